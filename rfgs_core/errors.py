@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Errors a user can act on, and the one place where they become a line on the terminal."""
+
+from __future__ import annotations
+
+import errno
+import sys
+from collections.abc import Callable
+
+
+class RfgsError(Exception):
+    """A mistake in the input or the machine's set-up: the message says what to do."""
+
+
+class RfgsFormatError(RfgsError, ValueError):
+    """A file that does not hold what its name or schema promises."""
+
+
+class MissingToolError(RfgsError):
+    """A program or library that is needed and not there; the message names the remedy."""
+
+
+def run_cli(command: Callable[[], int | None]) -> int:
+    """Runs a command and turns user errors into one clear line.
+
+    Args:
+        command: The command; its return value is the exit code, None meaning 0.
+
+    Returns:
+        Exit code: 2 for an `RfgsError` or a full disk, 130 after Ctrl-C.
+    """
+    try:
+        return command() or 0
+    except RfgsError as error:
+        sys.stderr.write(f"error: {error}\n")
+        return 2
+    except KeyboardInterrupt:
+        sys.stderr.write("\nstopped; finished work is kept, run the same command to continue\n")
+        return 130
+    except OSError as error:
+        if error.errno != errno.ENOSPC:
+            raise
+        where = f" while writing {error.filename}" if error.filename else ""
+        sys.stderr.write(
+            f"error: the disk is full{where}; free some space and run the same command again\n"
+        )
+        return 2

@@ -1,0 +1,9 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Radios: presets, antenna layouts, materials and what a scene must satisfy for them."""
+
+from __future__ import annotations
+
+from rfgs_core.radio.layout import DevicePose, Layout, layout, place_devices
+from rfgs_core.radio.presets import PRESETS, Radio, preset
+
+__all__ = ["PRESETS", "DevicePose", "Layout", "Radio", "layout", "place_devices", "preset"]

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Radio presets: band, subcarriers, antennas and where devices stand by default."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float64
+
+from rfgs_core.errors import RfgsError
+from rfgs_core.radio.constants import SPEED_OF_LIGHT
+
+OwnLinks = Literal["included", "only", "excluded"]
+
+
+@dataclass(frozen=True)
+class Radio:
+    """One kind of radio, identical in every device of a scene."""
+
+    name: str
+    """Name used on the command line and in file paths."""
+    freq_min_hz: float
+    """Lower band edge [Hz]."""
+    freq_max_hz: float
+    """Upper band edge [Hz]."""
+    num_subcarriers: int
+    """Number of tones; they sit at the centres of equal slices of the band."""
+    tx_rows: int
+    """Transmitting elements of a device along its local z."""
+    tx_cols: int
+    """Transmitting elements of a device along its local y."""
+    rx_rows: int
+    """Receiving elements of a device along its local z."""
+    rx_cols: int
+    """Receiving elements of a device along its local y."""
+    tx_offset_m: tuple[float, float, float]
+    """Centre of the TX array in the device's own axes [m]; the RX array is at the origin."""
+    own_device_links: OwnLinks = "included"
+    """Whether a device hears its own transmitter: included, only (a radar) or excluded."""
+    num_devices: int = 4
+    """Devices placed by the preset's own rule when the scene brings none."""
+    heights_m: tuple[float, ...] = (1.2, 2.2)
+    """Heights above the floor that placed devices alternate between [m]."""
+    inset_m: float = 0.2
+    """Distance of placed devices from the scene's bounds [m]."""
+    power_dbm: float = 20.0
+    """Transmit power over the whole band [dBm]; CSI itself is a ratio and does not hold it."""
+    noise_figure_db: float = 7.0
+    """Receiver noise figure [dB]."""
+    pattern: str = "iso"
+    """Antenna pattern, one of Sionna's names."""
+    polarization: str = "V"
+    """Antenna polarisation, one of Sionna's names."""
+
+    @property
+    def bandwidth_hz(self) -> float:
+        """Width of the band [Hz]."""
+        return self.freq_max_hz - self.freq_min_hz
+
+    @property
+    def centre_hz(self) -> float:
+        """Centre of the band [Hz]."""
+        return 0.5 * (self.freq_min_hz + self.freq_max_hz)
+
+    @property
+    def subcarrier_spacing_hz(self) -> float:
+        """Distance between neighbouring tones [Hz]."""
+        return self.bandwidth_hz / self.num_subcarriers
+
+    @property
+    def wavelength_m(self) -> float:
+        """Wavelength at the band's centre [m]."""
+        return SPEED_OF_LIGHT / self.centre_hz
+
+    @property
+    def freq_hz(self) -> Float64[np.ndarray, "subcarrier"]:
+        """Absolute tone frequencies [Hz], ascending, shape (subcarrier,)."""
+        return self.freq_min_hz + (np.arange(self.num_subcarriers) + 0.5) * (
+            self.subcarrier_spacing_hz
+        )
+
+    @property
+    def unambiguous_path_m(self) -> float:
+        """Path length after which delays alias, c/Δf [m]."""
+        return SPEED_OF_LIGHT / self.subcarrier_spacing_hz
+
+    @property
+    def range_resolution_m(self) -> float:
+        """Range resolution of an out-and-back path, c/(2B) [m]."""
+        return SPEED_OF_LIGHT / (2.0 * self.bandwidth_hz)
+
+
+#: Every radio that can be asked for by name.
+PRESETS: dict[str, Radio] = {
+    radio.name: radio
+    for radio in (
+        Radio(
+            name="wifi",
+            freq_min_hz=5.72e9,
+            freq_max_hz=5.88e9,
+            num_subcarriers=64,
+            tx_rows=1,
+            tx_cols=1,
+            rx_rows=8,
+            rx_cols=8,
+            tx_offset_m=(0.0, 0.0, -0.3),
+        ),
+        Radio(
+            name="mmwave",
+            freq_min_hz=60e9,
+            freq_max_hz=64e9,
+            num_subcarriers=320,
+            tx_rows=8,
+            tx_cols=1,
+            rx_rows=1,
+            rx_cols=8,
+            tx_offset_m=(0.0, 0.05, 0.0),
+            own_device_links="only",
+            noise_figure_db=12.0,
+            power_dbm=12.0,
+        ),
+    )
+}
+
+
+def preset(name: str) -> Radio:
+    """Looks a radio up by name.
+
+    Raises:
+        RfgsError: No preset has that name; the message lists those that exist.
+    """
+    if name not in PRESETS:
+        raise RfgsError(f"unknown radio {name!r}; expected one of {', '.join(sorted(PRESETS))}")
+    return PRESETS[name]

@@ -1,0 +1,295 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reads scene bundles: what Blender knows about a scene, as plain files."""
+
+from __future__ import annotations
+
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from plyfile import PlyData, PlyParseError
+
+from rfgs_core.errors import RfgsFormatError
+from rfgs_core.files import inside, read_json
+
+SCHEMA = "rfgs-bundle/1"
+NUM_JOINTS = 17
+
+_FIELDS: dict[str, type | tuple[type, ...]] = {
+    "blend_name": str,
+    "blend_sha256": str,
+    "blender_version": str,
+    "fps": (int, float),
+    "frame_start": int,
+    "frame_end": int,
+    "frames": list,
+    "bounds_m": list,
+    "devices": list,
+    "cameras": list,
+    "materials": list,
+    "objects": list,
+    "instances": list,
+}
+_ROWS: dict[str, tuple[str, ...]] = {
+    "devices": ("name", "radio", "role", "position_m", "quat_wxyz"),
+    "cameras": ("name", "width", "height", "fl_x", "fl_y", "cx", "cy", "world_from_camera"),
+    "materials": ("name", "radio_material", "thickness_m", "scattering_coefficient"),
+    "objects": ("id", "name", "class", "instance", "moving", "files"),
+    "instances": ("id", "name", "class", "person"),
+}
+
+
+@dataclass(frozen=True)
+class Topology:
+    """What stays the same in every frame about everything that moves."""
+
+    faces: np.ndarray
+    """Vertex indices of each triangle, int32, shape (T, 3)."""
+    material: np.ndarray
+    """Index into the bundle's materials of each triangle, int32, shape (T,)."""
+    instance: np.ndarray
+    """Instance id of each triangle, int32, shape (T,)."""
+    segment: np.ndarray
+    """Joint of `rfgs_core.skeleton` that each triangle follows or -1, int32, shape (T,)."""
+    rest_vertices: np.ndarray
+    """Vertices in the rest pose [m], float32, shape (V, 3)."""
+
+
+@dataclass(frozen=True)
+class BundleFrame:
+    """Everything that moves, at one frame."""
+
+    frame: int
+    """Blender frame number."""
+    vertices: np.ndarray
+    """World positions [m], float32, shape (V, 3)."""
+    joints: np.ndarray
+    """Joint positions of each person [m], float32, shape (P, 17, 3)."""
+    person_instance: np.ndarray
+    """Instance id of each person, int32, shape (P,)."""
+    action: np.ndarray
+    """Action label of each person, shape (P,), strings."""
+
+
+@dataclass(frozen=True)
+class StaticMesh:
+    """One (object, material) pair of the static scene."""
+
+    name: str
+    """File name without suffix, `<object>__<material>`."""
+    material_index: int
+    """Index into the bundle's materials."""
+    vertices: np.ndarray
+    """World positions [m], float32, shape (V, 3)."""
+    faces: np.ndarray
+    """Vertex indices of each triangle, int32, shape (T, 3)."""
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """A scene bundle on disk."""
+
+    path: Path
+    """Folder of the bundle."""
+    info: dict[str, Any]
+    """All of `bundle.json`."""
+    devices: list[dict[str, Any]]
+    """Radio devices the scene brings."""
+    cameras: list[dict[str, Any]]
+    """Cameras by name."""
+    materials: list[dict[str, Any]]
+    """Materials that faces refer to by index."""
+    objects: list[dict[str, Any]]
+    """Objects of the scene."""
+    instances: list[dict[str, Any]]
+    """Instances, ids from 1; 0 is everything static."""
+    topology: Topology
+    """Triangles of everything that moves."""
+    bounds_m: np.ndarray
+    """Minimum and maximum of the scene over its frames [m], shape (2, 3)."""
+    frames: list[int]
+    """Frames that were exported."""
+    fps: float
+    """Frames per second."""
+
+    def frame(self, frame: int) -> BundleFrame:
+        """Reads what moves at one frame.
+
+        Raises:
+            RfgsFormatError: The file is missing, damaged or does not fit the topology.
+        """
+        path = self.path / "frames" / f"{frame:06d}.npz"
+        arrays = read_arrays(path, ("vertices", "joints", "person_instance", "action"))
+        vertices, joints = arrays["vertices"], arrays["joints"]
+        _expect(path, "vertices", vertices, self.topology.rest_vertices.shape)
+        people = len(arrays["person_instance"])
+        if people:
+            _expect(path, "joints", joints, (people, NUM_JOINTS, 3))
+        _expect(path, "action", arrays["action"], (people,))
+        return BundleFrame(
+            frame=frame,
+            vertices=vertices.astype(np.float32),
+            joints=joints.astype(np.float32).reshape(people, NUM_JOINTS, 3),
+            person_instance=arrays["person_instance"].astype(np.int32),
+            action=arrays["action"].astype(str),
+        )
+
+    def static_meshes(self) -> list[StaticMesh]:
+        """Reads every static mesh, in the order of the object table.
+
+        Raises:
+            RfgsFormatError: A mesh is missing, damaged or of an unknown material.
+        """
+        by_name = {sanitised(row["name"]): index for index, row in enumerate(self.materials)}
+        meshes = []
+        for row in self.objects:
+            for name in row["files"]:
+                path = inside(self.path, name)
+                material = path.stem.rpartition("__")[2]
+                if material not in by_name:
+                    raise RfgsFormatError(
+                        f"{path}: expected a name <object>__<material> with a material of "
+                        f"bundle.json, got material {material!r}"
+                    )
+                vertices, faces = read_ply_mesh(path)
+                meshes.append(StaticMesh(path.stem, by_name[material], vertices, faces))
+        return meshes
+
+
+def sanitised(name: str) -> str:
+    """A name as bundles spell it in file names: only letters, digits, `_` and `-`."""
+    return "".join(
+        char if char.isascii() and (char.isalnum() or char in "_-") else "_" for char in name
+    )
+
+
+def read_bundle(path: Path) -> Bundle:
+    """Opens a scene bundle and checks that it holds what its schema promises.
+
+    Args:
+        path: Folder with `bundle.json`.
+
+    Returns:
+        The bundle; frames and static meshes are read when asked for.
+
+    Raises:
+        RfgsError: There is no such bundle.
+        RfgsFormatError: A file is damaged, of another schema or contradicts another.
+    """
+    path = Path(path)
+    file = path / "bundle.json"
+    info = read_json(file)
+    _check_info(file, info)
+    bounds = np.asarray(info["bounds_m"], dtype=np.float64)
+    if bounds.shape != (2, 3) or not np.isfinite(bounds).all() or (bounds[1] < bounds[0]).any():
+        raise RfgsFormatError(f"{file}: bounds_m: expected [[min xyz], [max xyz]], got {bounds}")
+    topology = _read_topology(path / "topology.npz", info)
+    return Bundle(
+        path=path,
+        info=info,
+        devices=info["devices"],
+        cameras=info["cameras"],
+        materials=info["materials"],
+        objects=info["objects"],
+        instances=info["instances"],
+        topology=topology,
+        bounds_m=bounds,
+        frames=[int(frame) for frame in info["frames"]],
+        fps=float(info["fps"]),
+    )
+
+
+def read_arrays(path: Path, names: tuple[str, ...]) -> dict[str, np.ndarray]:
+    """Reads named arrays of an `.npz` file; pickled objects are refused.
+
+    Raises:
+        RfgsFormatError: The file is missing, damaged or lacks an array.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            missing = [name for name in names if name not in stored.files]
+            if missing:
+                raise RfgsFormatError(
+                    f"{path}: expected arrays {', '.join(names)}; missing {', '.join(missing)}"
+                )
+            return {name: stored[name] for name in names}
+    except FileNotFoundError as error:
+        raise RfgsFormatError(f"{path}: no such file; the folder is incomplete") from error
+    except (ValueError, EOFError, OSError, zipfile.BadZipFile) as error:
+        if isinstance(error, RfgsFormatError):
+            raise
+        raise RfgsFormatError(f"{path}: damaged array file ({error})") from error
+
+
+def read_ply_mesh(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Reads a triangle mesh.
+
+    Returns:
+        Vertices float32 (V, 3) and faces int32 (T, 3).
+
+    Raises:
+        RfgsFormatError: The file is missing, not a PLY, truncated or not made of triangles.
+    """
+    try:
+        ply = PlyData.read(str(path))
+        vertex = ply["vertex"].data
+        vertices = np.stack([vertex[axis] for axis in "xyz"], axis=1).astype(np.float32)
+        rows = ply["face"].data["vertex_indices"]
+        faces = np.vstack(rows).astype(np.int32) if len(rows) else np.zeros((0, 3), np.int32)
+    except FileNotFoundError as error:
+        raise RfgsFormatError(f"{path}: no such file; the folder is incomplete") from error
+    except (PlyParseError, KeyError, ValueError, OSError) as error:
+        raise RfgsFormatError(f"{path}: expected a triangle mesh in PLY ({error})") from error
+    if faces.shape[1] != 3 or (faces.size and not 0 <= faces.min() <= faces.max() < len(vertices)):
+        raise RfgsFormatError(f"{path}: expected triangles of existing vertices")
+    return vertices, faces
+
+
+def _check_info(file: Path, info: Any) -> None:
+    schema = info.get("schema") if isinstance(info, dict) else None
+    if schema != SCHEMA:
+        raise RfgsFormatError(f"{file}: expected schema {SCHEMA!r}, got {schema!r}")
+    for name, kind in _FIELDS.items():
+        if not isinstance(info.get(name), kind):
+            raise RfgsFormatError(f"{file}: field {name!r} is missing or of the wrong type")
+    for table, columns in _ROWS.items():
+        for index, row in enumerate(info[table]):
+            missing = [column for column in columns if column not in row]
+            if missing:
+                raise RfgsFormatError(f"{file}: {table}[{index}] lacks {', '.join(missing)}")
+    if info["fps"] <= 0 or not info["frames"]:
+        raise RfgsFormatError(f"{file}: expected fps > 0 and at least one frame")
+
+
+def _read_topology(path: Path, info: dict[str, Any]) -> Topology:
+    names = ("faces", "material", "instance", "segment", "rest_vertices")
+    arrays = read_arrays(path, names)
+    faces, vertices = arrays["faces"], arrays["rest_vertices"]
+    _expect(path, "faces", faces, (len(faces), 3))
+    _expect(path, "rest_vertices", vertices, (len(vertices), 3))
+    for name in ("material", "instance", "segment"):
+        _expect(path, name, arrays[name], (len(faces),))
+    instances = {row["id"] for row in info["instances"]}
+    limits = {"faces": len(vertices), "material": len(info["materials"])}
+    for name, limit in limits.items():
+        values = arrays[name]
+        if values.size and not 0 <= values.min() <= values.max() < limit:
+            raise RfgsFormatError(f"{path}: {name}: expected indices below {limit}")
+    if not set(np.unique(arrays["instance"]).tolist()) <= instances:
+        raise RfgsFormatError(f"{path}: instance: expected ids of the table in bundle.json")
+    return Topology(
+        faces=faces.astype(np.int32),
+        material=arrays["material"].astype(np.int32),
+        instance=arrays["instance"].astype(np.int32),
+        segment=arrays["segment"].astype(np.int32),
+        rest_vertices=vertices.astype(np.float32),
+    )
+
+
+def _expect(path: Path, name: str, array: np.ndarray, shape: tuple[int, ...]) -> None:
+    if array.shape != shape:
+        raise RfgsFormatError(f"{path}: {name}: expected shape {shape}, got {array.shape}")
+    if array.dtype.kind == "f" and not np.isfinite(array).all():
+        raise RfgsFormatError(f"{path}: {name}: expected finite numbers")

@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""RF-GS inside Blender: radio properties, scene bundles, ground truth, Gaussians.
+
+Works as an extension of Blender 4.2 and newer and as a package beside pip `bpy`.
+"""
+
+from . import properties
+
+_MODULES = (properties,)
+
+
+def register() -> None:
+    """Registers everything; called by Blender when the extension is enabled."""
+    for module in _MODULES:
+        module.register()
+
+
+def unregister() -> None:
+    """Takes back everything that `register` added."""
+    for module in reversed(_MODULES):
+        module.unregister()

@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the add-on stores in a .blend: one property group each on objects, materials, scenes."""
+
+import zlib
+
+import bpy
+
+from .tables import MATERIALS, RADIOS
+
+ROLES = [
+    ("NONE", "None", "Not a radio device", 0),
+    ("ACCESS_POINT", "Access point", "Transmits and receives", 1),
+    ("TRANSMITTER", "Transmitter", "Only transmits", 2),
+    ("RECEIVER", "Receiver", "Only receives", 3),
+]
+
+CLASSES = [
+    ("AUTO", "Automatic", "Person if skinned to an armature, else static or other", 0),
+    ("STATIC", "Static", "Part of the environment; must not move", 1),
+    ("PERSON", "Person", "A moving human body", 2),
+    ("VEHICLE", "Vehicle", "A rigid moving metal object", 3),
+    ("IGNORE", "Ignore", "Invisible to radio and left out of the bundle", 4),
+]
+
+DISPLAY_MODES = [
+    ("points", "Points", "One sphere of equal size per Gaussian; fast", 0),
+    ("ellipsoids", "Ellipsoids", "One ellipsoid per Gaussian at one standard deviation", 1),
+]
+
+
+def _material_items() -> list[tuple[str, str, str, int]]:
+    """Enum rows whose stored numbers follow from the name, so a longer table shifts nothing."""
+    items = [("AUTO", "Guess", "Guess the material from names and shape", 0)]
+    for name, row in MATERIALS.items():
+        band = f"{row['freq_min_hz'] / 1e9:g}–{row['freq_max_hz'] / 1e9:g} GHz"
+        number = zlib.crc32(name.encode()) & 0x7FFFFFFF
+        label = name.replace("_", " ").capitalize()
+        items.append((name, label, f"Valid {band}, {row['thickness_m']:g} m thick", number))
+    return items
+
+
+def _search_radios(_self: object, _context: object, text: str) -> list[str]:
+    return [name for name in ("any", *RADIOS) if text.lower() in name]
+
+
+class RFGS_PG_object(bpy.types.PropertyGroup):
+    """Radio meaning of an object."""
+
+    role: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Role",
+        description="What this Empty is in the radio scene; its local +X is the boresight",
+        items=ROLES,
+        default="NONE",
+    )
+    radio: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Radio",
+        description="Preset this device belongs to, or 'any' for every radio",
+        default="any",
+        search=_search_radios,
+    )
+    object_class: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Class",
+        description="What this mesh is to the radio",
+        items=CLASSES,
+        default="AUTO",
+    )
+    instance: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Instance",
+        description="Objects of one name form one instance in masks; empty: the object itself",
+        default="",
+    )
+
+
+class RFGS_PG_material(bpy.types.PropertyGroup):
+    """Radio meaning of a material."""
+
+    radio_material: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Radio material",
+        description="Electrical model of this surface",
+        items=_material_items(),
+        default="AUTO",
+    )
+    thickness_m: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="Thickness",
+        description="Thickness of the slab behind this surface [m]; 0 takes the material's own",
+        default=0.0,
+        min=0.0,
+        soft_max=1.0,
+        precision=4,
+        step=0.1,
+    )
+    scattering_coefficient: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="Scattering",
+        description="Share of the reflected field's amplitude that is scattered diffusely, 0 to 1",
+        default=0.0,
+        min=0.0,
+        max=1.0,
+    )
+
+
+class RFGS_PG_scene(bpy.types.PropertyGroup):
+    """Settings of the panel."""
+
+    frames: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Frames",
+        description="First:last or first:last:step, both ends included; empty: the whole range",
+        default="",
+    )
+    cameras: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Cameras", description="First N cameras by name; 0: all", default=0, min=0
+    )
+    resolution: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Resolution",
+        description="Longer side of the pictures [px]; 0: the scene's own",
+        default=0,
+        min=0,
+        subtype="PIXEL",
+    )
+    bundle_folder: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Bundle",
+        description="Folder the scene bundle is written to",
+        default="//rfgs_bundle",
+        subtype="DIR_PATH",
+    )
+    pictures_folder: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Pictures",
+        description="Folder the ground truth is written to",
+        default="//rfgs_pictures",
+        subtype="DIR_PATH",
+    )
+    samples: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Samples", description="Cycles samples per pixel", default=16, min=1
+    )
+    passes: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Depth, normals, masks",
+        description="Also write a multilayer EXR per picture",
+        default=True,
+    )
+    gaussians_path: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Gaussians",
+        description="A run folder, its gaussians folder or one 3DGS PLY",
+        default="",
+        subtype="FILE_PATH",
+    )
+    display_mode: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Show as", items=DISPLAY_MODES, default="points"
+    )
+    opacity_threshold: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="Opacity threshold",
+        description="Gaussians below this opacity are hidden",
+        default=0.1,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+    )
+
+
+CLASSES_TO_REGISTER = (RFGS_PG_object, RFGS_PG_material, RFGS_PG_scene)
+
+
+def register() -> None:
+    """Adds `rfgs` to objects, materials and scenes."""
+    for cls in CLASSES_TO_REGISTER:
+        bpy.utils.register_class(cls)
+    bpy.types.Object.rfgs = bpy.props.PointerProperty(type=RFGS_PG_object)
+    bpy.types.Material.rfgs = bpy.props.PointerProperty(type=RFGS_PG_material)
+    bpy.types.Scene.rfgs = bpy.props.PointerProperty(type=RFGS_PG_scene)
+
+
+def unregister() -> None:
+    """Takes everything back that `register` added."""
+    del bpy.types.Scene.rfgs
+    del bpy.types.Material.rfgs
+    del bpy.types.Object.rfgs
+    for cls in reversed(CLASSES_TO_REGISTER):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Radios, materials and joints shared with the rest of RF-GS; `make sync` writes the file."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+_TABLES = json.loads((Path(__file__).parent / "tables.json").read_text("utf-8"))
+
+#: Name and one-line description of every radio preset.
+RADIOS: dict[str, str] = {row["name"]: row["description"] for row in _TABLES["radios"]}
+
+#: Radio materials by name, each with freq_min_hz, freq_max_hz, thickness_m [m] and color.
+MATERIALS: dict[str, dict] = {row["name"]: row for row in _TABLES["materials"]}
+
+#: Names of the 17 joints, in the order of every joint array.
+JOINTS: tuple[str, ...] = tuple(_TABLES["joints"])
+
+#: Index of each joint's parent, -1 for the root.
+PARENTS: tuple[int, ...] = tuple(_TABLES["parents"])

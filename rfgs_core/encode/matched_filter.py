@@ -21,52 +21,70 @@ from rfgs_core.radio.constants import SPEED_OF_LIGHT
 OVERSAMPLING = 16
 
 
-#: Points handled by one thread before it fetches more; sets the size of its scratch arrays.
-CHUNK = 256
+#: Points that share one pass over all links, so that a link's profile stays in cache.
+CHUNK = 64
 
 
-@numba.njit(fastmath=True, cache=True, inline="always")
-def _legs(point, elements, centre_k, distance, turn):
-    """Distance from a point to each element and the phasor exp(+j k d) per sub-band."""
-    for e in range(elements.shape[0]):
-        dx, dy, dz = (
-            point[0] - elements[e, 0],
-            point[1] - elements[e, 1],
-            point[2] - elements[e, 2],
-        )
-        d = np.sqrt(dx * dx + dy * dy + dz * dz)
-        distance[e] = d
-        for band in range(centre_k.shape[0]):
-            # Reduce in double: at 60 GHz the phase is thousands of radians.
-            cycles = centre_k[band] * d / (2.0 * np.pi)
-            phase = np.float32(2.0 * np.pi * (cycles - np.floor(cycles)))
-            turn[band, e] = np.complex64(np.cos(phase) + 1j * np.sin(phase))
+@numba.njit(fastmath=True, cache=True)
+def _legs(points, elements, k, distance, turn):
+    """Distances of each element to a chunk of points and the phasors exp(+j k d).
 
-
-@numba.njit(parallel=True, fastmath=True, cache=True)
-def _back_project(profiles, centre_k, samples_per_m, tx_xyz, rx_xyz, links, points, out):
-    """Adds each link's profile, read at the point's path length, to its pair's sum.
-
-    `links` holds transmitting element, receiving element and pair of each profile.
+    Phases are reduced in double: at 60 GHz they reach thousands of radians.
     """
-    num_links, num_bands, num_samples = profiles.shape
+    for e in range(elements.shape[0]):
+        for n in range(points.shape[0]):
+            dx = points[n, 0] - elements[e, 0]
+            dy = points[n, 1] - elements[e, 1]
+            dz = points[n, 2] - elements[e, 2]
+            d = np.sqrt(dx * dx + dy * dy + dz * dz)
+            distance[e, n] = d
+            cycles = k * d / (2.0 * np.pi)
+            phase = np.float32(2.0 * np.pi * (cycles - np.floor(cycles)))
+            turn[0, e, n] = np.cos(phase)
+            turn[1, e, n] = np.sin(phase)
+
+
+@numba.njit(fastmath=True, cache=True)
+def _read_profile(profile, samples_per_m, d_t, d_r, turn_t, turn_r, total):
+    """Adds one link's profile at the path lengths of a chunk, turned back by its phase."""
+    size = profile.shape[1] - 1
+    for n in range(d_t.shape[0]):
+        at = (d_t[n] + d_r[n]) * samples_per_m
+        at -= size * np.floor(at / size)
+        low = np.int32(at)
+        frac = np.float32(at - low)
+        re = profile[0, low] + frac * (profile[0, low + 1] - profile[0, low])
+        im = profile[1, low] + frac * (profile[1, low + 1] - profile[1, low])
+        cos = turn_t[0, n] * turn_r[0, n] - turn_t[1, n] * turn_r[1, n]
+        sin = turn_t[0, n] * turn_r[1, n] + turn_t[1, n] * turn_r[0, n]
+        total[0, n] += re * cos - im * sin
+        total[1, n] += re * sin + im * cos
+
+
+@numba.njit(parallel=True, cache=True)
+def _back_project(profiles, centre_k, samples_per_m, tx_xyz, rx_xyz, links, points, out):
+    """Fills `out[pair, band, re/im, point]`; `links` rows are tx, rx and pair of a profile."""
     for chunk in numba.prange((points.shape[0] + CHUNK - 1) // CHUNK):
-        d_t, turn_t = np.zeros(len(tx_xyz)), np.zeros((num_bands, len(tx_xyz)), np.complex64)
-        d_r, turn_r = np.zeros(len(rx_xyz)), np.zeros((num_bands, len(rx_xyz)), np.complex64)
-        for n in range(chunk * CHUNK, min((chunk + 1) * CHUNK, points.shape[0])):
-            _legs(points[n], tx_xyz, centre_k, d_t, turn_t)
-            _legs(points[n], rx_xyz, centre_k, d_r, turn_r)
-            for link in range(num_links):
-                t, r, pair = links[link, 0], links[link, 1], links[link, 2]
-                at = (d_t[t] + d_r[r]) * samples_per_m
-                low = int(at)
-                frac = np.float32(at - low)
-                low = low % num_samples
-                high = low + 1 if low + 1 < num_samples else 0
-                for band in range(num_bands):
-                    value = profiles[link, band, low] * (np.float32(1) - frac)
-                    value += profiles[link, band, high] * frac
-                    out[n, pair, band] += value * turn_t[band, t] * turn_r[band, r]
+        here = slice(chunk * CHUNK, min((chunk + 1) * CHUNK, points.shape[0]))
+        count = here.stop - here.start
+        d_t = np.zeros((len(tx_xyz), count))
+        d_r = np.zeros((len(rx_xyz), count))
+        turn_t = np.zeros((2, len(tx_xyz), count), np.float32)
+        turn_r = np.zeros((2, len(rx_xyz), count), np.float32)
+        for band in range(len(centre_k)):
+            _legs(points[here], tx_xyz, centre_k[band], d_t, turn_t)
+            _legs(points[here], rx_xyz, centre_k[band], d_r, turn_r)
+            for link in range(len(links)):
+                t, r, pair = links[link]
+                _read_profile(
+                    profiles[link, band],
+                    samples_per_m,
+                    d_t[t],
+                    d_r[r],
+                    turn_t[:, t],
+                    turn_r[:, r],
+                    out[pair, band, :, here],
+                )
 
 
 def _band_profiles(
@@ -121,9 +139,12 @@ def matched_filter(
     link_pair = pair[tx_index, rx_index].astype(np.int64)
     profiles, centre_k, samples_per_m = _band_profiles(csi[tx_index, rx_index], freq_hz, num_bands)
     num_pairs = int(link_pair.max()) + 1
-    out = np.zeros((len(points), num_pairs, num_bands), dtype=np.complex64)
+    out = np.zeros((num_pairs, num_bands, 2, len(points)), dtype=np.float32)
+    # The first sample again at the end: reading between the last two needs no wrap.
+    profiles = np.concatenate([profiles, profiles[..., :1]], axis=2)
+    split = np.stack([profiles.real, profiles.imag], axis=2)
     _back_project(
-        profiles,
+        split,
         centre_k,
         samples_per_m,
         np.ascontiguousarray(tx_xyz, dtype=np.float64),
@@ -133,7 +154,8 @@ def matched_filter(
         out,
     )
     counts = np.bincount(link_pair, minlength=num_pairs)
-    return out.transpose(1, 2, 0) / np.maximum(counts, 1)[:, None, None].astype(np.float32)
+    total = out[:, :, 0] + 1j * out[:, :, 1]
+    return total / np.maximum(counts, 1)[:, None, None].astype(np.float32)
 
 
 def device_pairs(

@@ -1,0 +1,102 @@
+#!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
+# Installs a real Blender >= 5.0 into DIR (default .blender) from Debian unstable, beside the
+# running system and without touching it, and leaves the wrapper DIR/blender.
+# Falls back to Debian 13's 4.3 where unstable cannot be installed, and says which it took.
+set -eu
+
+usage() { echo "usage: $0 [DIR]    installs Blender into DIR (default: .blender of this clone)"; }
+fail() { echo "error: $*" >&2; exit 2; }
+
+case "${1:-}" in
+  -h | --help) usage; exit 0 ;;
+  -*) usage >&2; exit 2 ;;
+esac
+clone=$(cd "$(dirname "$0")/.." && pwd)
+dir=${1:-$clone/.blender}
+
+version_of() { "$1" --version 2>/dev/null | sed -n 's/^Blender \([0-9][0-9.]*\).*/\1/p' | head -n 1; }
+
+if [ -x "$dir/blender" ]; then
+  version=$(version_of "$dir/blender")
+  if [ -n "$version" ]; then
+    echo "Blender $version is already in $dir"
+    exit 0
+  fi
+fi
+
+[ "$(id -u)" = 0 ] || fail "installing Blender needs root; run: sudo $0 $dir
+(or set BLENDER=/path/to/a/blender of version 5.0 or newer)"
+command -v debootstrap >/dev/null || fail "debootstrap is missing; run: apt-get install debootstrap"
+command -v apt-get >/dev/null || fail "this script needs Debian's apt; set BLENDER=/path/to/blender instead"
+
+# The mirror this machine already uses: the first Debian main archive in apt's configuration.
+mirror=$(apt-get indextargets --format '$(ORIGIN) $(COMPONENT) $(REPO_URI)' 'Created-By: Packages' |
+  awk '$1 == "Debian" && $2 == "main" && $3 ~ /^(http|https|file|ftp):/ && $3 !~ /security/ { print $3; exit }')
+[ -n "$mirror" ] || fail "apt knows no Debian mirror; run 'apt-get update', or set BLENDER=/path/to/blender"
+
+mkdir -p "$dir"
+dir=$(cd "$dir" && pwd)
+
+# $1: suite. Leaves $dir/root complete, or absent.
+install_suite() {
+  staging=$dir/.staging-$1
+  rm -rf "$staging"
+  echo "installing Blender from Debian $1 into $dir (about two minutes, 2 GB)"
+  log=$dir/install-$1.log
+  # No deb-src and no device nodes: only the files are used, from outside of the folder.
+  debootstrap --variant=minbase "$1" "$staging" "$mirror" >"$log" 2>&1 || return 1
+  # Downloads go through this machine's own apt settings (proxies, credentials helpers).
+  for setting in Acquire::http::Proxy Acquire::https::Proxy; do
+    value=$(apt-config shell v "$setting" | sed "s/^v='\(.*\)'$/\1/")
+    [ -z "$value" ] || echo "$setting \"$value\";" >>"$staging/etc/apt/apt.conf.d/90proxy"
+  done
+  cp /etc/resolv.conf "$staging/etc/resolv.conf" 2>/dev/null || true
+  DEBIAN_FRONTEND=noninteractive chroot "$staging" \
+    apt-get install -y --no-install-recommends blender python3-numpy >>"$log" 2>&1 || return 1
+  chroot "$staging" apt-get clean
+  rm -rf "$dir/root"
+  mv "$staging" "$dir/root"
+}
+
+suite=sid
+if ! install_suite sid; then
+  echo "Debian unstable cannot be installed here (see $dir/install-sid.log); trying Debian 13's Blender 4.3" >&2
+  rm -rf "$dir/.staging-sid"
+  suite=trixie
+  if ! install_suite trixie; then
+    rm -rf "$dir/.staging-trixie"
+    fail "Debian 13 failed too, see $dir/install-trixie.log; set BLENDER=/path/to/blender instead"
+  fi
+fi
+
+# The loader and every library come from the folder, so the host's own versions do not matter.
+cat >"$dir/blender" <<'WRAPPER'
+#!/bin/sh
+# Runs the Blender below this folder with its own libraries.
+here=$(cd "$(dirname "$(readlink -f "$0")")" && pwd)
+root=$here/root
+arch=$(basename "$(dirname "$(ls -d "$root"/usr/lib/*-linux-gnu*/libc.so.6)")")
+lib=$root/usr/lib/$arch
+loader=$(ls "$root"/usr/lib64/ld-linux-*.so.* "$lib"/ld-linux-*.so.* 2>/dev/null | head -n 1)
+resources=$(ls -d "$root"/usr/share/blender/[0-9]* 2>/dev/null | head -n 1)
+[ -n "$resources" ] || resources=$root/usr/share/blender
+python=$(ls -d "$root"/usr/lib/python3.[0-9]* | head -n 1)
+export BLENDER_SYSTEM_RESOURCES="$resources"
+export BLENDER_SYSTEM_SCRIPTS="$resources/scripts"
+export BLENDER_SYSTEM_DATAFILES="$resources/datafiles"
+export BLENDER_SYSTEM_PYTHON="$root/usr" PYTHONHOME="$root/usr"
+export LIBGL_DRIVERS_PATH="$lib/dri"
+unset PYTHONPATH
+case "$python" in '') echo "no Python below $root" >&2; exit 2 ;; esac
+exec "$loader" --library-path "$lib:$lib/blas:$lib/lapack:$lib/pulseaudio:$root/usr/lib" \
+  "$root/usr/bin/blender" "$@"
+WRAPPER
+chmod +x "$dir/blender"
+
+version=$(version_of "$dir/blender")
+[ -n "$version" ] || fail "$dir/blender does not start; try: $dir/blender --version"
+echo "Blender $version (Debian $suite) is ready: $dir/blender"
+case "$version" in
+  [0-4].*) echo "warning: this is older than 5.0; tests against Blender 5 need BLENDER=/path/to/a/newer/one" >&2 ;;
+esac

@@ -1,0 +1,49 @@
+# Targets set up what they need: an environment in .venv/ of this clone and, when run as root on
+# a Debian-like system, the few system libraries that Sionna RT and Blender load.
+SHELL := /bin/bash
+PYTHON ?= python3.11
+VENV := .venv/bin
+READY := .venv/.ready
+# A machine with only `python3` is fine as long as that is Python 3.11.
+PYTHON_FOUND := $(shell command -v $(PYTHON) || command -v python3)
+
+.PHONY: demo test test-slow test-blender lint format sync system clean
+
+demo: $(READY) system
+	$(VENV)/rfgs demo --out demo
+
+test: $(READY) system
+	$(VENV)/pytest -m "not slow and not blender" tests
+
+test-slow: $(READY) system
+	$(VENV)/pytest -m "slow and not blender" tests
+
+test-blender: $(READY) system
+	bash .ci/test_blender.sh
+
+lint: $(READY)
+	$(VENV)/ruff check .
+	$(VENV)/ruff format --check .
+	$(VENV)/pyright
+
+format: $(READY)
+	$(VENV)/ruff check --fix .
+	$(VENV)/ruff format .
+
+sync: $(READY)
+	$(VENV)/python -m rfgs_core.sync
+
+system:
+	@bash .ci/system_libraries.sh
+
+$(READY): pyproject.toml constraints.txt
+	@$(PYTHON_FOUND) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' || { \
+	  echo "error: Python 3.11 is needed (bpy 4.5 has no wheels for others); found $$($(PYTHON_FOUND) --version 2>&1). Install it, or run: make PYTHON=/path/to/python3.11 ..."; exit 2; }
+	$(PYTHON_FOUND) -m venv .venv
+	$(VENV)/python -m pip install --quiet --upgrade pip
+	@echo "Installing the pinned packages (about 2 GB on disk, several minutes) ..."
+	$(VENV)/python -m pip install --quiet --constraint constraints.txt --editable ".[dev,cluster,scenes]"
+	@touch $(READY)
+
+clean:
+	rm -rf .venv .blender demo

@@ -1,0 +1,10 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Shape checks at run time for every test: jaxtyping annotations are enforced by beartype."""
+
+from __future__ import annotations
+
+from jaxtyping import install_import_hook
+
+install_import_hook(
+    ["rfgs_core.radio", "rfgs_core.encode", "rfgs_core.gaussians"], "beartype.beartype"
+)

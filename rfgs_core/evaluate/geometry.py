@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where the moving surface is: F-scores, Chamfer distance, centroid and height.
+
+A method gives a score on the grid; its K best voxels are its prediction. K follows from the
+nominal surface of what moves, never from the frame, so a method cannot be helped by knowing
+how much of the body is visible.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numba
+import numpy as np
+from jaxtyping import Float, Float64, Int, Int64
+from scipy.spatial import KDTree
+
+from rfgs_core.errors import RfgsError
+from rfgs_core.evaluate.grid import VOXEL_M, Grid
+
+#: Distances at which precision and recall are taken [m], by metric name.
+THRESHOLDS_M = {"f05": 0.05, "f10": 0.10, "f20": 0.20}
+#: Names of the geometry group in `metrics.json`.
+GEOMETRY_KEYS = (*THRESHOLDS_M, "f10_best", "chamfer_m", "centroid_m", "height_m", "tracked")
+#: A frame counts as tracked if the predicted centroid is this close [m].
+TRACKED_M = 0.5
+#: `f10_best` looks at every K up to this many times the nominal one.
+BEST_K_FACTOR = 4
+#: Height is the distance between these percentiles of z, so that one stray voxel does not set it.
+HEIGHT_PERCENTILES = (2.5, 97.5)
+#: K over the number of voxel faces the nominal surface covers; a surface cuts ~1.5 voxels per face.
+VOXELS_PER_FACE = 1.5
+
+
+def voxel_budget(instances: Sequence[dict[str, Any]], voxel_m: float = VOXEL_M) -> int:
+    """K, the number of voxels a method may predict.
+
+    Args:
+        instances: Instance table of the sequence; those with a `nominal_surface_m2` count.
+        voxel_m: Edge of a voxel [m].
+
+    Raises:
+        RfgsError: No instance has a nominal surface.
+
+    Example:
+        >>> voxel_budget([{"id": 1, "nominal_surface_m2": 1.6}])
+        1500
+    """
+    surface = sum(float(entry.get("nominal_surface_m2") or 0.0) for entry in instances)
+    if surface <= 0.0:
+        raise RfgsError(
+            "no instance of this sequence has a nominal_surface_m2, so there is nothing that "
+            "moves to compare with; give one in the instance table of sequence.json"
+        )
+    return round(VOXELS_PER_FACE * surface / voxel_m**2)
+
+
+def reference_points(
+    vertices: Float[np.ndarray, "V 3"],
+    faces: Int[np.ndarray, "T 3"],
+    n: int = 20000,
+    seed: int = 0,
+) -> Float64[np.ndarray, "n 3"]:
+    """Points on a mesh, spread evenly over its area.
+
+    Args:
+        vertices: Vertex positions [m].
+        faces: Vertex indices of the triangles.
+        n: Number of points.
+        seed: Seed of the sampling.
+
+    Returns:
+        Points [m].
+
+    Raises:
+        RfgsError: The mesh has no area.
+    """
+    corners = np.asarray(vertices, dtype=np.float64)[np.asarray(faces)]
+    edge_a, edge_b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    area = 0.5 * np.linalg.norm(np.cross(edge_a, edge_b), axis=1)
+    if not area.sum() > 0.0:
+        raise RfgsError(f"expected a moving mesh with area, got {len(faces)} faces of zero area")
+    generator = np.random.default_rng(seed)
+    face = generator.choice(len(area), size=n, p=area / area.sum())
+    # Uniform over a triangle: fold the unit square along its diagonal.
+    u, v = generator.random((2, n))
+    fold = u + v > 1.0
+    u[fold], v[fold] = 1.0 - u[fold], 1.0 - v[fold]
+    return corners[face, 0] + u[:, None] * edge_a[face] + v[:, None] * edge_b[face]
+
+
+def best_voxels(score: Float[np.ndarray, "x y z"], count: int) -> Int64[np.ndarray, "k"]:
+    """Flat indices of the `count` highest positive scores, best first, ties by index."""
+    flat = np.asarray(score, dtype=np.float32).ravel()
+    candidates = np.flatnonzero(flat > 0.0)
+    if len(candidates) > count:
+        limit = np.partition(flat[candidates], len(candidates) - count)[len(candidates) - count]
+        candidates = candidates[flat[candidates] >= limit]
+    order = np.argsort(-flat[candidates], kind="stable")[:count]
+    return candidates[order]
+
+
+@numba.njit(cache=True, parallel=True)
+def _first_rank(rank, origin, voxel, points, radius):
+    """Lowest rank among the voxels whose centre is within `radius` of each point."""
+    reach = int(np.ceil(radius / voxel)) + 1
+    out = np.full(points.shape[0], np.iinfo(np.int64).max, dtype=np.int64)
+    for n in numba.prange(points.shape[0]):
+        base = np.floor((points[n] - origin) / voxel).astype(np.int64)
+        best = np.iinfo(np.int64).max
+        for i in range(max(base[0] - reach, 0), min(base[0] + reach + 1, rank.shape[0])):
+            for j in range(max(base[1] - reach, 0), min(base[1] + reach + 1, rank.shape[1])):
+                for k in range(max(base[2] - reach, 0), min(base[2] + reach + 1, rank.shape[2])):
+                    if rank[i, j, k] >= best:
+                        continue
+                    dx = origin[0] + (i + 0.5) * voxel - points[n, 0]
+                    dy = origin[1] + (j + 0.5) * voxel - points[n, 1]
+                    dz = origin[2] + (k + 0.5) * voxel - points[n, 2]
+                    if dx * dx + dy * dy + dz * dz <= radius * radius:
+                        best = rank[i, j, k]
+        out[n] = best
+    return out
+
+
+def f_score_curve(
+    ranked: Int64[np.ndarray, "k"],
+    distance_m: Float[np.ndarray, "k"],
+    grid: Grid,
+    reference: Float[np.ndarray, "n 3"],
+    threshold_m: float,
+) -> Float64[np.ndarray, "k"]:
+    """F-score at one threshold if only the first 1, 2, … of the ranked voxels are predicted.
+
+    Precision is the share of predicted centres within the threshold of the reference, recall
+    the share of reference points within the threshold of a predicted centre, F = 2PR/(P+R).
+
+    Args:
+        ranked: Flat voxel indices, best first.
+        distance_m: Distance of each of them to the nearest reference point [m].
+        grid: Their grid.
+        reference: Points on the true surface [m].
+        threshold_m: Distance that counts as a hit [m].
+    """
+    count = np.arange(1, len(ranked) + 1)
+    precision = np.cumsum(distance_m <= threshold_m) / count
+    rank = np.full(grid.size, np.iinfo(np.int64).max, dtype=np.int64)
+    rank[ranked] = np.arange(len(ranked))
+    first = _first_rank(
+        rank.reshape(grid.shape), np.asarray(grid.origin_m), grid.voxel_m, reference, threshold_m
+    )
+    covered = np.bincount(first[first < len(ranked)], minlength=len(ranked))
+    recall = np.cumsum(covered) / len(reference)
+    return 2.0 * precision * recall / np.maximum(precision + recall, 1e-30)
+
+
+def geometry_metrics(
+    score: Float[np.ndarray, "x y z"],
+    grid: Grid,
+    reference: Float[np.ndarray, "n 3"],
+    k: int,
+) -> dict[str, float | None]:
+    """Geometry group of one frame.
+
+    Args:
+        score: Score per voxel; only positive scores can be predicted.
+        grid: Grid of the score.
+        reference: Points on the true surface [m], see `reference_points`.
+        k: Number of voxels to predict, see `voxel_budget`.
+
+    Returns:
+        `f05, f10, f20` at K; `f10_best` over K up to four times that; `chamfer_m`, the mean of
+        both mean nearest distances; `centroid_m`, distance between centroids; `height_m`,
+        error of the vertical extent; `tracked`, 1 or 0. Distances are None if nothing is
+        predicted.
+    """
+    if score.shape != grid.shape:
+        raise ValueError(f"expected a score of shape {grid.shape}, got {score.shape}")
+    reference = np.ascontiguousarray(reference, dtype=np.float64)
+    ranked = best_voxels(score, BEST_K_FACTOR * k)
+    if len(ranked) == 0:
+        nothing: dict[str, float | None] = dict.fromkeys(GEOMETRY_KEYS)
+        return nothing | {"f05": 0.0, "f10": 0.0, "f20": 0.0, "f10_best": 0.0, "tracked": 0.0}
+    centres = grid.centres(ranked)
+    distance_m = KDTree(reference).query(centres, workers=-1)[0]
+    last = min(k, len(ranked)) - 1
+    result: dict[str, float | None] = {}
+    for name, threshold_m in THRESHOLDS_M.items():
+        curve = f_score_curve(ranked, distance_m, grid, reference, threshold_m)
+        result[name] = float(curve[last])
+        if name == "f10":
+            result["f10_best"] = float(curve.max())
+    predicted = centres[: last + 1]
+    back_m = KDTree(predicted).query(reference, workers=-1)[0]
+    result["chamfer_m"] = float(0.5 * (distance_m[: last + 1].mean() + back_m.mean()))
+    centroid_m = float(np.linalg.norm(predicted.mean(axis=0) - reference.mean(axis=0)))
+    result["centroid_m"] = centroid_m
+    result["height_m"] = abs(_height_m(predicted) - _height_m(reference))
+    result["tracked"] = float(centroid_m <= TRACKED_M)
+    return result
+
+
+def _height_m(points: Float[np.ndarray, "n 3"]) -> float:
+    """Vertical extent between two percentiles [m]."""
+    low, high = np.percentile(points[:, 2], HEIGHT_PERCENTILES)
+    return float(high - low)

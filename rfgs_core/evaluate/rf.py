@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How well channel entries that training never saw are predicted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Complex, Float, Int
+
+#: Metrics of the RF group and, where it exists, the median over frames beside the pooled value.
+RF_KEYS = ("element_snr_db", "subcarrier_snr_db", "device_gain_mae_db", "delay_profile_corr")
+#: Ratio under which a power counts as nothing, far below single precision [ratio].
+NEGLIGIBLE = 1e-14
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Which entries of a channel training must not see; the three kinds do not overlap."""
+
+    element: Bool[np.ndarray, "tx rx subcarrier"]
+    """Held-out array columns, at training tones."""
+    subcarrier: Bool[np.ndarray, "tx rx subcarrier"]
+    """Held-out tones, at training elements."""
+    pair_links: Bool[np.ndarray, "tx rx"]
+    """Links of held-out device pairs, in both directions; all their tones are held out."""
+    element_links: Bool[np.ndarray, "tx rx"]
+    """Links of held-out elements outside the held-out device pairs."""
+    visible: Bool[np.ndarray, "tx rx subcarrier"]
+    """Measured entries that training may see."""
+
+    @staticmethod
+    def of(
+        split: Mapping[str, Any],
+        tx_device: Int[np.ndarray, "tx"],
+        rx_device: Int[np.ndarray, "rx"],
+        measured: Bool[np.ndarray, "tx rx"],
+        num_subcarriers: int,
+    ) -> HeldOut:
+        """Reads a radio's split: `rx_elements`, `subcarriers` and unordered `device_pairs`."""
+        tone = np.zeros(num_subcarriers, dtype=bool)
+        tone[list(split["subcarriers"])] = True
+        column = np.zeros(measured.shape, dtype=bool)
+        column[:, list(split["rx_elements"])] = True
+        pair = np.zeros(measured.shape, dtype=bool)
+        for a, b in split["device_pairs"]:
+            for one, other in ((a, b), (b, a)):
+                pair |= (tx_device[:, None] == one) & (rx_device[None, :] == other)
+        pair &= measured
+        column &= measured & ~pair
+        plain = measured & ~pair & ~column
+        return HeldOut(
+            element=column[:, :, None] & ~tone,
+            subcarrier=plain[:, :, None] & tone,
+            pair_links=pair,
+            element_links=column,
+            visible=plain[:, :, None] & ~tone,
+        )
+
+
+def snr_db(error_power: float, power: float) -> float | None:
+    """10 log10(Σ|true|² / Σ|true − predicted|²) [dB]; None where nothing is to be predicted."""
+    if power <= 0.0:
+        return None
+    return float(10.0 * np.log10(power / max(error_power, NEGLIGIBLE * power)))
+
+
+def delay_profiles(
+    csi: Complex[np.ndarray, "link subcarrier"],
+) -> Float[np.ndarray, "link delay"]:
+    """Magnitude of the delay profile of each link, Hann-windowed against side lobes."""
+    return np.abs(np.fft.ifft(csi * np.hanning(csi.shape[1] + 2)[1:-1], axis=1))
+
+
+def _correlation(
+    true: Float[np.ndarray, "link delay"], predicted: Float[np.ndarray, "link delay"]
+) -> float | None:
+    """Mean over links of the Pearson correlation of profiles; a flat prediction gives None."""
+    a = true - true.mean(axis=1, keepdims=True)
+    b = predicted - predicted.mean(axis=1, keepdims=True)
+    norm = np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1)
+    if len(true) == 0 or not (norm > 0.0).any():
+        return None
+    return float(np.mean(np.sum(a * b, axis=1) / np.maximum(norm, 1e-300)))
+
+
+def frame_rf(
+    true: Complex[np.ndarray, "tx rx subcarrier"],
+    predicted: Complex[np.ndarray, "tx rx subcarrier"],
+    held_out: HeldOut,
+    tx_device: Int[np.ndarray, "tx"],
+    rx_device: Int[np.ndarray, "rx"],
+) -> dict[str, Any]:
+    """Sums and values of one frame, to be pooled by `pool_rf`.
+
+    Args:
+        true: Channel of the frame.
+        predicted: Prediction of the same entries.
+        held_out: Entries to compare.
+        tx_device: Device of each transmitting element.
+        rx_device: Device of each receiving element.
+
+    Returns:
+        For `element` and `subcarrier` the pair (error power, power); `gain_db`, the absolute
+        differences of mean power per ordered held-out device pair [dB], None where nothing is
+        predicted; `delay_profile_corr` over the links of held-out elements and pairs.
+    """
+    result: dict[str, Any] = {}
+    for name in ("element", "subcarrier"):
+        where = getattr(held_out, name)
+        error = np.abs(true[where] - predicted[where]).astype(np.float64)
+        power = np.abs(true[where]).astype(np.float64)
+        result[name] = (float(np.sum(error**2)), float(np.sum(power**2)))
+    gains: list[float | None] = []
+    for a in np.unique(tx_device):
+        for b in np.unique(rx_device):
+            links = held_out.pair_links & (tx_device[:, None] == a) & (rx_device[None, :] == b)
+            if not links.any():
+                continue
+            want = float(np.mean(np.abs(true[links]).astype(np.float64) ** 2))
+            got = float(np.mean(np.abs(predicted[links]).astype(np.float64) ** 2))
+            if want > 0.0:
+                gains.append(abs(10.0 * float(np.log10(got / want))) if got > 0.0 else None)
+    result["gain_db"] = gains
+    links = held_out.pair_links | held_out.element_links
+    result["delay_profile_corr"] = _correlation(
+        delay_profiles(true[links]), delay_profiles(predicted[links])
+    )
+    return result
+
+
+def rf_values(frame: Mapping[str, Any]) -> dict[str, float | None]:
+    """The RF group of a single frame out of `frame_rf`."""
+    return {key: value for key, value in pool_rf([frame]).items() if key in RF_KEYS}
+
+
+def pool_rf(frames: Sequence[Mapping[str, Any]]) -> dict[str, float | None]:
+    """The RF group over frames.
+
+    Signal-to-noise ratios are pooled (one ratio of sums over all frames) and their medians
+    over frames stand beside them as `element_snr_median_db` and `subcarrier_snr_median_db`.
+    Gains are averaged over (device pair, frame), correlations over frames. A value is None
+    where nothing was held out or nothing is predicted.
+    """
+    result: dict[str, float | None] = {}
+    for name in ("element", "subcarrier"):
+        sums = np.sum([frame[name] for frame in frames], axis=0)
+        result[f"{name}_snr_db"] = snr_db(float(sums[0]), float(sums[1]))
+        single = [snr_db(*frame[name]) for frame in frames]
+        known = [value for value in single if value is not None]
+        result[f"{name}_snr_median_db"] = float(np.median(known)) if known else None
+    gains = [gain for frame in frames for gain in frame["gain_db"]]
+    predicted = [gain for gain in gains if gain is not None]
+    # One pair without a prediction has an infinite error, and with it the mean.
+    complete = bool(gains) and len(predicted) == len(gains)
+    result["device_gain_mae_db"] = float(np.mean(predicted)) if complete else None
+    corr = [frame["delay_profile_corr"] for frame in frames]
+    known = [value for value in corr if value is not None]
+    result["delay_profile_corr"] = float(np.mean(known)) if len(known) == len(corr) else None
+    return result

@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scattering points on everything that moves: evenly spread, bound to the mesh.
+
+Random points of equal area are 3 dB too loud at a thousand points per square metre; Lloyd
+samples with their own areas are 10 dB closer to the surface integral. They are made once in
+the rest pose and follow the mesh as (face, barycentric coordinates).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+#: Spacing of points as a share of the shortest wavelength; 0.4 is the coarsest that works.
+SPACING_WAVELENGTHS = 0.385
+#: Points per square metre beyond which a finer surface would cost more than it gives; at
+#: 60 GHz this is coarser than a wavelength, so levels hold there and waveforms do not.
+MAX_DENSITY = 4500.0
+#: Points sit this far outside the skin [m], so that the skin itself can shadow them.
+LIFT_M = 1e-3
+#: Parts of an instance smaller than this share of its area (eyes, tongue) are left out.
+_SMALLEST_PART = 0.02
+_SAMPLES_PER_POINT = 40
+_LLOYD_STEPS = 20
+
+
+@dataclass(frozen=True)
+class SurfacePoints:
+    """Points bound to triangles of a mesh that deforms."""
+
+    faces: np.ndarray
+    """Vertices of the triangle each point lies on, int64, shape (point, 3)."""
+    barycentric: np.ndarray
+    """Barycentric coordinates in that triangle, shape (point, 3)."""
+    areas: np.ndarray
+    """Surface each point stands for [m²], shape (point,)."""
+    material: np.ndarray
+    """Material index of each point, shape (point,)."""
+    welded_faces: np.ndarray
+    """Faces of the outer surface over welded vertices, outward, shape (T', 3)."""
+    weld: np.ndarray
+    """First vertex at the place of each vertex, shape (V,); seams share one normal."""
+
+    def at(self, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Where the points are when the mesh has moved.
+
+        Args:
+            vertices: Vertices of the whole moving mesh [m], shape (V, 3).
+
+        Returns:
+            Positions on the skin [m] and unit outward normals, each shape (point, 3).
+        """
+        corners = vertices.astype(np.float64)[self.weld]
+        a, b, c = (corners[self.welded_faces[:, i]] for i in range(3))
+        across = np.cross(b - a, c - a)
+        normals = np.zeros_like(corners)
+        for axis in range(3):
+            for corner in range(3):
+                normals[:, axis] += np.bincount(
+                    self.welded_faces[:, corner], across[:, axis], len(corners)
+                )
+        positions = np.einsum("pc,pcx->px", self.barycentric, corners[self.faces])
+        smooth = np.einsum("pc,pcx->px", self.barycentric, normals[self.weld[self.faces]])
+        length = np.linalg.norm(smooth, axis=1, keepdims=True)
+        return positions, smooth / np.maximum(length, 1e-12)
+
+
+def density(wavelength_m: float) -> float:
+    """Points per square metre for a spacing of `SPACING_WAVELENGTHS`, capped."""
+    return min(1.0 / (SPACING_WAVELENGTHS * wavelength_m) ** 2, MAX_DENSITY)
+
+
+def surface_points(
+    vertices: np.ndarray,
+    faces: np.ndarray,
+    material: np.ndarray,
+    instance: np.ndarray,
+    wavelength_m: float,
+    seed: int,
+) -> SurfacePoints:
+    """Spreads points over the outer surface of a mesh in its rest pose.
+
+    Args:
+        vertices: Rest pose [m], shape (V, 3).
+        faces: Triangles, shape (T, 3).
+        material: Material index of each triangle, shape (T,).
+        instance: Instance id of each triangle, shape (T,).
+        wavelength_m: Shortest wavelength [m].
+        seed: Seed of the starting points.
+
+    Returns:
+        The points, about `density` times the area of them.
+    """
+    vertices = vertices.astype(np.float64)
+    weld = _weld(vertices)
+    welded = weld[faces]
+    part = _parts(welded, len(vertices))
+    keep = _outer(vertices, welded, part, instance)
+    welded = _outward(vertices, welded[keep], part[keep])
+    rng = np.random.default_rng(seed)
+    index, barycentric, areas = _lloyd(vertices, welded, density(wavelength_m), rng)
+    return SurfacePoints(
+        faces=welded[index],
+        barycentric=barycentric,
+        areas=areas,
+        material=material[keep][index],
+        welded_faces=welded,
+        weld=weld,
+    )
+
+
+def triangle_areas(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Area of each triangle [m²], shape (T,)."""
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+
+
+def _weld(vertices: np.ndarray) -> np.ndarray:
+    """First vertex at the same place (to 10 µm) for each vertex."""
+    _, first, inverse = np.unique(
+        np.round(vertices * 1e5).astype(np.int64), axis=0, return_index=True, return_inverse=True
+    )
+    return first[inverse.ravel()]
+
+
+def _parts(faces: np.ndarray, num_vertices: int) -> np.ndarray:
+    """Connected part of each triangle, shape (T,)."""
+    rows = np.concatenate([faces[:, 0], faces[:, 1]])
+    cols = np.concatenate([faces[:, 1], faces[:, 2]])
+    graph = coo_matrix((np.ones(len(rows)), (rows, cols)), shape=(num_vertices, num_vertices))
+    _, label = connected_components(graph, directed=False)
+    return label[faces[:, 0]]
+
+
+def _outer(
+    vertices: np.ndarray, faces: np.ndarray, part: np.ndarray, instance: np.ndarray
+) -> np.ndarray:
+    """Which triangles belong to parts large enough to matter, bool, shape (T,)."""
+    area = triangle_areas(vertices, faces)
+    of_part = np.bincount(part, area)
+    of_instance = np.bincount(instance, area)
+    return of_part[part] >= _SMALLEST_PART * of_instance[instance]
+
+
+def _outward(vertices: np.ndarray, faces: np.ndarray, part: np.ndarray) -> np.ndarray:
+    """Turns closed parts that are inside out; open sheets stay as they are."""
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    centre = np.stack([np.bincount(part, a[:, i]) for i in range(3)], axis=1)
+    centre /= np.maximum(np.bincount(part), 1)[:, None]
+    a, b, c = a - centre[part], b - centre[part], c - centre[part]
+    volume = np.bincount(part, np.einsum("tx,tx->t", a, np.cross(b, c)) / 6.0)
+    size = np.bincount(part, triangle_areas(vertices, faces)) ** 1.5
+    inside_out = (volume < -1e-3 * size)[part]
+    return np.where(inside_out[:, None], faces[:, ::-1], faces)
+
+
+def _lloyd(
+    vertices: np.ndarray, faces: np.ndarray, per_m2: float, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Lloyd's iteration on dense samples; centres stay on samples, hence on the surface.
+
+    Returns:
+        Triangle of each point, its barycentric coordinates and the area of its cell [m²].
+    """
+    area = triangle_areas(vertices, faces)
+    count = max(int(np.ceil(area.sum() * per_m2)), 1)
+    samples = count * _SAMPLES_PER_POINT
+    # Stratified along the cumulated area: every triangle gets its share, without clumps.
+    level = (np.arange(samples) + rng.random(samples)) / samples * area.sum()
+    index = np.minimum(np.searchsorted(np.cumsum(area), level), len(area) - 1)
+    u, v = np.sqrt(rng.random(samples)), rng.random(samples)
+    barycentric = np.stack([1.0 - u, u * (1.0 - v), u * v], axis=1)
+    places = np.einsum("pc,pcx->px", barycentric, vertices[faces[index]])
+    chosen = rng.choice(samples, count, replace=False)
+    tree = cKDTree(places)
+    for _ in range(_LLOYD_STEPS):
+        _, cell = cKDTree(places[chosen]).query(places)
+        size = np.bincount(cell, minlength=count)
+        mean = np.stack([np.bincount(cell, places[:, i], count) for i in range(3)], axis=1)
+        filled = size > 0
+        _, nearest = tree.query(mean[filled] / size[filled, None])
+        chosen = chosen.copy()
+        chosen[filled] = nearest
+        chosen = np.unique(chosen)
+        count = len(chosen)
+    _, cell = cKDTree(places[chosen]).query(places)
+    cell_area = np.bincount(cell, minlength=count) * (area.sum() / samples)
+    return index[chosen], barycentric[chosen], cell_area

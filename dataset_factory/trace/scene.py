@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A scene bundle as a Sionna RT scene: materials, meshes and one-element devices."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import sionna.rt as rt
+
+from dataset_factory.bundle import Bundle
+from rfgs_core.errors import RfgsError
+from rfgs_core.radio import Layout, Radio
+from rfgs_core.radio.layout import DevicePose, rotation
+from rfgs_core.radio.materials import MATERIALS
+from rfgs_core.radio.tissue import skin_conductivity, skin_permittivity
+
+#: Name of the one object that holds everything that moves.
+BODY = "moving"
+
+
+def check_materials(bundle: Bundle, radio: Radio) -> None:
+    """Refuses materials whose model does not cover the radio's band.
+
+    Raises:
+        RfgsError: Naming the material, its band and the radio's.
+    """
+    for row in bundle.materials:
+        name = row["radio_material"]
+        if name not in MATERIALS:
+            raise RfgsError(
+                f"{bundle.path}: material {row['name']!r} has the unknown radio material "
+                f"{name!r}; expected one of {', '.join(sorted(MATERIALS))}"
+            )
+        material = MATERIALS[name]
+        if not material.covers(radio):
+            raise RfgsError(
+                f"{bundle.path}: material {row['name']!r} is {name!r}, whose model holds from "
+                f"{material.freq_min_hz / 1e9:g} to {material.freq_max_hz / 1e9:g} GHz, but radio "
+                f"{radio.name!r} uses {radio.freq_min_hz / 1e9:g} to "
+                f"{radio.freq_max_hz / 1e9:g} GHz; choose another material or radio"
+            )
+
+
+def radio_material(row: dict[str, Any], index: int) -> rt.RadioMaterial:
+    """The Sionna material of one row of a bundle's material table."""
+    name = f"material-{index}"
+    common: dict[str, Any] = {
+        "thickness": float(row["thickness_m"]),
+        "scattering_coefficient": float(row["scattering_coefficient"]),
+    }
+    if row["radio_material"] == "skin":
+        return rt.RadioMaterial(name=name, frequency_update_callback=_skin, **common)
+    return rt.ITURadioMaterial(name=name, itu_type=row["radio_material"], **common)
+
+
+def _skin(freq_hz: mi.Float) -> tuple[mi.Float, mi.Float]:
+    """Relative permittivity and conductivity [S/m] of skin for Sionna."""
+    freq = np.array(freq_hz, dtype=np.float64).ravel()[:1]
+    return (
+        mi.Float(float(skin_permittivity(freq)[0].real)),
+        mi.Float(float(skin_conductivity(freq)[0])),
+    )
+
+
+def mesh(name: str, vertices: np.ndarray, faces: np.ndarray) -> mi.Mesh:
+    """A Mitsuba mesh with face normals from world vertices [m] and triangles."""
+    props = mi.Properties()
+    props["face_normals"] = True
+    result = mi.Mesh(name, len(vertices), len(faces), props=props)
+    params = mi.traverse(result)
+    params["vertex_positions"] = mi.Float(np.ascontiguousarray(vertices, dtype=np.float32).ravel())
+    params["faces"] = mi.UInt32(np.ascontiguousarray(faces, dtype=np.uint32).ravel())
+    params.update()
+    return result
+
+
+def static_scene(bundle: Bundle, radio: Radio, freq_hz: float | None = None) -> rt.Scene:
+    """Builds the scene without anything that moves, shapes kept apart.
+
+    Args:
+        bundle: Scene bundle.
+        radio: Gives antenna pattern, polarisation and the default frequency.
+        freq_hz: Frequency of material properties [Hz]; None takes the band's centre.
+    """
+    scene = rt.load_scene(None)
+    set_frequency(scene, radio.centre_hz if freq_hz is None else freq_hz)
+    antenna = rt.PlanarArray(
+        num_rows=1, num_cols=1, pattern=radio.pattern, polarization=radio.polarization
+    )
+    scene.tx_array = scene.rx_array = antenna
+    materials: dict[int, rt.RadioMaterial] = {}
+    objects = []
+    for index, part in enumerate(bundle.static_meshes()):
+        if part.material_index not in materials:
+            row = bundle.materials[part.material_index]
+            materials[part.material_index] = radio_material(row, part.material_index)
+        objects.append(
+            rt.SceneObject(
+                mi_mesh=mesh(f"static-{index}", part.vertices, part.faces),
+                name=f"static-{index}",
+                radio_material=materials[part.material_index],
+            )
+        )
+    if objects:
+        scene.edit(add=objects)
+    return scene
+
+
+def set_frequency(scene: rt.Scene, freq_hz: float) -> None:
+    """Sets the carrier [Hz] as an opaque value, so that kernels do not depend on it."""
+    scene.frequency = dr.opaque(mi.Float, freq_hz)
+
+
+def add_devices(
+    scene: rt.Scene, layout: Layout, devices: list[DevicePose], which: list[int]
+) -> None:
+    """Adds the devices of the given indices as one-element transmitters and receivers."""
+    tx_centres, rx_centres = centres(layout)
+    for index in which:
+        orientation = mi.Point3f(*euler_angles(devices[index].quat_wxyz))
+        tx, rx = tx_centres[index].tolist(), rx_centres[index].tolist()
+        scene.add(rt.Transmitter(f"tx-{index}", position=tx, orientation=orientation))
+        scene.add(rt.Receiver(f"rx-{index}", position=rx, orientation=orientation))
+
+
+def centres(layout: Layout) -> tuple[np.ndarray, np.ndarray]:
+    """Centres of each device's TX and RX arrays [m], each of shape (device, 3)."""
+    count = int(layout.tx_device.max()) + 1
+    tx = [layout.tx_xyz[layout.tx_device == i].mean(axis=0) for i in range(count)]
+    rx = [layout.rx_xyz[layout.rx_device == i].mean(axis=0) for i in range(count)]
+    return np.stack(tx), np.stack(rx)
+
+
+def euler_angles(quat_wxyz: tuple[float, float, float, float]) -> tuple[float, float, float]:
+    """Sionna's angles (α, β, γ) about z, y, x [rad] of a rotation world_from_device."""
+    r = rotation(quat_wxyz)
+    beta = float(np.arcsin(np.clip(-r[2, 0], -1.0, 1.0)))
+    if abs(r[2, 0]) > 1.0 - 1e-12:
+        return float(np.arctan2(-r[0, 1], r[1, 1])), beta, 0.0
+    return float(np.arctan2(r[1, 0], r[0, 0])), beta, float(np.arctan2(r[2, 1], r[2, 2]))
+
+
+def visible(mi_scene: mi.Scene, origins: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Whether nothing stands between points and one place.
+
+    Args:
+        mi_scene: Scene to test in.
+        origins: Starting points [m], shape (point, 3).
+        target: End point [m], shape (3,).
+
+    Returns:
+        True where the segment is free, bool, shape (point,).
+    """
+    way = target[None, :] - origins
+    length = np.linalg.norm(way, axis=1)
+    way = way / length[:, None]
+    o = origins.astype(np.float32)
+    d = way.astype(np.float32)
+    ray = mi.Ray3f(mi.Point3f(*o.T), mi.Vector3f(*d.T))
+    # Stop short of the end, where float32 could meet a surface that the antenna hangs on.
+    ray.maxt = mi.Float((length * (1.0 - 1e-5)).astype(np.float32))
+    return ~np.array(mi_scene.ray_test(ray)).astype(bool)

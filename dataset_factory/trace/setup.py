@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Prepares a process for Sionna RT: LLVM, threads and the kernel cache.
+
+Call `prepare` before anything imports drjit, mitsuba or sionna.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+from rfgs_core.llvm import use_llvm
+
+#: Kernels differ from frame to frame, so an unlimited cache would fill the disk [bytes].
+CACHE_LIMIT_BYTES = 1 << 30
+
+
+def prepare(threads: int | None = None) -> None:
+    """Sets the environment and the number of threads of Dr.Jit and numba.
+
+    Args:
+        threads: Threads per process; None leaves the choice to Dr.Jit and numba.
+
+    Raises:
+        MissingToolError: No usable LLVM library.
+    """
+    use_llvm()
+    cache = Path(os.environ.get("XDG_CACHE_HOME", tempfile.gettempdir())) / "rfgs-drjit"
+    os.environ.setdefault("DRJIT_CACHE_DIR", str(cache))
+    os.environ.setdefault("DRJIT_CACHE_MAXSIZE", str(CACHE_LIMIT_BYTES))
+    if threads is None:
+        return
+    import drjit as dr
+    import numba
+
+    dr.set_thread_count(threads)
+    numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))

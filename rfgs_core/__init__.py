@@ -3,4 +3,19 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rfgs_core.dataset import open_dataset
+
 __version__ = "0.1.0"
+__all__ = ["__version__", "open_dataset"]
+
+
+def __getattr__(name: str) -> Any:
+    # Reading datasets pulls in xarray; `import rfgs_core` stays light.
+    if name == "open_dataset":
+        from rfgs_core.dataset import open_dataset
+
+        return open_dataset
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

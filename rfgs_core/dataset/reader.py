@@ -1,0 +1,298 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Opens datasets: everything is read lazily and checked when read."""
+
+from __future__ import annotations
+
+import zipfile
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from jaxtyping import Complex64, Float32, Float64, Int32, UInt8, UInt16
+
+from rfgs_core.dataset.csi_store import open_csi, read_csi
+from rfgs_core.dataset.mesh_ply import read_mesh
+from rfgs_core.dataset.names import SequenceFiles
+from rfgs_core.dataset.pictures import read_exr, read_png_rgba, read_png_u16
+from rfgs_core.dataset.schema import (
+    DatasetInfo,
+    bounds_array,
+    device_pose,
+    radio_from_json,
+    read_dataset_info,
+    read_sequence_info,
+)
+from rfgs_core.errors import RfgsError, RfgsFormatError
+from rfgs_core.files import inside, sha256
+from rfgs_core.radio import DevicePose, Layout, Radio, layout
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def open_dataset(path: Path | str) -> Dataset:
+    """Opens a finished dataset.
+
+    Args:
+        path: Folder that holds `dataset.json`.
+
+    Returns:
+        The dataset; sequences are opened with `Dataset.sequence`.
+
+    Raises:
+        RfgsError: There is no dataset, it is unfinished or of a newer schema.
+        RfgsFormatError: `dataset.json` does not keep to its schema.
+    """
+    path = Path(path)
+    file = path / "dataset.json"
+    if not file.is_file():
+        raise RfgsError(f"{path}: no dataset there; expected a folder with dataset.json")
+    info = read_dataset_info(file)
+    if not info.manifest_sha256:
+        raise RfgsError(
+            f"{path}: this dataset is unfinished; run the same rfgs-factory generate again"
+        )
+    return Dataset(path, info)
+
+
+class Dataset:
+    """A finished dataset on disk."""
+
+    def __init__(self, path: Path, info: DatasetInfo) -> None:
+        self.path = path
+        self.info = info
+
+    @property
+    def sequences(self) -> list[str]:
+        """Names of the sequences."""
+        return list(self.info.sequences)
+
+    @property
+    def has(self) -> list[str]:
+        """What is present: csi, csi_static, images, depth, normal, mask, geometry."""
+        return list(self.info.has)
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """Digest that identifies the data: of `dataset.json`, which holds the manifest's."""
+        return sha256(self.path / "dataset.json")
+
+    def sequence(self, name: str | None = None) -> Sequence:
+        """Opens a sequence.
+
+        Args:
+            name: Which one; None opens the only one.
+
+        Raises:
+            RfgsError: The name is unknown, or none was given and there are several.
+        """
+        if name is None:
+            if len(self.sequences) != 1:
+                raise RfgsError(
+                    f"{self.path}: ambiguous sequence: it holds {', '.join(self.sequences)}; "
+                    "choose one with --sequence"
+                )
+            name = self.sequences[0]
+        if name not in self.sequences:
+            raise RfgsError(
+                f"{self.path}: no sequence {name!r}; expected one of {', '.join(self.sequences)}"
+            )
+        return Sequence(inside(self.path, name), name)
+
+    def need(self, *contents: str) -> None:
+        """Refuses to go on without some contents.
+
+        Raises:
+            RfgsError: The dataset lacks one of `contents`.
+        """
+        missing = [name for name in contents if name not in self.info.has]
+        if missing:
+            raise RfgsError(f"{self.path}: this dataset holds no {', '.join(missing)}")
+
+
+class Sequence:
+    """One scene over some frames, seen by radios and cameras."""
+
+    def __init__(self, path: Path, name: str) -> None:
+        self.path = path
+        self.name = name
+        self.files = SequenceFiles(path)
+        self.info = read_sequence_info(self.files.info)
+
+    @property
+    def frames(self) -> list[int]:
+        """Blender frame numbers, ascending."""
+        return list(self.info.frames)
+
+    @property
+    def fps(self) -> float:
+        """Frames per second."""
+        return float(self.info.fps)
+
+    @property
+    def bounds_m(self) -> Float64[np.ndarray, "2 3"]:
+        """Minimum and maximum of the scene [m]."""
+        return bounds_array(self.info)
+
+    @property
+    def cameras(self) -> list[dict[str, Any]]:
+        """Name, intrinsics, pose and split of each camera."""
+        return self.info.cameras
+
+    @property
+    def splits(self) -> dict[str, Any]:
+        """What is held out of training."""
+        return self.info.splits
+
+    @property
+    def instances(self) -> list[dict[str, Any]]:
+        """Ids that masks and meshes use."""
+        return self.info.instances
+
+    @property
+    def trace_depth(self) -> int:
+        """Interactions that a traced path may have."""
+        return self.info.trace_depth
+
+    @property
+    def radios(self) -> list[str]:
+        """Names of the radios."""
+        return sorted(self.info.radios)
+
+    def time_s(self, frame: int) -> float:
+        """Time of a frame [s]."""
+        return (frame - self.info.frame_start) / self.fps
+
+    def radio_spec(self, name: str) -> Radio:
+        """The radio's band and antennas."""
+        return radio_from_json(self.files.info, self.info.radios[self._radio(name)])
+
+    def devices(self, name: str) -> list[DevicePose]:
+        """Where the radio's devices stand."""
+        return [device_pose(row) for row in self.info.devices[self._radio(name)]]
+
+    def layout(self, name: str) -> Layout:
+        """Every antenna element of the radio."""
+        return layout(self.radio_spec(name), self.devices(name))
+
+    def radio(self, name: str) -> xarray.Dataset:
+        """Channels of a radio with their coordinates, read when used.
+
+        Values read this way are not checked against their digests; `Sequence.csi` does that.
+        """
+        return open_csi(self.files.csi(self._radio(name)))
+
+    def csi(self, name: str, frame: int) -> Complex64[np.ndarray, "tx rx subcarrier"]:
+        """Channel of one frame, checked against the digest in its marker.
+
+        Raises:
+            RfgsError: There is no such radio or frame.
+            RfgsFormatError: The chunk is missing, truncated or altered.
+        """
+        index = self._index(frame)
+        store = self.files.csi(self._radio(name))
+        return self._fitting(name, read_csi(store, index, self.files.csi_done(name, frame)), frame)
+
+    def csi_static(self, name: str) -> Complex64[np.ndarray, "tx rx subcarrier"]:
+        """Channel without anything that moves, checked against its digest.
+
+        Raises:
+            RfgsFormatError: The chunk is missing, truncated or altered.
+        """
+        store = self.files.csi(self._radio(name))
+        return self._fitting(name, read_csi(store, None, self.files.csi_done(name, None)), None)
+
+    def moving_mesh(
+        self, frame: int
+    ) -> tuple[
+        Float32[np.ndarray, "vertex 3"],
+        Int32[np.ndarray, "face 3"],
+        Int32[np.ndarray, "face"],
+    ]:
+        """Vertices [m], triangles and instance id per triangle of what moves."""
+        vertices = self._geometry(frame)["vertices"]
+        topology = _arrays(self.files.topology)
+        return vertices, topology["faces"], topology["instance"]
+
+    def static_mesh(self) -> tuple[Float32[np.ndarray, "vertex 3"], Int32[np.ndarray, "face 3"]]:
+        """Vertices [m] and triangles of what stands still."""
+        return read_mesh(self.files.static_mesh)
+
+    def joints(self, frame: int) -> Float32[np.ndarray, "person 17 3"]:
+        """Joint positions of each person [m], in the order of `rfgs_core.skeleton`."""
+        return self._geometry(frame)["joints"]
+
+    def image(self, camera: str, frame: int) -> UInt8[np.ndarray, "h w 4"]:
+        """Colour picture, sRGB with alpha."""
+        self._index(frame)
+        return read_png_rgba(self.files.image(self._camera(camera), frame))
+
+    def image_empty(self, camera: str) -> UInt8[np.ndarray, "h w 4"]:
+        """Colour picture without anything that moves."""
+        return read_png_rgba(self.files.image_empty(self._camera(camera)))
+
+    def depth(self, camera: str, frame: int) -> Float32[np.ndarray, "h w"]:
+        """Planar depth [m], +inf where nothing was hit."""
+        self._index(frame)
+        return _plane(self.files.depth(self._camera(camera), frame), "Z")
+
+    def normal(self, camera: str, frame: int) -> Float32[np.ndarray, "h w 3"]:
+        """World normals, zero where nothing was hit."""
+        self._index(frame)
+        file = self.files.normal(self._camera(camera), frame)
+        return np.stack([_plane(file, axis) for axis in "XYZ"], axis=-1)
+
+    def mask(self, camera: str, frame: int) -> UInt16[np.ndarray, "h w"]:
+        """Instance id of each pixel, 0 for everything static."""
+        self._index(frame)
+        return read_png_u16(self.files.mask(self._camera(camera), frame))
+
+    def _index(self, frame: int) -> int:
+        try:
+            return self.info.frames.index(frame)
+        except ValueError as error:
+            raise RfgsError(
+                f"{self.path}: no frame {frame}; it holds {self.frames[0]} to {self.frames[-1]}, "
+                f"{len(self.frames)} frames"
+            ) from error
+
+    def _radio(self, name: str) -> str:
+        if name not in self.info.radios:
+            raise RfgsError(f"{self.path}: no radio {name!r}; it holds {', '.join(self.radios)}")
+        return name
+
+    def _camera(self, name: str) -> str:
+        names = [row["name"] for row in self.cameras]
+        if name not in names:
+            raise RfgsError(f"{self.path}: no camera {name!r}; it holds {', '.join(names)}")
+        return name
+
+    def _fitting(self, name: str, value: np.ndarray, frame: int | None) -> np.ndarray:
+        shape = (*self.layout(name).measured.shape, self.radio_spec(name).num_subcarriers)
+        if value.shape != shape:
+            raise RfgsFormatError(
+                f"{self.files.csi(name)}: frame {frame}: expected shape {shape}, got {value.shape}"
+            )
+        return value
+
+    def _geometry(self, frame: int) -> dict[str, np.ndarray]:
+        self._index(frame)
+        return _arrays(self.files.geometry(frame))
+
+
+def _arrays(path: Path) -> dict[str, np.ndarray]:
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            return {name: stored[name] for name in stored.files}
+    except FileNotFoundError as error:
+        raise RfgsFormatError(f"{path}: no such file; this dataset holds no geometry") from error
+    except (ValueError, EOFError, OSError, zipfile.BadZipFile) as error:
+        raise RfgsFormatError(f"{path}: damaged array file ({error})") from error
+
+
+def _plane(path: Path, channel: str) -> Float32[np.ndarray, "h w"]:
+    channels = read_exr(path)
+    if channel not in channels:
+        raise RfgsFormatError(f"{path}: expected channel {channel!r}, got {', '.join(channels)}")
+    return channels[channel]

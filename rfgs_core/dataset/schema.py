@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The JSON files of a dataset as dataclasses, and the checks that make them trustworthy."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import MISSING, asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float64
+
+from rfgs_core.errors import RfgsError, RfgsFormatError
+from rfgs_core.files import read_json
+from rfgs_core.radio import DevicePose, Radio
+
+DATASET_SCHEMA = "rfgs-dataset/1"
+SEQUENCE_SCHEMA = "rfgs-sequence/1"
+
+#: Everything a dataset may hold; commands name what they miss.
+CONTENTS = ("csi", "csi_static", "images", "depth", "normal", "mask", "geometry")
+
+#: Outer surface of an adult that sets the size of a predicted point set [m²].
+PERSON_SURFACE_M2 = 1.6
+
+_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]*")
+_TYPES: dict[str, type | tuple[type, ...]] = {
+    "int": int,
+    "float": (int, float),
+    "str": str,
+    "list": list,
+    "dict": dict,
+    "tuple": (list, tuple),
+}
+
+
+@dataclass(frozen=True)
+class DatasetInfo:
+    """What `dataset.json` holds."""
+
+    versions: dict[str, str]
+    """Versions of the packages and of Blender that made the data."""
+    config: dict[str, Any]
+    """Everything asked of the program that made the data."""
+    root_seed: int
+    """Seed that all other seeds derive from."""
+    has: list[str]
+    """What is present, of `CONTENTS`."""
+    sequences: list[str]
+    """Names of the sequences, also their folders."""
+    manifest_sha256: str = ""
+    """Digest of `MANIFEST.sha256`; empty while the dataset is being made."""
+
+
+@dataclass(frozen=True)
+class SequenceInfo:
+    """What `sequence.json` holds."""
+
+    scene: str
+    """Name of the scene."""
+    blend_sha256: str
+    """Digest of the Blender file."""
+    frames: list[int]
+    """Blender frame numbers, ascending."""
+    frame_start: int
+    """Frame whose time is zero."""
+    fps: float
+    """Frames per second."""
+    bounds_m: list[list[float]]
+    """Minimum and maximum of the scene [m], 2 x 3."""
+    cameras: list[dict[str, Any]]
+    """Name, intrinsics [px], `world_from_camera` and `split` of each camera."""
+    devices: dict[str, list[dict[str, Any]]]
+    """Name and pose of every device, by radio."""
+    radios: dict[str, dict[str, Any]]
+    """All fields of each radio, by name."""
+    splits: dict[str, Any]
+    """What is held out of training."""
+    materials: list[dict[str, Any]] = field(default_factory=list)
+    """Radio materials of the scene."""
+    instances: list[dict[str, Any]] = field(default_factory=list)
+    """Ids that masks use, with name, class and nominal surface [m²]."""
+    guesses: list[dict[str, Any]] = field(default_factory=list)
+    """Every default that was guessed, with the reason."""
+    trace_depth: int = 1
+    """Interactions that a traced path may have."""
+    shadow: str = "kirchhoff"
+    """How bodies shadow paths."""
+
+
+def info_json(info: DatasetInfo | SequenceInfo) -> dict[str, Any]:
+    """The JSON object of a dataclass, with its schema."""
+    schema = DATASET_SCHEMA if isinstance(info, DatasetInfo) else SEQUENCE_SCHEMA
+    return {"schema": schema, **asdict(info)}
+
+
+def read_dataset_info(path: Path) -> DatasetInfo:
+    """Reads `dataset.json`.
+
+    Raises:
+        RfgsError: The file does not exist or is of a newer schema.
+        RfgsFormatError: The file does not keep to its schema.
+    """
+    info = DatasetInfo(**_fields(path, DatasetInfo, DATASET_SCHEMA))
+    for name in info.sequences:
+        check_name(path, name)
+    unknown = sorted(set(info.has) - set(CONTENTS))
+    if unknown:
+        raise RfgsFormatError(f"{path}: has: unknown contents {', '.join(unknown)}")
+    return info
+
+
+def read_sequence_info(path: Path) -> SequenceInfo:
+    """Reads `sequence.json`.
+
+    Raises:
+        RfgsError: The file does not exist or is of a newer schema.
+        RfgsFormatError: The file does not keep to its schema.
+    """
+    info = SequenceInfo(**_fields(path, SequenceInfo, SEQUENCE_SCHEMA))
+    for name in [*info.radios, *(row.get("name") for row in info.cameras)]:
+        check_name(path, name)
+    if not info.frames or sorted(set(info.frames)) != info.frames or info.fps <= 0:
+        raise RfgsFormatError(f"{path}: expected ascending frame numbers and fps > 0")
+    if np.shape(info.bounds_m) != (2, 3):
+        raise RfgsFormatError(f"{path}: bounds_m: expected [[min xyz], [max xyz]]")
+    if set(info.radios) != set(info.devices):
+        raise RfgsFormatError(f"{path}: radios and devices name different radios")
+    return info
+
+
+def check_name(path: Path, name: Any) -> None:
+    """Refuses names that could not be plain file names inside the dataset.
+
+    Raises:
+        RfgsFormatError: The name holds anything but letters, digits, `_`, `-` and inner dots.
+    """
+    if not isinstance(name, str) or not _NAME.fullmatch(name):
+        raise RfgsFormatError(
+            f"{path}: {name!r} leads outside the dataset or is no plain file name; "
+            "expected letters, digits, '_' and '-'"
+        )
+
+
+def radio_from_json(path: Path, values: dict[str, Any]) -> Radio:
+    """Builds a radio from the fields stored in a sequence.
+
+    Raises:
+        RfgsFormatError: A field is missing or unknown.
+    """
+    try:
+        fixed: dict[str, Any] = {
+            key: tuple(v) if isinstance(v, list) else v for key, v in values.items()
+        }
+        return Radio(**fixed)
+    except TypeError as error:
+        raise RfgsFormatError(f"{path}: radios: {error}") from error
+
+
+def device_pose(values: dict[str, Any]) -> DevicePose:
+    """Builds a device's pose from the fields stored in a sequence or bundle."""
+    x, y, z = (float(value) for value in values["position_m"])
+    w, i, j, k = (float(value) for value in values["quat_wxyz"])
+    return DevicePose(values["name"], (x, y, z), (w, i, j, k))
+
+
+def bounds_array(info: SequenceInfo) -> Float64[np.ndarray, "2 3"]:
+    """Scene bounds [m] as an array."""
+    return np.asarray(info.bounds_m, dtype=np.float64)
+
+
+def _fields(path: Path, kind: type, schema: str) -> dict[str, Any]:
+    value = read_json(path)
+    if not isinstance(value, dict):
+        raise RfgsFormatError(f"{path}: expected a JSON object")
+    check_schema(path, value.get("schema"), schema)
+    known = {}
+    for spec in fields(kind):
+        if spec.name not in value:
+            if spec.default is not MISSING or spec.default_factory is not MISSING:
+                continue
+            raise RfgsFormatError(f"{path}: field {spec.name!r} is missing")
+        expected = _TYPES[str(spec.type).partition("[")[0]]
+        if not isinstance(value[spec.name], expected):
+            raise RfgsFormatError(
+                f"{path}: field {spec.name!r}: expected {spec.type}, got "
+                f"{type(value[spec.name]).__name__}"
+            )
+        known[spec.name] = value[spec.name]
+    return known
+
+
+def check_schema(path: Path, found: Any, expected: str) -> None:
+    """Refuses other schemas and newer versions of the expected one.
+
+    Raises:
+        RfgsError: The file was written by a newer version of this software.
+        RfgsFormatError: The file is of another kind.
+    """
+    family, _, version = expected.partition("/")
+    got_family, _, got_version = str(found).partition("/")
+    if got_family != family or not got_version.isdigit():
+        raise RfgsFormatError(f"{path}: expected schema {expected!r}, got {found!r}")
+    if int(got_version) > int(version):
+        raise RfgsError(
+            f"{path}: schema {found} is newer than {expected}, the newest this version reads; "
+            "update RF-GS"
+        )

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is held out of training, chosen once when a sequence is made."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rfgs_core.radio import Layout, Radio
+from rfgs_core.seeds import sub_seed
+
+
+def evenly_spaced(count: int) -> list[int]:
+    """Indices of about a quarter of `count` things, evenly spaced; none of a single thing.
+
+    Example:
+        >>> evenly_spaced(8)
+        [2, 6]
+    """
+    if count < 2:
+        return []
+    held = max(1, round(count / 4))
+    return [int((index + 0.5) * count / held) for index in range(held)]
+
+
+def image_split(cameras: list[str], frames: list[int]) -> dict[str, list[Any]]:
+    """Chooses cameras for testing, and frames whose pictures no shader may see."""
+    return {
+        "test_cameras": [cameras[index] for index in evenly_spaced(len(cameras))],
+        "test_frames": [frames[index] for index in evenly_spaced(len(frames))],
+    }
+
+
+def radio_split(radio: Radio, layout: Layout, seed: int) -> dict[str, list[Any]]:
+    """Chooses the held-out channel entries of one radio.
+
+    Args:
+        radio: The radio.
+        layout: Its antenna elements.
+        seed: Root seed; it picks the device pair.
+
+    Returns:
+        `rx_elements`: indices of the last quarter of each array's columns; `subcarriers`: the
+        contiguous eighth from 5/8 to 6/8 of the band; `device_pairs`: one unordered pair of
+        devices, a device with itself where a radio only hears itself.
+    """
+    held_columns = radio.rx_cols // 4
+    elements = np.flatnonzero(layout.rx_column >= radio.rx_cols - held_columns)
+    tones = radio.num_subcarriers
+    first, last = 5 * tones // 8, 6 * tones // 8
+    tx, rx = np.nonzero(layout.measured)
+    devices = np.stack([layout.tx_device[tx], layout.rx_device[rx]], axis=1)
+    pairs = np.unique(np.sort(devices, axis=1), axis=0)
+    between = pairs[pairs[:, 0] != pairs[:, 1]]
+    pool = between if len(between) else pairs
+    # With a single pair nothing would be left to train on.
+    held = pool[sub_seed(seed, radio.name, "held-out pair") % len(pool)][None]
+    return {
+        "rx_elements": elements.tolist(),
+        "subcarriers": list(range(first, max(last, first + 1))) if tones >= 8 else [],
+        "device_pairs": held.tolist() if len(pairs) > 1 else [],
+    }

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a dataset shall hold, and which of it is still missing."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import asdict, dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Any, Literal
+
+from dataset_factory.scenes import Scene, blend_digest
+from rfgs_core.dataset.csi_store import chunk_file
+from rfgs_core.dataset.names import SequenceFiles
+from rfgs_core.errors import RfgsError
+from rfgs_core.radio import preset
+
+#: Packages whose version may change a byte of the data.
+PACKAGES = ("rfgs", "sionna-rt", "mitsuba", "drjit", "numpy", "scipy", "numba", "zarr", "OpenEXR")
+
+_FRAMES = re.compile(r"(-?\d+):(-?\d+)(?::(\d+))?")
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Everything that decides the bytes of a dataset."""
+
+    scene: str
+    """Name of the scene."""
+    blend_sha256: str
+    """Digest of the Blender file."""
+    radios: list[str]
+    """Presets to trace."""
+    frames: str
+    """Frames `A:B[:STEP]`, empty for the scene's own range."""
+    cameras: int
+    """How many cameras, 0 for all."""
+    resolution: int
+    """Longer side of the pictures [px]."""
+    samples: int
+    """Samples per pixel."""
+    depth: int
+    """Interactions a path with a person may have."""
+    shadow: Literal["kirchhoff", "hard"]
+    """How bodies shadow paths."""
+    seed: int
+    """Root seed."""
+    images: bool
+    """Whether pictures are rendered."""
+
+
+def make_plan(scene: Scene, radios: tuple[str, ...], frames: str, **options: Any) -> Plan:
+    """Checks the request and fixes it.
+
+    Args:
+        scene: Where the data comes from.
+        radios: Preset names.
+        frames: Frames `A:B[:STEP]` or empty.
+        **options: The other fields of `Plan`.
+
+    Raises:
+        RfgsError: A radio is unknown or named twice, or a number is out of range.
+    """
+    if not radios:
+        raise RfgsError("no radio given; add --radio wifi, --radio mmwave or both")
+    for name in radios:
+        preset(name)
+    if len(set(radios)) != len(radios):
+        raise RfgsError(f"a radio is named twice: {', '.join(radios)}")
+    if frames:
+        parse_frames(frames)
+    limits = {"depth": (1, 5), "resolution": (16, 8192), "samples": (1, 65536), "cameras": (0, 999)}
+    for name, (low, high) in limits.items():
+        if not low <= options[name] <= high:
+            raise RfgsError(f"--{name} {options[name]}: expected {low} to {high}")
+    return Plan(
+        scene=scene.name,
+        blend_sha256=blend_digest(scene),
+        radios=sorted(radios),
+        frames=frames,
+        **options,
+    )
+
+
+def parse_frames(text: str) -> list[int]:
+    """Frame numbers of `A:B[:STEP]`, B included.
+
+    Raises:
+        RfgsError: The text is of another form or holds no frame.
+
+    Example:
+        >>> parse_frames("10:20:5")
+        [10, 15, 20]
+    """
+    match = _FRAMES.fullmatch(text)
+    if not match:
+        raise RfgsError(f"--frames {text!r}: expected FIRST:LAST or FIRST:LAST:STEP, as in 1:60:2")
+    first, last, step = int(match[1]), int(match[2]), int(match[3] or 1)
+    if last < first or step < 1:
+        raise RfgsError(f"--frames {text!r}: expected FIRST <= LAST and STEP >= 1")
+    return list(range(first, last + 1, step))
+
+
+def frame_runs(frames: list[int]) -> list[str]:
+    """Ascending frames as few `A:B:STEP` texts.
+
+    Example:
+        >>> frame_runs([1, 2, 3, 7, 10, 13])
+        ['1:3:1', '7:13:3']
+    """
+    runs: list[list[int]] = []
+    for frame in frames:
+        run = runs[-1] if runs else []
+        if run and (len(run) == 1 or frame - run[-1] == run[1] - run[0]):
+            run.append(frame)
+        else:
+            runs.append([frame])
+    return [f"{run[0]}:{run[-1]}:{run[1] - run[0] if len(run) > 1 else 1}" for run in runs]
+
+
+def versions() -> dict[str, str]:
+    """Versions of the packages that make the data."""
+    found = {}
+    for name in PACKAGES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            found[name] = "source tree"
+    return found
+
+
+def refuse_other_plan(
+    path: Path, plan: Plan, stored: dict[str, Any], stored_versions: dict[str, str]
+) -> None:
+    """Refuses to mix two configurations in one folder.
+
+    Raises:
+        RfgsError: Naming the first field that differs.
+    """
+    wanted = {**asdict(plan), **{f"version of {k}": v for k, v in versions().items()}}
+    found = {**stored, **{f"version of {k}": v for k, v in stored_versions.items()}}
+    for name, value in wanted.items():
+        if name in found and found[name] != value:
+            raise RfgsError(
+                f"{path} was made with {name} = {found[name]!r}, this run asks for {value!r}; "
+                "use the same settings, or another --out"
+            )
+
+
+def missing_channels(files: SequenceFiles, radio: str, frames: list[int]) -> list[int | None]:
+    """Frames whose channel is not finished, None standing for the static channel."""
+    store = files.csi(radio)
+    rows: list[tuple[int | None, int | None]] = [(None, None), *enumerate(frames)]
+    return [
+        frame
+        for index, frame in rows
+        if not (files.csi_done(radio, frame).is_file() and chunk_file(store, index).is_file())
+    ]
+
+
+def missing_pictures(files: SequenceFiles, frames: list[int]) -> list[int]:
+    """Frames whose pictures are not finished."""
+    return [frame for frame in frames if not files.images_done(frame).is_file()]

@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a scene must satisfy before a radio is traced in it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Float64, Int
+
+from rfgs_core.radio.layout import DevicePose
+from rfgs_core.radio.materials import MATERIALS
+from rfgs_core.radio.presets import Radio
+
+#: Multiple reflections travel further than twice the diagonal; this much is added for them [m].
+DELAY_MARGIN_M = 5.0
+
+#: A closed mesh that fills more of the scene than this is the room itself, not furniture.
+ROOM_FRACTION = 0.5
+
+_Mesh = tuple[str, Float[np.ndarray, "vertex 3"], Int[np.ndarray, "face 3"]]
+
+
+def check(
+    radio: Radio, bounds_m: Float64[np.ndarray, "2 3"], materials: list[dict[str, Any]]
+) -> list[str]:
+    """Lists what keeps a radio from being traced faithfully in a scene.
+
+    Args:
+        radio: The radio.
+        bounds_m: Minimum and maximum of the scene [m].
+        materials: Rows with `name` and `radio_material`.
+
+    Returns:
+        One sentence per problem, each with its remedy; empty when all is well.
+    """
+    problems = []
+    longest_m = 2.0 * float(np.linalg.norm(bounds_m[1] - bounds_m[0])) + DELAY_MARGIN_M
+    if radio.unambiguous_path_m < longest_m:
+        problems.append(
+            f"radio {radio.name!r} tells paths apart only up to {radio.unambiguous_path_m:.1f} m "
+            f"(c / subcarrier spacing), but paths in this scene reach {longest_m:.1f} m; use more "
+            "subcarriers, a narrower band or a smaller scene"
+        )
+    for row in materials:
+        problem = _material_problem(radio, row)
+        if problem:
+            problems.append(problem)
+    return problems
+
+
+def check_devices(
+    radio: Radio,
+    bounds_m: Float64[np.ndarray, "2 3"],
+    devices: list[DevicePose],
+    meshes: Iterable[_Mesh],
+) -> list[str]:
+    """Lists devices that are outside the scene or inside a closed object.
+
+    Args:
+        radio: The radio the devices belong to.
+        bounds_m: Minimum and maximum of the scene [m].
+        devices: Their poses.
+        meshes: Name, vertices [m] and triangles of each static object.
+
+    Returns:
+        One sentence per problem.
+    """
+    problems = []
+    points = np.array([device.position_m for device in devices]).reshape(-1, 3)
+    for device, point in zip(devices, points, strict=True):
+        if (point < bounds_m[0]).any() or (point > bounds_m[1]).any():
+            problems.append(
+                f"device {device.name!r} of radio {radio.name!r} at {np.round(point, 2).tolist()} "
+                "m is outside the scene; move it inside or enlarge the scene"
+            )
+    volume = float(np.prod(np.maximum(bounds_m[1] - bounds_m[0], 1e-6)))
+    for name, vertices, faces in meshes:
+        if not len(faces):
+            continue
+        low, high = vertices.min(axis=0), vertices.max(axis=0)
+        if np.prod(high - low) > ROOM_FRACTION * volume:
+            continue
+        near = np.flatnonzero(((points > low) & (points < high)).all(axis=1))
+        turns = winding_number(points[near], vertices, faces)
+        problems.extend(
+            f"device {devices[index].name!r} of radio {radio.name!r} is inside {name!r}; move it "
+            "out of the object"
+            for index in near[np.abs(turns) > 0.5]
+        )
+    return problems
+
+
+def winding_number(
+    points: Float[np.ndarray, "point 3"],
+    vertices: Float[np.ndarray, "vertex 3"],
+    faces: Int[np.ndarray, "face 3"],
+) -> Float64[np.ndarray, "point"]:
+    """How often a mesh wraps around each point: ±1 inside a closed one, 0 outside.
+
+    Solid angle of a triangle after Van Oosterom and Strackee (1983), eq. 8:
+    tan(Ω/2) = a·(b×c) / (abc + (a·b)c + (b·c)a + (c·a)b).
+    """
+    total = np.zeros(len(points))
+    corners = vertices.astype(np.float64)[faces]
+    for index, point in enumerate(points):
+        a, b, c = np.moveaxis(corners - point, 1, 0)
+        la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
+        top = np.einsum("ij,ij->i", a, np.cross(b, c))
+        bottom = la * lb * lc + (a * b).sum(1) * lc + (b * c).sum(1) * la + (c * a).sum(1) * lb
+        total[index] = 2.0 * np.arctan2(top, bottom).sum() / (4.0 * np.pi)
+    return total
+
+
+def _material_problem(radio: Radio, row: dict[str, Any]) -> str:
+    name = row["radio_material"]
+    if name not in MATERIALS:
+        return (
+            f"material {row['name']!r} has the unknown radio material {name!r}; expected one of "
+            f"{', '.join(sorted(MATERIALS))}"
+        )
+    material = MATERIALS[name]
+    if material.covers(radio):
+        return ""
+    remedy = sorted(other.name for other in MATERIALS.values() if other.covers(radio))
+    return (
+        f"material {row['name']!r} is {name!r}, which is known from "
+        f"{material.freq_min_hz / 1e9:g} to {material.freq_max_hz / 1e9:g} GHz only, but radio "
+        f"{radio.name!r} uses {radio.freq_min_hz / 1e9:g} to {radio.freq_max_hz / 1e9:g} GHz; "
+        f"choose one of {', '.join(remedy)}"
+    )

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 #: Spacing of points as a share of the shortest wavelength; 0.4 is the coarsest that works.
 SPACING_WAVELENGTHS = 0.385
@@ -176,9 +176,9 @@ def _lloyd(
     barycentric = np.stack([1.0 - u, u * (1.0 - v), u * v], axis=1)
     places = np.einsum("pc,pcx->px", barycentric, vertices[faces[index]])
     chosen = rng.choice(samples, count, replace=False)
-    tree = cKDTree(places)
+    tree = KDTree(places)
     for _ in range(_LLOYD_STEPS):
-        _, cell = cKDTree(places[chosen]).query(places)
+        _, cell = KDTree(places[chosen]).query(places)
         size = np.bincount(cell, minlength=count)
         mean = np.stack([np.bincount(cell, places[:, i], count) for i in range(3)], axis=1)
         filled = size > 0
@@ -187,6 +187,6 @@ def _lloyd(
         chosen[filled] = nearest
         chosen = np.unique(chosen)
         count = len(chosen)
-    _, cell = cKDTree(places[chosen]).query(places)
+    _, cell = KDTree(places[chosen]).query(places)
     cell_area = np.bincount(cell, minlength=count) * (area.sum() / samples)
     return index[chosen], barycentric[chosen], cell_area

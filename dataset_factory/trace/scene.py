@@ -159,7 +159,7 @@ def visible(mi_scene: mi.Scene, origins: np.ndarray, target: np.ndarray) -> np.n
     way = way / length[:, None]
     o = origins.astype(np.float32)
     d = way.astype(np.float32)
-    ray = mi.Ray3f(mi.Point3f(*o.T), mi.Vector3f(*d.T))
     # Stop short of the end, where float32 could meet a surface that the antenna hangs on.
+    ray: Any = mi.Ray3f(mi.Point3f(*o.T), mi.Vector3f(*d.T))
     ray.maxt = mi.Float((length * (1.0 - 1e-5)).astype(np.float32))
     return ~np.array(mi_scene.ray_test(ray)).astype(bool)

@@ -35,4 +35,4 @@ def prepare(threads: int | None = None) -> None:
     import numba
 
     dr.set_thread_count(threads)
-    numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))
+    numba.set_num_threads(min(threads, len(os.sched_getaffinity(0))))

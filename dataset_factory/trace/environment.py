@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Paths of the scene without anything that moves, traced once per sequence."""
+
+from __future__ import annotations
+
+import numpy as np
+import sionna.rt as rt
+
+from dataset_factory.bundle import Bundle
+from dataset_factory.trace.paths import PathSet, empty, merged, path_set
+from dataset_factory.trace.scene import add_devices, centres, static_scene
+from rfgs_core.radio import Layout, Radio
+from rfgs_core.radio.layout import DevicePose
+
+#: Interactions of an environment path; a fourth would change bistatic links by −39 dB.
+MAX_DEPTH = 3
+#: Rays per transmitter; with these the path set has converged to −107 dB.
+NUM_SAMPLES = 300_000
+#: Room for candidates; fewer lose paths silently.
+MAX_PATHS = 20_000
+#: Above this fractional bandwidth materials are evaluated at several frequencies.
+WIDE_BAND = 0.05
+#: Frequencies of a wide band at which paths are traced again.
+WIDE_BAND_NODES = 9
+#: Frequencies of a narrow band, where only the shadow changes.
+NARROW_BAND_NODES = 3
+
+
+def node_frequencies(radio: Radio) -> np.ndarray:
+    """Frequencies [Hz] between which amplitudes are interpolated, both band edges included."""
+    wide = radio.bandwidth_hz / radio.centre_hz > WIDE_BAND
+    count = WIDE_BAND_NODES if wide else NARROW_BAND_NODES
+    return np.linspace(radio.freq_min_hz, radio.freq_max_hz, count)
+
+
+def environment_paths(
+    bundle: Bundle, radio: Radio, layout: Layout, devices: list[DevicePose], seed: int
+) -> PathSet:
+    """Traces the empty scene between device centres.
+
+    Args:
+        bundle: Scene bundle.
+        radio: Radio; wide bands are traced at each node frequency.
+        layout: Antenna elements; device pairs without a measured link are left out.
+        devices: Poses of the devices.
+        seed: Seed of the rays, the same for a whole sequence.
+
+    Returns:
+        Paths with one amplitude per node frequency.
+    """
+    nodes = node_frequencies(radio)
+    if len(nodes) == NARROW_BAND_NODES:
+        traced = _traced(bundle, radio, layout, devices, seed, radio.centre_hz)
+        return _with_amplitude(traced, np.repeat(traced.amplitude, len(nodes), axis=1))
+    return _joined([_traced(bundle, radio, layout, devices, seed, float(f)) for f in nodes])
+
+
+def device_groups(layout: Layout) -> list[list[int]]:
+    """Devices that must be traced together: each alone if only own links are measured."""
+    devices = list(range(int(layout.tx_device.max()) + 1))
+    own = layout.tx_device[:, None] == layout.rx_device[None, :]
+    return [[i] for i in devices] if not (layout.measured & ~own).any() else [devices]
+
+
+def measured_paths(paths: PathSet, layout: Layout) -> PathSet:
+    """Only the paths of device pairs with a measured link."""
+    count = int(layout.tx_device.max()) + 1
+    wanted = np.zeros((count, count), dtype=bool)
+    links = np.argwhere(layout.measured)
+    wanted[layout.tx_device[links[:, 0]], layout.rx_device[links[:, 1]]] = True
+    return paths.select(wanted[paths.tx, paths.rx])
+
+
+def _traced(
+    bundle: Bundle,
+    radio: Radio,
+    layout: Layout,
+    devices: list[DevicePose],
+    seed: int,
+    freq_hz: float,
+) -> PathSet:
+    """Paths at one frequency, one amplitude each."""
+    scatters = any(row["scattering_coefficient"] > 0.0 for row in bundle.materials)
+    scene = static_scene(bundle, radio, freq_hz)
+    tx_centres, rx_centres = centres(layout)
+    solver = rt.PathSolver(deterministic=True)
+    parts = []
+    for group in device_groups(layout):
+        for name in [*scene.transmitters, *scene.receivers]:
+            scene.remove(name)
+        add_devices(scene, layout, devices, group)
+        paths = solver(
+            scene,
+            max_depth=MAX_DEPTH,
+            samples_per_src=NUM_SAMPLES,
+            max_num_paths_per_src=MAX_PATHS,
+            synthetic_array=True,
+            diffuse_reflection=scatters,
+            refraction=True,
+            seed=seed,
+        )
+        parts.append(path_set(paths, group, group, tx_centres, rx_centres))
+    return measured_paths(merged(parts), layout)
+
+
+def _with_amplitude(paths: PathSet, amplitude: np.ndarray) -> PathSet:
+    """The same paths with other amplitudes, shape (path, node)."""
+    return PathSet(paths.tx, paths.rx, amplitude, paths.vertices, paths.kinds, paths.primitives)
+
+
+def _joined(sets: list[PathSet]) -> PathSet:
+    """One set of paths over several frequencies; a path missing at one is zero there.
+
+    Rays choose between reflection and refraction by the material, so a weak path may be found
+    at some frequencies only. Paths are the same when their interactions and corners are.
+    """
+    rows: dict[bytes, int] = {}
+    picked: list[PathSet] = []
+    values: list[np.ndarray] = []
+    for node, paths in enumerate(sets):
+        corners = np.round(paths.vertices * 1e3).astype(np.int64)
+        for i in range(len(paths)):
+            key = b"".join(part[i].tobytes() for part in (paths.tx, paths.rx, paths.kinds, corners))
+            if key not in rows:
+                rows[key] = len(rows)
+                picked.append(paths.select(np.array([i])))
+                values.append(np.zeros(len(sets), dtype=np.complex128))
+            values[rows[key]][node] += paths.amplitude[i, 0]
+    if not picked:
+        return empty(MAX_DEPTH, len(sets))
+    with_all = [
+        _with_amplitude(path, value[None, :]) for path, value in zip(picked, values, strict=True)
+    ]
+    return merged(with_all)

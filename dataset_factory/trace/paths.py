@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Propagation paths between device centres, in an order that does not depend on threads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import sionna.rt as rt
+
+#: Sionna's code of a sensing interaction: a scattering point.
+SENSING = 16
+_SPECULAR = 1
+_REFRACTION = 4
+
+
+@dataclass(frozen=True)
+class PathSet:
+    """Paths between pairs of devices, sorted by pair, length and vertices."""
+
+    tx: np.ndarray
+    """Transmitting device of each path, int64, shape (path,)."""
+    rx: np.ndarray
+    """Receiving device of each path, int64, shape (path,)."""
+    amplitude: np.ndarray
+    """Amplitude without the phase of the delay, complex128, shape (path, node)."""
+    vertices: np.ndarray
+    """Corners from transmitter to receiver [m], padded with the receiver, (path, depth + 2, 3)."""
+    kinds: np.ndarray
+    """Sionna's interaction codes, 0 beyond the last, shape (path, depth)."""
+    primitives: np.ndarray
+    """Triangle, or scattering point, of each interaction, shape (path, depth)."""
+
+    def __len__(self) -> int:
+        return len(self.tx)
+
+    @property
+    def length_m(self) -> np.ndarray:
+        """Length of each path between device centres [m], shape (path,)."""
+        return np.linalg.norm(np.diff(self.vertices, axis=1), axis=2).sum(axis=1)
+
+    def select(self, keep: np.ndarray) -> PathSet:
+        """The paths of a mask or of indices, in that order."""
+        return PathSet(
+            self.tx[keep],
+            self.rx[keep],
+            self.amplitude[keep],
+            self.vertices[keep],
+            self.kinds[keep],
+            self.primitives[keep],
+        )
+
+    def sorted(self) -> PathSet:
+        """The same paths ordered by pair, length, interactions and amplitude."""
+        amplitude = self.amplitude[:, 0]
+        keys = [amplitude.imag, amplitude.real]
+        keys += [
+            self.vertices[:, i, axis]
+            for i in range(1, self.vertices.shape[1] - 1)
+            for axis in range(3)
+        ]
+        keys += [*self.primitives.T, *self.kinds.T, self.length_m, self.rx, self.tx]
+        return self.select(np.lexsort(keys))
+
+    def breaks(self) -> np.ndarray:
+        """Interactions after which a path no longer has one mirror image, bool (path, depth)."""
+        return (self.kinds != 0) & (self.kinds != _SPECULAR) & (self.kinds != _REFRACTION)
+
+    def mirrors(self) -> np.ndarray:
+        """Interactions that mirror the way, bool, shape (path, depth)."""
+        return self.kinds == _SPECULAR
+
+
+def path_set(
+    paths: rt.Paths,
+    tx_index: list[int],
+    rx_index: list[int],
+    tx_centres: np.ndarray,
+    rx_centres: np.ndarray,
+) -> PathSet:
+    """Reads Sionna's paths between one-element devices.
+
+    Args:
+        paths: Result of a solver, traced with `synthetic_array=True`.
+        tx_index: Device of each of Sionna's transmitters.
+        rx_index: Device of each of Sionna's receivers.
+        tx_centres: Transmitter of every device [m], shape (device, 3).
+        rx_centres: Receiver of every device [m], shape (device, 3).
+
+    Returns:
+        The valid paths, sorted, with one amplitude node.
+    """
+    valid = np.array(paths.valid).astype(bool)
+    if valid.size == 0 or not valid.any():
+        return empty(0)
+    rx, tx, _ = np.nonzero(valid)
+    real, imag = (np.array(part)[:, 0, :, 0][valid] for part in paths.a)
+    kinds = np.array(paths.interactions)[:, valid].T.astype(np.int64)
+    primitives = np.array(paths.primitives)[:, valid].T.astype(np.int64)
+    corners = np.moveaxis(np.array(paths.vertices)[:, valid], 0, 1).astype(np.float64)
+    tx, rx = np.asarray(tx_index)[tx], np.asarray(rx_index)[rx]
+    corners = np.where((kinds == 0)[:, :, None], rx_centres[rx][:, None, :], corners)
+    vertices = np.concatenate(
+        [tx_centres[tx][:, None, :], corners, rx_centres[rx][:, None, :]], axis=1
+    )
+    amplitude = (real.astype(np.float64) + 1j * imag.astype(np.float64))[:, None]
+    primitives = np.where(kinds == 0, 0, primitives)
+    return PathSet(tx, rx, amplitude, vertices, kinds, primitives).sorted()
+
+
+def empty(depth: int, nodes: int = 1) -> PathSet:
+    """A set without paths."""
+    index = np.zeros(0, dtype=np.int64)
+    table = np.zeros((0, depth), dtype=np.int64)
+    return PathSet(
+        index, index, np.zeros((0, nodes), np.complex128), np.zeros((0, depth + 2, 3)), table, table
+    )
+
+
+def merged(parts: list[PathSet]) -> PathSet:
+    """All paths of several sets of equal depth, sorted."""
+    parts = [part for part in parts if len(part)]
+    if not parts:
+        return empty(0)
+    depth = max(part.kinds.shape[1] for part in parts)
+    parts = [_padded(part, depth) for part in parts]
+    columns = zip(
+        *((p.tx, p.rx, p.amplitude, p.vertices, p.kinds, p.primitives) for p in parts),
+        strict=True,
+    )
+    return PathSet(*(np.concatenate(column) for column in columns)).sorted()
+
+
+def _padded(part: PathSet, depth: int) -> PathSet:
+    """The same set with room for `depth` interactions."""
+    extra = depth - part.kinds.shape[1]
+    if extra == 0:
+        return part
+    end = np.repeat(part.vertices[:, -1:], extra, axis=1)
+    return PathSet(
+        part.tx,
+        part.rx,
+        part.amplitude,
+        np.concatenate([part.vertices, end], axis=1),
+        np.pad(part.kinds, ((0, 0), (0, extra))),
+        np.pad(part.primitives, ((0, 0), (0, extra))),
+    )

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How much of each environment path gets past everything that moves.
+
+Sionna's absorber casts a shadow without diffraction. Here each path is multiplied by the
+Kirchhoff factor of the body's silhouette, T = 1 − (j s/λ) ∬ e^{−jπsρ²/λ} dA with
+s = 1/d_1 + 1/d_2 along the unfolded path: one factor per segment and body, their product per
+path. The silhouette is cut once per segment, from the device centres; antenna elements shift
+it by where their own line crosses the plane.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numba
+import numpy as np
+
+from dataset_factory.trace import silhouette
+from dataset_factory.trace.paths import PathSet
+from rfgs_core.radio import Layout
+from rfgs_core.radio.constants import SPEED_OF_LIGHT
+
+Shadow = Literal["kirchhoff", "hard"]
+
+
+def transmission(
+    paths: PathSet,
+    layout: Layout,
+    bodies: list[tuple[np.ndarray, np.ndarray]],
+    nodes_hz: np.ndarray,
+    mode: Shadow,
+) -> np.ndarray:
+    """Shadow factors of every path.
+
+    Args:
+        paths: Environment paths.
+        layout: Antenna elements; every device has equally many.
+        bodies: Vertices [m] and triangles of each body.
+        nodes_hz: Frequencies of the factors [Hz], shape (node,).
+        mode: "kirchhoff", or "hard" for all or nothing.
+
+    Returns:
+        Complex128, shape (path, tx element of the device, rx element of the device, node).
+    """
+    n_tx = int(np.count_nonzero(layout.tx_device == 0))
+    n_rx = int(np.count_nonzero(layout.rx_device == 0))
+    out = np.ones((len(paths), n_tx, n_rx, len(nodes_hz)), dtype=np.complex128)
+    if not len(paths):
+        return out
+    unfolded = _unfold(paths)
+    tx = layout.tx_xyz.reshape(-1, n_tx, 3)[paths.tx] - paths.vertices[:, :1]
+    rx = layout.rx_xyz.reshape(-1, n_rx, 3)[paths.rx] - paths.vertices[:, -1:]
+    for vertices, faces in bodies:
+        _shade(
+            paths.vertices,
+            unfolded,
+            np.ascontiguousarray(tx),
+            np.ascontiguousarray(rx),
+            np.ascontiguousarray(vertices, dtype=np.float64),
+            np.ascontiguousarray(faces, dtype=np.int64),
+            SPEED_OF_LIGHT / np.asarray(nodes_hz, dtype=np.float64),
+            silhouette.FRESNEL,
+            mode == "hard",
+            out,
+        )
+    return out
+
+
+def _unfold(paths: PathSet) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Where each segment lies on its unfolded line, and how offsets of the ends appear there.
+
+    A scattering point starts a new line: beyond it the transmitter's elements are one point.
+
+    Returns:
+        Length before and after each segment [m], shape (path, depth + 1), and matrices that
+        take offsets of TX and RX elements to the segment, shape (path, depth + 1, 3, 3).
+    """
+    steps = np.diff(paths.vertices, axis=1)
+    length = np.linalg.norm(steps, axis=2)
+    k = steps / np.maximum(length, 1e-12)[:, :, None]
+    count, segments = length.shape
+    before, after = np.zeros((count, segments)), np.zeros((count, segments))
+    tx_turn = np.broadcast_to(np.eye(3), (count, segments, 3, 3)).copy()
+    rx_turn = tx_turn.copy()
+    breaks = paths.breaks()
+    reflect = _reflections(paths, k)
+    for i in range(segments - 1):
+        broken = breaks[:, i]
+        before[:, i + 1] = np.where(broken, 0.0, before[:, i] + length[:, i])
+        turned = reflect[:, i] @ tx_turn[:, i]
+        tx_turn[:, i + 1] = np.where(broken[:, None, None], 0.0, turned)
+    for i in range(segments - 2, -1, -1):
+        broken = breaks[:, i]
+        after[:, i] = np.where(broken, 0.0, after[:, i + 1] + length[:, i + 1])
+        turned = reflect[:, i] @ rx_turn[:, i + 1]
+        rx_turn[:, i] = np.where(broken[:, None, None], 0.0, turned)
+    return before, after, tx_turn, rx_turn
+
+
+def _reflections(paths: PathSet, k: np.ndarray) -> np.ndarray:
+    """Mirror matrix of each interaction, the identity where nothing bends (path, depth, 3, 3)."""
+    normal = k[:, 1:] - k[:, :-1]
+    size = np.linalg.norm(normal, axis=2)
+    bends = paths.mirrors() & (size > 1e-9)
+    normal = np.where(bends[:, :, None], normal / np.maximum(size, 1e-12)[:, :, None], 0.0)
+    return np.eye(3) - 2.0 * normal[..., :, None] * normal[..., None, :]
+
+
+@numba.njit(cache=True, parallel=True)
+def _shade(
+    corners: np.ndarray,
+    unfolded: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
+    tx_offset: np.ndarray,
+    rx_offset: np.ndarray,
+    vertices: np.ndarray,
+    faces: np.ndarray,
+    wavelengths: np.ndarray,
+    table: np.ndarray,
+    hard: bool,
+    out: np.ndarray,
+) -> None:
+    """Multiplies the factors of one body into `out`."""
+    before, after, tx_turn, rx_turn = unfolded
+    shortest = wavelengths.min()
+    for p in numba.prange(len(corners)):
+        for i in range(corners.shape[1] - 1):
+            way = corners[p, i + 1] - corners[p, i]
+            length = np.sqrt((way * way).sum())
+            if length < 1e-6:
+                continue
+            xy, between, plane, scale, axes = silhouette.project(
+                vertices, corners[p, i], corners[p, i + 1], before[p, i], after[p, i]
+            )
+            if scale == 0.0:
+                continue
+            per_m = np.sqrt(2.0 * scale / shortest)
+            runs, heights = silhouette.runs_of(
+                xy, between, faces, silhouette.WINDOW / per_m, silhouette.FAR / per_m
+            )
+            if not len(runs):
+                continue
+            if hard:
+                if silhouette.covers(runs, heights):
+                    out[p] = 0.0
+                continue
+            d_1, d_2 = before[p, i] + plane, after[p, i] + length - plane
+            to_tx = (axes @ tx_turn[p, i]) * (d_2 / (d_1 + d_2))
+            to_rx = (axes @ rx_turn[p, i]) * (d_1 / (d_1 + d_2))
+            for t in range(tx_offset.shape[1]):
+                for r in range(rx_offset.shape[1]):
+                    shift = to_tx @ tx_offset[p, t] + to_rx @ rx_offset[p, r]
+                    for n in range(len(wavelengths)):
+                        per_m = np.sqrt(2.0 * scale / wavelengths[n])
+                        factor = silhouette.screen_factor(table, runs, heights, shift, per_m)
+                        out[p, t, r, n] *= factor

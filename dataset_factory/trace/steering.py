@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From paths between device centres to every antenna element and tone.
+
+A path of specular reflections and refractions has one mirror image of its transmitter: the
+element-to-element distance is |r − I(t)|, exact for plane surfaces, which is the design's
+|L k_r − r| − L with both ends moved. A path through a scattering point is two such legs, one
+seen from each end. Amplitudes scale with the changed distance.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+
+from dataset_factory.trace.paths import PathSet
+from rfgs_core.radio import Layout
+from rfgs_core.radio.constants import SPEED_OF_LIGHT
+
+
+@dataclass(frozen=True)
+class Images:
+    """What the ends of each path see."""
+
+    one_sided: np.ndarray
+    """Whether the path has one mirror image from end to end, bool, shape (path,)."""
+    seen_from_tx: np.ndarray
+    """Image of the first scattering point seen from the transmitter [m], shape (path, 3)."""
+    seen_from_rx: np.ndarray
+    """Image of the last scattering point, or of the transmitter, seen from the receiver [m]."""
+    mirror: np.ndarray
+    """Turns offsets at the transmitter into offsets of its image, shape (path, 3, 3)."""
+    middle_m: np.ndarray
+    """Length between first and last scattering point [m], shape (path,)."""
+
+
+def images(paths: PathSet) -> Images:
+    """Unfolds paths into the straight lines that both ends see."""
+    steps = np.diff(paths.vertices, axis=1)
+    length = np.linalg.norm(steps, axis=2)
+    # Padding repeats the receiver, so directions are taken where a step exists.
+    k = steps / np.maximum(length, 1e-12)[:, :, None]
+    depth = paths.kinds.shape[1]
+    count = (paths.kinds != 0).sum(axis=1)
+    breaks = paths.breaks()
+    one_sided = ~breaks.any(axis=1)
+    rows = np.arange(len(paths))
+    last = k[rows, count]
+    first_break = np.argmax(breaks, axis=1) if depth else np.zeros(len(paths), dtype=np.int64)
+    last_break = depth - 1 - np.argmax(breaks[:, ::-1], axis=1) if depth else first_break
+    before = np.where(np.arange(depth + 1) <= first_break[:, None], length, 0.0).sum(axis=1)
+    after = np.where(np.arange(depth + 1) > last_break[:, None], length, 0.0).sum(axis=1)
+    total = length.sum(axis=1)
+    after = np.where(one_sided, total, after)
+    before = np.where(one_sided, 0.0, before)
+    return Images(
+        one_sided=one_sided,
+        seen_from_tx=paths.vertices[:, 0] + before[:, None] * k[:, 0],
+        seen_from_rx=paths.vertices[:, -1] - after[:, None] * last,
+        mirror=_mirror(paths, k),
+        middle_m=np.where(one_sided, 0.0, total - before - after),
+    )
+
+
+def _mirror(paths: PathSet, k: np.ndarray) -> np.ndarray:
+    """Product of the reflections along each path, shape (path, 3, 3)."""
+    product = np.broadcast_to(np.eye(3), (len(paths), 3, 3)).copy()
+    for i in range(paths.kinds.shape[1]):
+        normal = k[:, i + 1] - k[:, i]
+        size = np.linalg.norm(normal, axis=1)
+        bends = paths.mirrors()[:, i] & (size > 1e-9)
+        normal = np.where(bends[:, None], normal / np.maximum(size, 1e-12)[:, None], 0.0)
+        reflect = np.eye(3) - 2.0 * normal[:, :, None] * normal[:, None, :]
+        product = reflect @ product
+    return product
+
+
+def steer(
+    paths: PathSet,
+    layout: Layout,
+    freq_hz: np.ndarray,
+    nodes_hz: np.ndarray,
+    transmission: np.ndarray | None = None,
+) -> np.ndarray:
+    """Sums paths for every measured pair of elements and every tone.
+
+    H(f) = Σ_p a_p(f) T_p(f) e^{−j2πf d_p/c}, distances in double precision, paths in their own
+    order within each link, so the bytes do not depend on the number of threads.
+
+    Args:
+        paths: Paths, sorted.
+        layout: Antenna elements.
+        freq_hz: Equally spaced tones [Hz].
+        nodes_hz: Frequencies of the amplitudes, ascending; linear in between.
+        transmission: Shadow factors, shape (path, tx element of the device, rx element of the
+            device, node); None for none.
+
+    Returns:
+        Complex128, shape (tx, rx, subcarrier).
+    """
+    out = np.zeros((len(layout.tx_xyz), len(layout.rx_xyz), len(freq_hz)), dtype=np.complex128)
+    if not len(paths):
+        return out
+    seen = images(paths)
+    left, share = _interpolation(freq_hz, nodes_hz)
+    wavenumber = 2.0 * np.pi * np.asarray(freq_hz, dtype=np.float64) / SPEED_OF_LIGHT
+    step = float(wavenumber[1] - wavenumber[0]) if len(wavenumber) > 1 else 0.0
+    for a, b in np.unique(np.stack([paths.tx, paths.rx], axis=1), axis=0):
+        of_pair = np.flatnonzero((paths.tx == a) & (paths.rx == b))
+        tx, rx = np.flatnonzero(layout.tx_device == a), np.flatnonzero(layout.rx_device == b)
+        shape = (len(of_pair), len(tx), len(rx), paths.amplitude.shape[1])
+        gain = np.broadcast_to(paths.amplitude[of_pair][:, None, None, :], shape)
+        if transmission is not None:
+            gain = gain * transmission[of_pair]
+        tx_centre = paths.vertices[of_pair[0], 0]
+        out[np.ix_(tx, rx)] = _steer(
+            np.ascontiguousarray(gain),
+            seen.one_sided[of_pair],
+            seen.seen_from_tx[of_pair],
+            seen.seen_from_rx[of_pair],
+            np.einsum("pij,ej->pei", seen.mirror[of_pair], layout.tx_xyz[tx] - tx_centre),
+            seen.middle_m[of_pair],
+            np.stack([paths.vertices[of_pair[0], 0], paths.vertices[of_pair[0], -1]]),
+            np.ascontiguousarray(layout.tx_xyz[tx]),
+            np.ascontiguousarray(layout.rx_xyz[rx]),
+            (left, share, float(wavenumber[0]), step),
+        )
+    out[~layout.measured] = 0.0
+    return out
+
+
+def _interpolation(freq_hz: np.ndarray, nodes_hz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Left node of each tone and the share of the right one."""
+    if len(nodes_hz) == 1:
+        return np.zeros(len(freq_hz), dtype=np.int64), np.zeros(len(freq_hz))
+    left = np.clip(np.searchsorted(nodes_hz, freq_hz, side="right") - 1, 0, len(nodes_hz) - 2)
+    return left, (freq_hz - nodes_hz[left]) / (nodes_hz[left + 1] - nodes_hz[left])
+
+
+@numba.njit(cache=True, inline="always")
+def _distance(a: np.ndarray, b: np.ndarray) -> float:
+    """Distance of two points."""
+    x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    return math.sqrt(x * x + y * y + z * z)
+
+
+@numba.njit(cache=True, parallel=True)
+def _steer(
+    gain: np.ndarray,
+    one_sided: np.ndarray,
+    seen_from_tx: np.ndarray,
+    seen_from_rx: np.ndarray,
+    image_offset: np.ndarray,
+    middle_m: np.ndarray,
+    ends: np.ndarray,
+    tx_xyz: np.ndarray,
+    rx_xyz: np.ndarray,
+    tones: tuple[np.ndarray, np.ndarray, float, float],
+) -> np.ndarray:
+    """Channel of one device pair, shape (tx, rx, subcarrier)."""
+    left, share, k_0, k_step = tones
+    n_paths, n_tx, n_rx, n_nodes = gain.shape
+    out = np.zeros((n_tx, n_rx, len(left)), dtype=np.complex128)
+    for link in numba.prange(n_tx * n_rx):
+        t, r = link // n_rx, link % n_rx
+        for p in range(n_paths):
+            at_rx = _distance(rx_xyz[r], seen_from_rx[p])
+            if one_sided[p]:
+                x = rx_xyz[r] - seen_from_rx[p] - image_offset[p, t]
+                d = math.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
+                scale = _distance(ends[1], seen_from_rx[p]) / d
+            else:
+                at_tx = _distance(tx_xyz[t], seen_from_tx[p])
+                d = at_tx + middle_m[p] + at_rx
+                scale = _distance(ends[0], seen_from_tx[p]) / at_tx
+                scale *= _distance(ends[1], seen_from_rx[p]) / at_rx
+            phasor = scale * complex(math.cos(k_0 * d), -math.sin(k_0 * d))
+            turn = complex(math.cos(k_step * d), -math.sin(k_step * d))
+            for f in range(len(left)):
+                right = min(left[f] + 1, n_nodes - 1)
+                a = (1.0 - share[f]) * gain[p, t, r, left[f]] + share[f] * gain[p, t, r, right]
+                out[t, r, f] += a * phasor
+                phasor *= turn
+    return out

@@ -5,32 +5,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Complex, Float, Int
+from jaxtyping import Bool, Complex, Float
 
+from rfgs_core.evaluate.backprojection import PairMaps, pair_maps
 from rfgs_core.evaluate.grid import Grid
 from rfgs_core.evaluate.rf import HeldOut
-
-
-@dataclass(frozen=True)
-class Antennas:
-    """Where the elements of a radio are and which tones it measures."""
-
-    tx_xyz: Float[np.ndarray, "tx 3"]
-    """Transmitting elements [m]."""
-    rx_xyz: Float[np.ndarray, "rx 3"]
-    """Receiving elements [m]."""
-    tx_device: Int[np.ndarray, "tx"]
-    """Device of each transmitting element."""
-    rx_device: Int[np.ndarray, "rx"]
-    """Device of each receiving element."""
-    rx_column: Int[np.ndarray, "rx"]
-    """Array column of each receiving element within its device."""
-    measured: Bool[np.ndarray, "tx rx"]
-    """Links that the radio measures."""
-    freq_hz: Float[np.ndarray, "subcarrier"]
-    """Tone frequencies [Hz], equally spaced."""
+from rfgs_core.radio import Layout
 
 
 @dataclass(frozen=True)
@@ -41,8 +24,10 @@ class Evidence:
     """csi − csi_static; NaN where held out or not measured."""
     static: Complex[np.ndarray, "tx rx subcarrier"]
     """csi_static; NaN where held out or not measured."""
-    antennas: Antennas
-    """Geometry of the radio."""
+    layout: Layout
+    """Antenna elements of the radio."""
+    freq_hz: Float[np.ndarray, "subcarrier"]
+    """Tone frequencies [Hz], equally spaced."""
     link_visible: Bool[np.ndarray, "tx rx"]
     """Links with at least one visible tone."""
     tone_visible: Bool[np.ndarray, "subcarrier"]
@@ -59,7 +44,8 @@ class Evidence:
         csi: Complex[np.ndarray, "tx rx subcarrier"],
         csi_static: Complex[np.ndarray, "tx rx subcarrier"],
         held_out: HeldOut,
-        antennas: Antennas,
+        layout: Layout,
+        freq_hz: Float[np.ndarray, "subcarrier"],
         grid: Grid,
         voxels: int,
     ) -> Evidence:
@@ -69,7 +55,8 @@ class Evidence:
         return Evidence(
             delta=np.where(visible, csi - csi_static, hidden).astype(np.complex64),
             static=np.where(visible, csi_static, hidden).astype(np.complex64),
-            antennas=antennas,
+            layout=layout,
+            freq_hz=freq_hz,
             link_visible=visible.any(axis=2),
             tone_visible=visible.any(axis=(0, 1)),
             grid=grid,
@@ -79,6 +66,13 @@ class Evidence:
     def with_centroid(self, centroid_m: Float[np.ndarray, "3"] | None) -> Evidence:
         """The same evidence with the evaluated method's own centroid [m]."""
         return replace(self, method_centroid_m=centroid_m)
+
+    @cached_property
+    def maps(self) -> PairMaps:
+        """Matched-filter maps of the visible entries, computed once."""
+        return pair_maps(
+            self.delta_or_zero, self.link_visible, self.layout, self.freq_hz, self.grid
+        )
 
     @property
     def delta_or_zero(self) -> Complex[np.ndarray, "tx rx subcarrier"]:

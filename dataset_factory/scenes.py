@@ -42,7 +42,7 @@ def catalogue() -> list[Scene]:
     """
     file = catalogue_file()
     value = read_json(file)
-    rows = value.get("scenes") if isinstance(value, dict) else value
+    rows = (value.get("scenes") or []) if isinstance(value, dict) else value
     try:
         return [
             Scene(

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which devices a radio uses in a scene, and whether the scene suits them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dataset_factory.bundle import Bundle
+from rfgs_core.dataset.schema import device_pose
+from rfgs_core.errors import RfgsError
+from rfgs_core.radio import DevicePose, Radio, place_devices
+from rfgs_core.radio.check import check, check_devices
+
+#: Beyond this the ray launching settings are not converged [m].
+LARGEST_EXTENT_M = 15.0
+#: Heights of a person outside these limits mean that the unit scale is off [m].
+PERSON_HEIGHT_M = (0.3, 5.0)
+
+
+def choose_devices(bundle: Bundle, radio: Radio) -> tuple[list[DevicePose], dict[str, Any] | None]:
+    """The scene's own access points for a radio, else the preset's placement.
+
+    Returns:
+        The devices, and the guess that was made, None if the scene brought them.
+    """
+    own = [
+        device_pose(row)
+        for row in bundle.devices
+        if row["role"] == "ACCESS_POINT" and row["radio"] in ("any", radio.name)
+    ]
+    if own:
+        return own, None
+    placed = place_devices(radio, bundle.bounds_m)
+    guess = {
+        "what": "devices",
+        "object": radio.name,
+        "value": f"{len(placed)} in the corners of the scene",
+        "why": f"no Empty has the role access point with radio 'any' or {radio.name!r}",
+    }
+    return placed, guess
+
+
+def check_scene(bundle: Bundle, devices: dict[str, list[DevicePose]], radios: list[Radio]) -> None:
+    """Refuses scenes that cannot be traced faithfully.
+
+    Raises:
+        RfgsError: Every problem, each with its remedy, in one line.
+    """
+    name = bundle.info["blend_name"]
+    problems = _size_problems(bundle)
+    meshes = [(mesh.name, mesh.vertices, mesh.faces) for mesh in bundle.static_meshes()]
+    for radio in radios:
+        problems += check(radio, bundle.bounds_m, bundle.materials)
+        problems += check_devices(radio, bundle.bounds_m, devices[radio.name], meshes)
+    if problems:
+        raise RfgsError(f"{name}: " + "; also: ".join(dict.fromkeys(problems)))
+
+
+def _size_problems(bundle: Bundle) -> list[str]:
+    if not len(bundle.topology.faces):
+        return ["no moving mesh; animate a mesh (a person walking, for example) within the frames"]
+    problems = []
+    extent = bundle.bounds_m[1] - bundle.bounds_m[0]
+    if extent.max() > LARGEST_EXTENT_M:
+        problems.append(
+            f"the scene measures {extent[0]:.1f} x {extent[1]:.1f} x {extent[2]:.1f} m, more than "
+            f"{LARGEST_EXTENT_M:g} m; set far objects to the class Ignore, or check the unit scale"
+        )
+    vertices = bundle.frame(bundle.frames[0]).vertices
+    for row in bundle.instances:
+        if not row["person"]:
+            continue
+        faces = bundle.topology.faces[bundle.topology.instance == row["id"]]
+        height = float(np.ptp(vertices[np.unique(faces), 2])) if len(faces) else 0.0
+        low, high = PERSON_HEIGHT_M
+        if not low <= height <= high:
+            problems.append(
+                f"person {row['name']!r} is {height:.2f} m tall, expected {low} to {high} m; "
+                "check the unit scale"
+            )
+    return problems

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One tracing process: reads tasks from its standard input until that closes.
+
+A process of its own, not a thread, because Dr.Jit scales best with one thread per process; and
+one that ends when its parent does, however that happened, because its input closes then.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+import traceback
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
+
+from dataset_factory.bundle import Bundle, read_bundle
+from rfgs_core.dataset.csi_store import write_csi
+from rfgs_core.dataset.names import SequenceFiles
+from rfgs_core.dataset.schema import device_pose
+from rfgs_core.errors import RfgsError
+from rfgs_core.radio import preset
+
+if TYPE_CHECKING:
+    from dataset_factory.trace import Tracer
+
+
+class Worker:
+    """Traces frames of one job, keeping the scene of the current radio loaded."""
+
+    def __init__(self, job: dict[str, Any]) -> None:
+        from dataset_factory.trace.setup import prepare
+
+        prepare(threads=1)
+        self.job = job
+        self.bundle: Bundle = read_bundle(Path(job["bundle"]))
+        self.files = SequenceFiles(Path(job["sequence"]))
+        self.radio = ""
+        self.tracer: Tracer | None = None
+
+    def trace(self, radio: str, frame: int | None) -> dict[str, float]:
+        """Traces one frame, or the static channel for None, and stores it.
+
+        Returns:
+            Seconds spent per stage so far by the radio's tracer.
+        """
+        tracer = self._tracer(radio)
+        value = tracer.static() if frame is None else tracer.frame(self.bundle.frame(frame))
+        index = None if frame is None else self.bundle.frames.index(frame)
+        write_csi(self.files.csi(radio), index, value, self.files.csi_done(radio, frame))
+        return dict(tracer.timings)
+
+    def _tracer(self, radio: str) -> Tracer:
+        from dataset_factory.trace import Tracer
+
+        if self.tracer is None or self.radio != radio:
+            devices = [device_pose(row) for row in self.job["devices"][radio]]
+            self.radio = radio
+            self.tracer = Tracer(
+                self.bundle,
+                preset(radio),
+                devices,
+                depth=self.job["depth"],
+                shadow=self.job["shadow"],
+                seed=self.job["seed"],
+            )
+        return self.tracer
+
+
+def serve(tasks: IO[str], replies: IO[str]) -> None:
+    """Answers each task with one line of JSON: seconds per stage, or an error."""
+    worker: Worker | None = None
+    for line in tasks:
+        request = json.loads(line)
+        try:
+            if worker is None:
+                worker = Worker(request)
+                reply: dict[str, Any] = {"ready": True}
+            else:
+                reply = {"seconds": worker.trace(request["radio"], request["frame"])}
+        except RfgsError as error:
+            reply = {"error": str(error)}
+        except OSError as error:
+            reply = {"error": str(error), "errno": error.errno, "file": str(error.filename or "")}
+            traceback.print_exc()
+        except Exception as error:
+            # Sent to the parent, which ends the run: a fault of ours or of the ray tracer.
+            reply = {"error": f"{type(error).__name__}: {error}", "crash": True}
+            traceback.print_exc()
+        replies.write(json.dumps(reply) + "\n")
+        replies.flush()
+
+
+def main() -> None:
+    """Keeps standard output for replies; whatever libraries print goes to the log."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with os.fdopen(os.dup(1), "w", encoding="utf-8") as replies:
+        os.dup2(2, 1)
+        serve(sys.stdin, replies)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Gradients of the scattering sum, derived by hand and checked against `gradcheck`.
+
+With G(f) = conj(dL/dH(f)) lambda / (4 pi)^(3/2), one pass over the tones gives the moments
+c_n = sum_f G z kappa^n. Everything else follows from them per Gaussian and link: with
+S_n = gain c_n and k = k_c + kappa dk,
+
+    dL/dA = Re S_0,    dL/dd = A Im(k_c S_0 + dk S_1),
+    dL/dQ = -A/2 Re(k_c^2 S_0 + 2 k_c dk S_1 + dk^2 S_2),    dL/dgain = conj(A c_0).
+
+z is computed again, so memory does not grow with links times tones times Gaussians.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit, prange
+
+from rfgs_core.propagation.kernels_scatter import (
+    AMPLITUDE,
+    BY_AMPLITUDE,
+    BY_DISTANCE,
+    BY_SPREAD,
+    HIDE_R,
+    HIDE_T,
+    INV_R,
+    INV_T,
+    MOMENTS,
+    OPTIONS,
+    RI,
+    ROWS,
+    RR,
+    SEEN,
+    UNROLL,
+    URX,
+    URY,
+    URZ,
+    UTX,
+    UTY,
+    UTZ,
+    WAVENUMBER,
+    ZI,
+    ZR,
+    Cloud,
+    E,
+    Plan,
+    illuminate,
+    see,
+    start_tones,
+    turn,
+)
+from rfgs_core.propagation.lanes import LANES
+
+
+class CloudGradient(NamedTuple):
+    """Gradients of the fields of `Cloud`, in the same layout and precision `real`."""
+
+    means: np.ndarray
+    shape: np.ndarray
+    gain: np.ndarray
+    visibility: np.ndarray
+    normals: np.ndarray
+
+
+@njit(inline="always", **OPTIONS)
+def _add(x: float, y: float, g: float, h: float, at: float, sums: Any) -> Any:
+    """Adds one tone, (x + jy)(g + jh) kappa^n, to the moments n = 0, 1, 2."""
+    p, q = x * g - y * h, x * h + y * g
+    p1, q1 = p * at, q * at
+    s, t, s1, t1, s2, t2 = sums
+    return s + p, t + q, s1 + p1, t1 + q1, s2 + p1 * at, t2 + q1 * at
+
+
+@njit(**OPTIONS)
+def _moment_tones(n: int, seed: np.ndarray, centre: float, w: np.ndarray) -> None:
+    """Moments of a chunk for each Gaussian of the block, moving z and r on."""
+    zr, zi, rr, ri, e = w[ZR], w[ZI], w[RR], w[RI], w[E]
+    c0, d0, c1 = w[MOMENTS], w[MOMENTS + 1], w[MOMENTS + 2]
+    d1, c2, d2 = w[MOMENTS + 3], w[MOMENTS + 4], w[MOMENTS + 5]
+    real, zero = w.dtype.type, w.dtype.type(0.0)
+    w[MOMENTS:ROWS, :n] = zero
+    for m in range(0, seed.shape[1], UNROLL):
+        g0, g1, g2, g3 = seed[0, m], seed[0, m + 1], seed[0, m + 2], seed[0, m + 3]
+        h0, h1, h2, h3 = seed[1, m], seed[1, m + 1], seed[1, m + 2], seed[1, m + 3]
+        a0, a1 = real(m - centre), real(m + 1 - centre)
+        a2, a3 = real(m + 2 - centre), real(m + 3 - centre)
+        for b in range(n):
+            x, y, u, v, s = zr[b], zi[b], rr[b], ri[b], e[b]
+            sums = _add(x, y, g0, h0, a0, (zero, zero, zero, zero, zero, zero))
+            x, y, u, v = turn(x, y, u, v, s)
+            sums = _add(x, y, g1, h1, a1, sums)
+            x, y, u, v = turn(x, y, u, v, s)
+            sums = _add(x, y, g2, h2, a2, sums)
+            x, y, u, v = turn(x, y, u, v, s)
+            sums = _add(x, y, g3, h3, a3, sums)
+            zr[b], zi[b], rr[b], ri[b] = turn(x, y, u, v, s)
+            c0[b] += sums[0]
+            d0[b] += sums[1]
+            c1[b] += sums[2]
+            d1[b] += sums[3]
+            c2[b] += sums[4]
+            d2[b] += sums[5]
+
+
+@njit(**OPTIONS)
+def _contract(
+    gain: np.ndarray, tone: np.ndarray, first: int, n: int, w: np.ndarray, by_gain: np.ndarray
+) -> None:
+    """Adds a chunk's moments to the gradients of gain, A, d and Q."""
+    real = w.dtype.type
+    k, dk = real(WAVENUMBER * tone[2]), real(WAVENUMBER * tone[1])
+    k2, kdk, dk2 = real(-0.5) * k * k, -k * dk, real(-0.5) * dk * dk
+    for b in range(n):
+        a = w[AMPLITUDE, b]
+        g, h = gain[0, first + b], gain[1, first + b]
+        x, y = w[MOMENTS, b], w[MOMENTS + 1, b]
+        by_gain[0, first + b] += a * x
+        by_gain[1, first + b] -= a * y
+        s0, t0 = g * x - h * y, g * y + h * x
+        x, y = w[MOMENTS + 2, b], w[MOMENTS + 3, b]
+        s1, t1 = g * x - h * y, g * y + h * x
+        s2 = g * w[MOMENTS + 4, b] - h * w[MOMENTS + 5, b]
+        w[BY_AMPLITUDE, b] += s0
+        w[BY_DISTANCE, b] += a * (k * t0 + dk * t1)
+        w[BY_SPREAD, b] += a * (k2 * s0 + kdk * s1 + dk2 * s2)
+
+
+@njit(inline="always", **OPTIONS)
+def _across(x: float, y: float, z: float, ux: float, uy: float, uz: float) -> Any:
+    """Part of a vector that is perpendicular to the unit vector u."""
+    along = x * ux + y * uy + z * uz
+    return x - along * ux, y - along * uy, z - along * uz
+
+
+@njit(**OPTIONS)
+def _chain_shape(shape: np.ndarray, first: int, n: int, w: np.ndarray, grad: CloudGradient) -> None:
+    """From d, Q and 1 / (d_t d_r) to positions and covariances.
+
+    With u the unit vector towards an antenna at distance d: dd/dp = -u, du/dp = -(I - u u^T)/d.
+    """
+    for b in range(n):
+        i = first + b
+        tx, ty, tz, it = w[UTX, b], w[UTY, b], w[UTZ, b], w[INV_T, b]
+        rx, ry, rz, ir = w[URX, b], w[URY, b], w[URZ, b], w[INV_R, b]
+        by_q, by_d = w[BY_SPREAD, b], w[BY_DISTANCE, b]
+        scale = w[BY_AMPLITUDE, b] * w[AMPLITUDE, b]
+        qx, qy, qz = tx + rx, ty + ry, tz + rz
+        grad.shape[0, i] += by_q * qx * qx
+        grad.shape[1, i] += by_q * qy * qy
+        grad.shape[2, i] += by_q * qz * qz
+        twice = by_q + by_q
+        grad.shape[3, i] += twice * qx * qy
+        grad.shape[4, i] += twice * qx * qz
+        grad.shape[5, i] += twice * qy * qz
+        x = twice * (shape[0, i] * qx + shape[3, i] * qy + shape[4, i] * qz)
+        y = twice * (shape[3, i] * qx + shape[1, i] * qy + shape[5, i] * qz)
+        z = twice * (shape[4, i] * qx + shape[5, i] * qy + shape[2, i] * qz)
+        x1, y1, z1 = _across(x, y, z, tx, ty, tz)
+        x2, y2, z2 = _across(x, y, z, rx, ry, rz)
+        near_t, near_r = scale * it - by_d, scale * ir - by_d
+        grad.means[0, i] += near_t * tx + near_r * rx - x1 * it - x2 * ir
+        grad.means[1, i] += near_t * ty + near_r * ry - y1 * it - y2 * ir
+        grad.means[2, i] += near_t * tz + near_r * rz - z1 * it - z2 * ir
+
+
+@njit(**OPTIONS)
+def _chain_normals(cloud: Cloud, first: int, n: int, w: np.ndarray, grad: CloudGradient) -> None:
+    """From the two sigmoids of the visibility to normals and positions."""
+    slope = w.dtype.type(cloud.sharpness)
+    for b in range(n):
+        i = first + b
+        tx, ty, tz, it = w[UTX, b], w[UTY, b], w[UTZ, b], w[INV_T, b]
+        rx, ry, rz, ir = w[URX, b], w[URY, b], w[URZ, b], w[INV_R, b]
+        scale = slope * w[BY_AMPLITUDE, b] * w[AMPLITUDE, b]
+        by_t, by_r = scale * w[HIDE_T, b], scale * w[HIDE_R, b]
+        grad.normals[0, i] += by_t * tx + by_r * rx
+        grad.normals[1, i] += by_t * ty + by_r * ry
+        grad.normals[2, i] += by_t * tz + by_r * rz
+        nx, ny, nz = cloud.normals[0, i], cloud.normals[1, i], cloud.normals[2, i]
+        x1, y1, z1 = _across(nx, ny, nz, tx, ty, tz)
+        x2, y2, z2 = _across(nx, ny, nz, rx, ry, rz)
+        by_t, by_r = by_t * it, by_r * ir
+        grad.means[0, i] -= by_t * x1 + by_r * x2
+        grad.means[1, i] -= by_t * y1 + by_r * y2
+        grad.means[2, i] -= by_t * z1 + by_r * z2
+
+
+@njit(**OPTIONS)
+def _chain_visibility(group: int, first: int, n: int, w: np.ndarray, grad: CloudGradient) -> None:
+    """From the amplitude to the weight of the link's group."""
+    target = grad.visibility[group]
+    for b in range(n):
+        target[first + b] += w[BY_AMPLITUDE, b] * w[INV_T, b] * w[INV_R, b] * w[SEEN, b]
+
+
+@njit(parallel=True, **OPTIONS)
+def scatter_backward(cloud: Cloud, plan: Plan, seed: np.ndarray, grad: CloudGradient) -> None:
+    """Adds to `grad`, given seed[link, order, re/im, padded tone] = G kappa^order."""
+    total = cloud.means.shape[1]
+    for block in prange((total + LANES - 1) // LANES):
+        w = np.zeros((ROWS, LANES), dtype=cloud.shape.dtype)
+        distance = np.zeros(LANES)
+        first = block * LANES
+        n = min(LANES, total - first)
+        for link in range(plan.ends.shape[0]):
+            illuminate(cloud, plan.ends[link], first, n, distance, w)
+            see(cloud, plan.group[link], first, n, w)
+            w[BY_AMPLITUDE:MOMENTS, :n] = 0.0
+            for c in range(plan.chunk.shape[0]):
+                column, count, piece = plan.chunk[c]
+                tone = plan.tone[c]
+                for order in range(cloud.gain.shape[1]):
+                    start_tones(tone, n, distance, w)
+                    part = seed[link, order, :, column : column + count]
+                    _moment_tones(n, part, tone[3], w)
+                    _contract(
+                        *(cloud.gain[piece, order], tone, first, n, w),
+                        grad.gain[piece, order],
+                    )
+            _chain_shape(cloud.shape, first, n, w, grad)
+            _chain_visibility(plan.group[link], first, n, w, grad)
+            if cloud.normals.shape[1] > 0:
+                _chain_normals(cloud, first, n, w, grad)

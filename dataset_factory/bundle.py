@@ -147,12 +147,14 @@ class Bundle:
         for row in self.objects:
             for name in row["files"]:
                 path = inside(self.path, name)
-                material = path.stem.rpartition("__")[2]
-                if material not in by_name:
+                # Material names may hold the separator themselves: the longest fit is meant.
+                fits = [known for known in by_name if path.stem.endswith(f"__{known}")]
+                if not fits:
                     raise RfgsFormatError(
                         f"{path}: expected a name <object>__<material> with a material of "
-                        f"bundle.json, got material {material!r}"
+                        "bundle.json"
                     )
+                material = max(fits, key=len)
                 vertices, faces = read_ply_mesh(path)
                 meshes.append(StaticMesh(path.stem, by_name[material], vertices, faces))
         return meshes

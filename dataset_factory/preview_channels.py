@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Plots of a sequence's channels: amplitude, delay, and delay over angle."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from rfgs_core.dataset import Sequence
+from rfgs_core.radio import Layout
+from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.radio.layout import rotation
+
+#: Interpolation of delays between the band's own bins.
+OVERSAMPLING = 8
+#: Dynamic range of images [dB].
+RANGE_DB = 40.0
+
+_KINDS = ("with people", "static", "difference")
+_COLOURS = ("#0b6bcb", "#8a94a3", "#d9480f")
+
+
+def profile_figure(sequence: Sequence, radio: str, frame: int) -> Figure:
+    """Amplitude image above delay profiles of up to eight device pairs."""
+    csi, static = sequence.csi(radio, frame), sequence.csi_static(radio)
+    layout, spec = sequence.layout(radio), sequence.radio_spec(radio)
+    pairs = _pairs(layout)[:8]
+    rows = -(-len(pairs) // 4)
+    figure = Figure(figsize=(12, 3.0 + 2.2 * rows), layout="constrained")
+    grid = figure.add_gridspec(rows + 1, 4, height_ratios=[1.2, *([1] * rows)])
+    axis = figure.add_subplot(grid[0, :])
+    rms = np.sqrt((np.abs(csi) ** 2).sum(0) / np.maximum(layout.measured.sum(0), 1)[:, None])
+    shown = axis.imshow(
+        _db(rms**2),
+        aspect="auto",
+        extent=(spec.freq_min_hz / 1e9, spec.freq_max_hz / 1e9, len(rms) - 0.5, -0.5),
+    )
+    axis.set(xlabel="frequency [GHz]", ylabel="receiving element")
+    figure.colorbar(shown, ax=axis, label="amplitude [dB]", pad=0.01)
+    first = None
+    for index, (a, b) in enumerate(pairs):
+        axis = figure.add_subplot(grid[1 + index // 4, index % 4], sharex=first, sharey=first)
+        first = first or axis
+        _profiles(axis, sequence, radio, (a, b), (csi, static, csi - static))
+        if index == 0:
+            axis.legend(fontsize=7, loc="upper right")
+    return figure
+
+
+def delay_angle_figure(sequence: Sequence, radio: str, frame: int) -> Figure:
+    """Delay–angle images of each receiving device (rows) with people, static, difference."""
+    csi, static = sequence.csi(radio, frame), sequence.csi_static(radio)
+    layout = sequence.layout(radio)
+    pairs = _listening_pairs(layout)[:4]
+    figure = Figure(figsize=(12, 2.7 * len(pairs)), layout="constrained")
+    axes = figure.subplots(len(pairs), 3, squeeze=False, sharex=True, sharey=True)
+    for row, (a, b) in zip(axes, pairs, strict=True):
+        for axis, value, title in zip(row, (csi, static, csi - static), _KINDS, strict=True):
+            power, angle_deg, length_m = delay_angle(sequence, radio, value, (a, b))
+            level = _db(power)
+            top = level.max()
+            shown = axis.imshow(
+                level.T,
+                origin="lower",
+                aspect="auto",
+                extent=(angle_deg[0], angle_deg[-1], 0.0, length_m[-1]),
+                vmin=top - RANGE_DB,
+                vmax=top,
+                cmap="inferno",
+            )
+            figure.colorbar(shown, ax=axis, pad=0.01).ax.tick_params(labelsize=7)
+            axis.set_title(f"device {a} to {b}, {title}", fontsize=9)
+            for point in sequence.joints(frame)[:, 0]:
+                angle, length = _seen_from(sequence, radio, (a, b), point)
+                axis.plot(angle, length, "x", color="#4dd2ff", ms=8, mew=2)
+        row[0].set_ylabel("path length [m]")
+    for axis in axes[-1]:
+        axis.set_xlabel("angle from boresight [°]")
+    return figure
+
+
+def delay_angle(
+    sequence: Sequence, radio: str, value: np.ndarray, pair: tuple[int, int]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Power over angle and path length at one receiving device, from one transmitting device.
+
+    Bartlett: P(θ, τ) = Σ_rows,tx |Σ_columns h_c(τ) e^{−jk y_c sin θ}|² with y_c the column's
+    position along the device's y axis; angles count from the boresight towards +y.
+
+    Returns:
+        Power (angle, delay), angles [°] and path lengths [m].
+    """
+    layout, spec = sequence.layout(radio), sequence.radio_spec(radio)
+    tx, rx = layout.tx_device == pair[0], layout.rx_device == pair[1]
+    profile, length_m = delay_profile(sequence, radio, value[np.ix_(tx, rx)])
+    device = sequence.devices(radio)[pair[1]]
+    local = (layout.rx_xyz[rx] - np.asarray(device.position_m)) @ rotation(device.quat_wxyz)
+    angle_deg = np.linspace(-90.0, 90.0, 181)
+    turn = np.sin(np.deg2rad(angle_deg))[:, None] * local[:, 1]
+    steering = np.exp(-2j * np.pi * spec.centre_hz / SPEED_OF_LIGHT * turn)
+    power = np.zeros((len(angle_deg), len(length_m)))
+    heights = np.round(local[:, 2], 6)
+    for height in np.unique(heights):
+        row = heights == height
+        beams = np.einsum("ar,trd->tad", steering[:, row], profile[:, row])
+        power += (np.abs(beams) ** 2).sum(axis=0)
+    return power, angle_deg, length_m
+
+
+def delay_profile(
+    sequence: Sequence, radio: str, links: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Hann-windowed impulse responses up to twice the scene's diagonal.
+
+    Returns:
+        Responses (..., delay) and path lengths [m].
+    """
+    spec = sequence.radio_spec(radio)
+    window = np.hanning(spec.num_subcarriers)
+    count = OVERSAMPLING * spec.num_subcarriers
+    # The first tone's own phase is kept, so responses stay comparable between elements.
+    response = np.fft.ifft(links * window, n=count, axis=-1) * count / window.sum()
+    length_m = np.arange(count) * spec.unambiguous_path_m / count
+    carrier = 2 * np.pi * spec.freq_hz[0] / SPEED_OF_LIGHT
+    response = response * np.exp(1j * carrier * length_m)
+    diagonal = float(np.linalg.norm(sequence.bounds_m[1] - sequence.bounds_m[0]))
+    keep = length_m <= 2 * diagonal
+    return response[..., keep], length_m[keep]
+
+
+def _profiles(
+    axis, sequence: Sequence, radio: str, pair: tuple[int, int], values: tuple[np.ndarray, ...]
+) -> None:
+    layout = sequence.layout(radio)
+    tx, rx = layout.tx_device == pair[0], layout.rx_device == pair[1]
+    for value, name, colour in zip(values, _KINDS, _COLOURS, strict=True):
+        profile, length_m = delay_profile(sequence, radio, value[np.ix_(tx, rx)])
+        power = (np.abs(profile) ** 2).mean(axis=(0, 1))
+        axis.plot(length_m, _db(power), color=colour, lw=1.2, label=name)
+    direct = np.linalg.norm(layout.tx_xyz[tx].mean(0) - layout.rx_xyz[rx].mean(0))
+    axis.axvline(direct, color="#444", ls=":", lw=1)
+    axis.set_title(f"device {pair[0]} to {pair[1]}", fontsize=9)
+    axis.set_xlabel("path length [m]", fontsize=8)
+    axis.tick_params(labelsize=7)
+    axis.grid(alpha=0.25)
+
+
+def _seen_from(
+    sequence: Sequence, radio: str, pair: tuple[int, int], point: np.ndarray
+) -> tuple[float, float]:
+    """Angle [°] and path length [m] of a single scatterer."""
+    layout, device = sequence.layout(radio), sequence.devices(radio)[pair[1]]
+    local = (point - np.asarray(device.position_m)) @ rotation(device.quat_wxyz)
+    away = np.linalg.norm(local)
+    out = np.linalg.norm(point - layout.tx_xyz[layout.tx_device == pair[0]].mean(axis=0))
+    return float(np.rad2deg(np.arcsin(local[1] / away))), float(away + out)
+
+
+def _pairs(layout: Layout) -> list[tuple[int, int]]:
+    tx, rx = np.nonzero(layout.measured)
+    pairs = np.unique(np.stack([layout.tx_device[tx], layout.rx_device[rx]], axis=1), axis=0)
+    return [(int(a), int(b)) for a, b in pairs]
+
+
+def _listening_pairs(layout: Layout) -> list[tuple[int, int]]:
+    """For each receiving device one transmitting device, another one where that is measured."""
+    chosen: dict[int, tuple[int, int]] = {}
+    count = int(layout.rx_device.max()) + 1
+    for a, b in sorted(_pairs(layout), key=lambda pair: (pair[0] - pair[1] - 1) % count):
+        chosen.setdefault(b, (a, b))
+    return [chosen[b] for b in sorted(chosen)]
+
+
+def _db(power: np.ndarray) -> np.ndarray:
+    return 10.0 * np.log10(np.maximum(power, 1e-30))

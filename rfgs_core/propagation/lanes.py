@@ -43,8 +43,9 @@ def sine_cosine_of_turns(turns: float) -> tuple[float, float]:
 @overload(exponential, jit_options=_OPTIONS)
 def _exponential(x: Any) -> Any:
     """Chooses the implementation of `exponential` by type."""
-    if x != types.float32:
-        return lambda x: math.exp(x)
+
+    def double(x: Any) -> Any:
+        return math.exp(x)
 
     def single(x: Any) -> Any:
         x = max(x, _LOWEST)
@@ -61,14 +62,15 @@ def _exponential(x: Any) -> Any:
         power = np.int32((np.int32(n) + np.int32(127)) << np.int32(23))
         return p * power.view(np.float32)
 
-    return single
+    return single if x == types.float32 else double
 
 
 @overload(sine_cosine_of_turns, jit_options=_OPTIONS)
 def _sine_cosine_of_turns(turns: Any) -> Any:
     """Chooses the implementation of `sine_cosine_of_turns` by type."""
-    if turns != types.float32:
-        return lambda turns: (math.sin(2 * math.pi * turns), math.cos(2 * math.pi * turns))
+
+    def double(turns: Any) -> Any:
+        return math.sin(2 * math.pi * turns), math.cos(2 * math.pi * turns)
 
     def single(turns: Any) -> Any:
         # sin and cos of pi t by Chebyshev interpolation in t^2 (errors below 1e-9), then the
@@ -87,4 +89,4 @@ def _sine_cosine_of_turns(turns: Any) -> Any:
         c = c * x + _F(1.0)
         return (s + s) * c, _F(1.0) - (s + s) * s
 
-    return single
+    return single if turns == types.float32 else double

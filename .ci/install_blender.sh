@@ -53,7 +53,7 @@ install_suite() {
   done
   cp /etc/resolv.conf "$staging/etc/resolv.conf" 2>/dev/null || true
   DEBIAN_FRONTEND=noninteractive chroot "$staging" \
-    apt-get install -y --no-install-recommends blender python3-numpy >>"$log" 2>&1 || return 1
+    apt-get install -y --no-install-recommends blender python3-numpy python3-cattr >>"$log" 2>&1 || return 1
   chroot "$staging" apt-get clean
   rm -rf "$dir/root"
   mv "$staging" "$dir/root"

@@ -4,9 +4,9 @@
 Works as an extension of Blender 4.2 and newer and as a package beside pip `bpy`.
 """
 
-from . import properties
+from . import command, operators, panels, properties
 
-_MODULES = (properties,)
+_MODULES = (properties, operators, panels, command)
 
 
 def register() -> None:

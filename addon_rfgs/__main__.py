@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`python -m addon_rfgs --blend FILE COMMAND …`, with Blender as a Python module."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from . import register, unregister
+from .cli import USER_ERROR, run
+
+
+def main(arguments: list[str]) -> int:
+    """Runs one command on a .blend; returns the exit code."""
+    program = "python -m addon_rfgs --blend FILE"
+    if arguments[:1] in (["-h"], ["--help"]):
+        return run(["--help"], program)
+    if len(arguments) < 2 or arguments[0] != "--blend":
+        sys.stderr.write(f"error: expected {program} export|groundtruth|import …\n")
+        return USER_ERROR
+    register()
+    try:
+        return run(arguments[2:], program, Path(arguments[1]))
+    finally:
+        unregister()
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pinhole cameras and radio devices of a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+import mathutils
+import numpy as np
+
+from .errors import AddonError
+from .frames import file_label, unit_scale
+
+#: Cameras set up around the scene where it brings none.
+GUESSED_CAMERAS = 8
+
+
+@dataclass
+class View:
+    """One camera as it renders: fixed, perspective, square pixels."""
+
+    name: str
+    """cam00, cam01, … by object name."""
+    source: str
+    """Name of the camera object."""
+    data: bpy.types.Camera
+    """Lens settings to copy."""
+    world_from_camera: np.ndarray  # [4, 4], Blender units, OpenGL axes
+    intrinsics: dict[str, float]
+    """width, height [px], fl_x, fl_y, cx, cy [px]."""
+
+    def row(self, unit: float) -> dict[str, Any]:
+        """Row of `bundle.json`; `unit` is metres per Blender unit."""
+        matrix = self.world_from_camera.copy()
+        matrix[:3, 3] *= unit
+        return {
+            "name": self.name,
+            "source": self.source,
+            **self.intrinsics,
+            "world_from_camera": matrix.tolist(),
+        }
+
+
+def picture_size(scene: bpy.types.Scene, resolution: int | None) -> tuple[int, int]:
+    """Width and height [px]: the scene's aspect with `resolution` as the longer side."""
+    render = scene.render
+    width, height = render.resolution_x, render.resolution_y
+    if not resolution:
+        factor = render.resolution_percentage / 100
+        return max(1, int(width * factor)), max(1, int(height * factor))
+    if resolution < 8:
+        raise AddonError(f"resolution: expected at least 8 pixels, got {resolution}")
+    factor = resolution / max(width, height)
+    return max(1, round(width * factor)), max(1, round(height * factor))
+
+
+def find_views(
+    scene: bpy.types.Scene, count: int | None, resolution: int | None
+) -> tuple[list[View], list[dict[str, Any]]]:
+    """The first `count` perspective cameras by name, as they stand in the first frame.
+
+    Returns:
+        Views and what was guessed: cameras that move, are left out or were made up.
+
+    Raises:
+        AddonError: More cameras are asked for than there are.
+    """
+    guesses: list[dict[str, Any]] = []
+    scene.frame_set(scene.frame_start)
+    graph = bpy.context.evaluated_depsgraph_get()
+    width, height = picture_size(scene, resolution)
+    cameras = sorted(
+        (item for item in scene.objects if item.type == "CAMERA"), key=lambda item: item.name
+    )
+    views = []
+    for item in cameras:
+        if item.data.type != "PERSP":
+            note = {"what": "camera", "object": item.name, "value": "left out"}
+            guesses.append({**note, "why": f"{item.data.type.lower()} projection"})
+            continue
+        evaluated = item.evaluated_get(graph)
+        matrix = np.array(evaluated.matrix_world, dtype=np.float64)
+        lens = _intrinsics(evaluated, width, height)
+        views.append(View(f"cam{len(views):02d}", item.name, item.data, _rigid(matrix), lens))
+    if not views:
+        raise AddonError(f"{file_label()}: no perspective camera; add one")
+    if count is not None and count > len(views):
+        raise AddonError(f"cameras: {count} asked for, {file_label()} has {len(views)}")
+    views = views[:count] if count else views
+    guesses.extend(
+        _moving(scene, "camera", {view.source: view.world_from_camera for view in views})
+    )
+    return views, guesses
+
+
+@contextmanager
+def cameras_ready(
+    scene: bpy.types.Scene, low: np.ndarray, high: np.ndarray
+) -> Iterator[list[dict[str, Any]]]:
+    """Stands a ring of cameras around a box where a scene has none; they go with the block.
+
+    Args:
+        scene: The scene.
+        low: Lower corner [3] of what the cameras shall see, Blender units.
+        high: Upper corner [3].
+    """
+    if any(item.type == "CAMERA" and item.data.type == "PERSP" for item in scene.objects):
+        yield []
+        return
+    centre, radius = 0.5 * (low + high), 1.2 * float(np.linalg.norm(high - low))
+    made = []
+    for index in range(GUESSED_CAMERAS):
+        angle = 2 * np.pi * index / GUESSED_CAMERAS
+        lift = radius * (0.1 if index % 2 == 0 else 0.5)
+        place = centre + np.array([radius * np.cos(angle), radius * np.sin(angle), lift])
+        item = bpy.data.objects.new(f"RFGS guessed {index:02d}", bpy.data.cameras.new("guessed"))
+        item.data.angle = np.radians(60)
+        item.matrix_world = mathutils.Matrix(look_at(place, centre).tolist())
+        scene.collection.objects.link(item)
+        made.append(item)
+    bpy.context.view_layer.update()
+    note = {"what": "camera", "object": "the scene", "value": f"a ring of {GUESSED_CAMERAS}"}
+    try:
+        yield [{**note, "why": "the scene has no perspective camera"}]
+    finally:
+        for item in made:
+            bpy.data.cameras.remove(item.data)
+
+
+def look_at(place: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """world_from_camera [4, 4] of an upright camera at `place` that looks at `target`."""
+    back = (place - target) / np.linalg.norm(place - target)
+    right = np.cross([0.0, 0.0, 1.0], back)
+    if np.linalg.norm(right) < 1e-6:
+        right = np.array([1.0, 0.0, 0.0])
+    right = right / np.linalg.norm(right)
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.stack([right, np.cross(back, right), back], axis=1)
+    matrix[:3, 3] = place
+    return matrix
+
+
+def place_camera(scene: bpy.types.Scene, view: View) -> bpy.types.Object:
+    """Adds a camera that stays at a view's pose, whatever animates the original."""
+    data = view.data.copy()
+    data.animation_data_clear()
+    item = bpy.data.objects.new(f"RFGS {view.name}", data)
+    item.matrix_world = mathutils.Matrix(view.world_from_camera.tolist())
+    data.dof.use_dof = False
+    scene.collection.objects.link(item)
+    return item
+
+
+def find_devices(scene: bpy.types.Scene) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Radio devices as they stand in the first frame, and what was guessed about them."""
+    scene.frame_set(scene.frame_start)
+    graph, unit = bpy.context.evaluated_depsgraph_get(), unit_scale(scene)
+    marked = [item for item in scene.objects if item.rfgs.role != "NONE"]
+    rows, poses = [], {}
+    for item in sorted(marked, key=lambda item: item.name):
+        matrix = item.evaluated_get(graph).matrix_world
+        poses[item.name] = _rigid(np.array(matrix, dtype=np.float64))
+        place, turn, _ = matrix.decompose()
+        rows.append(
+            {
+                "name": item.name,
+                "radio": item.rfgs.radio.strip() or "any",
+                "role": item.rfgs.role,
+                "position_m": [float(value) * unit for value in place],
+                "quat_wxyz": [float(value) for value in turn.normalized()],
+            }
+        )
+    return rows, _moving(scene, "radio device", poses)
+
+
+def _intrinsics(camera: bpy.types.Object, width: int, height: int) -> dict[str, float]:
+    """Pinhole parameters from Blender's own projection matrix; x right, y down [px]."""
+    graph = bpy.context.evaluated_depsgraph_get()
+    matrix = np.array(camera.calc_matrix_camera(graph, x=width, y=height), dtype=np.float64)
+    return {
+        "width": width,
+        "height": height,
+        "fl_x": float(matrix[0, 0] * width / 2),
+        "fl_y": float(matrix[1, 1] * height / 2),
+        "cx": float(width / 2 * (1 - matrix[0, 2])),
+        "cy": float(height / 2 * (1 + matrix[1, 2])),
+    }
+
+
+def _rigid(matrix: np.ndarray) -> np.ndarray:
+    """Takes the scale out of a camera's matrix, as Blender does when it renders."""
+    out = matrix.copy()
+    out[:3, :3] /= np.linalg.norm(out[:3, :3], axis=0)
+    return out
+
+
+def _moving(
+    scene: bpy.types.Scene, what: str, poses: dict[str, np.ndarray]
+) -> list[dict[str, Any]]:
+    """Notes about objects whose pose in later frames differs from `poses` of the first."""
+    notes = {}
+    for frame in (scene.frame_end, (scene.frame_start + scene.frame_end) // 2):
+        scene.frame_set(frame)
+        for name, pose in poses.items():
+            now = _rigid(np.array(scene.objects[name].matrix_world, dtype=np.float64))
+            if not np.allclose(now, pose, atol=1e-4):
+                note = {"what": what, "object": name, "value": f"pose of frame {scene.frame_start}"}
+                notes[name] = {**note, "why": f"it moves; a {what} of a dataset stands still"}
+    return list(notes.values())

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Frame ranges, units and the name of the open file."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from pathlib import Path
+
+import bpy
+
+from .errors import AddonError
+
+_PATTERN = re.compile(r"\s*(-?\d+)\s*:\s*(-?\d+)\s*(?::\s*(\d+)\s*)?")
+
+
+def chosen_frames(scene: bpy.types.Scene, text: str | None) -> list[int]:
+    """Frame numbers of `A:B[:STEP]`, both ends included; nothing means the whole range.
+
+    Raises:
+        AddonError: The scene has no range, or `text` is no range within it.
+    """
+    first, last = scene.frame_start, scene.frame_end
+    if last <= first:
+        raise AddonError(
+            f"{file_label()}: the scene has no frame range ({first}:{last}); "
+            "set Start and End in its output properties"
+        )
+    if not text:
+        return list(range(first, last + 1))
+    match = _PATTERN.fullmatch(text)
+    if not match:
+        raise AddonError(f"frames: expected FIRST:LAST or FIRST:LAST:STEP, got {text!r}")
+    start, end, step = int(match[1]), int(match[2]), int(match[3] or 1)
+    if start > end or step < 1:
+        raise AddonError(f"frames: expected FIRST <= LAST and STEP >= 1, got {text!r}")
+    if start < first or end > last:
+        raise AddonError(f"frames: {text} leaves the range {first}:{last} of {file_label()}")
+    return list(range(start, end + 1, step))
+
+
+def unit_scale(scene: bpy.types.Scene) -> float:
+    """Metres per Blender unit."""
+    units = scene.unit_settings
+    return 1.0 if units.system == "NONE" else float(units.scale_length)
+
+
+def file_label() -> str:
+    """Name of the open file for messages."""
+    return bpy.data.filepath or "the unsaved scene"
+
+
+def file_sha256() -> str:
+    """SHA-256 of the open file as it lies on disk.
+
+    Raises:
+        AddonError: The file was never saved.
+    """
+    if not bpy.data.filepath:
+        raise AddonError("the scene was never saved; save it first")
+    with Path(bpy.data.filepath).open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which radio material every face is made of, guessed where nobody said."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+import numpy as np
+
+from .naming import Names
+from .survey import Surface
+from .tables import MATERIALS
+
+#: Words in names, lower case, and what they mean; earlier rows win.
+KEYWORDS: tuple[tuple[str, tuple[str, ...]], ...] = (
+    ("plasterboard", ("plasterboard", "plaster", "drywall", "gypsum", "wallpaper")),
+    ("ceiling_board", ("ceiling",)),
+    ("chipboard", ("chipboard", "mdf", "particleboard")),
+    ("plywood", ("plywood",)),
+    ("concrete", ("concrete", "cement", "screed")),
+    ("brick", ("brick", "bricks", "masonry")),
+    ("marble", ("marble",)),
+    ("glass", ("glass", "window", "windowpane", "mirror")),
+    (
+        "metal",
+        (
+            "metal",
+            "steel",
+            "iron",
+            "aluminium",
+            "aluminum",
+            "chrome",
+            "copper",
+            "brass",
+            "radiator",
+        ),
+    ),
+    (
+        "wood",
+        (
+            "wood",
+            "wooden",
+            "oak",
+            "pine",
+            "timber",
+            "parquet",
+            "door",
+            "table",
+            "shelf",
+            "cupboard",
+        ),
+    ),
+    ("skin", ("skin", "flesh")),
+)
+
+#: A mesh no thicker than this share of its size counts as flat.
+_FLAT = 0.02
+
+
+@dataclass
+class MaterialTable:
+    """The bundle's list of materials, and what had to be guessed to make it."""
+
+    rows: list[dict[str, Any]]
+    """Rows of `bundle.json`."""
+    guesses: list[dict[str, Any]]
+    """Rows of `guesses.json`."""
+
+    def __init__(self) -> None:
+        self.rows, self.guesses = [], []
+        self._index: dict[tuple[str, str], int] = {}
+        self._names = Names()
+
+    def index(self, surface: Surface, slot: int) -> int:
+        """Row of one material slot of a surface, made on first use."""
+        materials = surface.materials
+        material = materials[min(slot, len(materials) - 1)] if materials else None
+        chosen = "AUTO" if material is None else material.rfgs.radio_material
+        why = ""
+        if chosen == "AUTO":
+            chosen, why = guess(surface, material)
+            self._note(surface, material, chosen, why)
+        key = ("" if material is None else material.name, chosen)
+        if key not in self._index:
+            self._index[key] = len(self.rows)
+            self.rows.append(self._row(material, chosen, bool(why)))
+        return self._index[key]
+
+    def _row(self, material: bpy.types.Material | None, chosen: str, guessed: bool) -> dict:
+        table = MATERIALS[chosen]
+        thickness_m = 0.0 if material is None else material.rfgs.thickness_m
+        scattering = 0.0 if material is None else material.rfgs.scattering_coefficient
+        return {
+            "name": self._names.unique(material.name if material else f"default_{chosen}"),
+            "source": "" if material is None else material.name,
+            "radio_material": chosen,
+            "thickness_m": round(float(thickness_m), 7) or table["thickness_m"],
+            "scattering_coefficient": round(float(scattering), 7),
+            "color": table["color"] if material is None else _colour(material),
+            "guessed": guessed,
+        }
+
+    def _note(
+        self, surface: Surface, material: bpy.types.Material | None, chosen: str, why: str
+    ) -> None:
+        label = surface.key if material is None else f"{surface.key}, material {material.name}"
+        note = {"what": "radio_material", "object": label, "value": chosen, "why": why}
+        if note not in self.guesses:
+            self.guesses.append(note)
+
+
+def guess(surface: Surface, material: bpy.types.Material | None) -> tuple[str, str]:
+    """Radio material of a surface nobody labelled, and why."""
+    for what, name in (
+        ("material", material.name if material else ""),
+        ("object", surface.source.name),
+    ):
+        words = _words(name)
+        for value, keywords in KEYWORDS:
+            hit = next((word for word in keywords if word in words), None)
+            if hit:
+                return value, f"{what} name contains {hit!r}"
+    if surface.armature is not None:
+        return "skin", f"skinned to {surface.armature.name!r}"
+    if is_flat(surface.vertices):
+        return "plasterboard", "flat"
+    return "wood", "nothing else is known"
+
+
+def is_flat(vertices: np.ndarray) -> bool:
+    """Whether vertices [V, 3] lie in a plane within 2 % of their extent."""
+    centred = vertices - vertices.mean(axis=0)
+    axes = np.linalg.eigh(centred.T @ centred)[1]
+    extent = np.ptp(centred @ axes, axis=0)
+    return bool(extent.min() <= _FLAT * extent.max())
+
+
+def _words(name: str) -> set[str]:
+    spaced = re.sub(r"([a-z])([A-Z])", r"\1 \2", name)
+    return set(re.findall(r"[a-z]+", spaced.lower()))
+
+
+def _colour(material: bpy.types.Material) -> list[float]:
+    """Base colour, linear RGB: the main shader's where it is a constant."""
+    colour = material.diffuse_color
+    for node in material.node_tree.nodes if material.node_tree else ():
+        if node.type in {"BSDF_PRINCIPLED", "BSDF_DIFFUSE", "BSDF_GLASS", "BSDF_GLOSSY"}:
+            socket = node.inputs.get("Base Color") or node.inputs.get("Color")
+            if socket is not None and not socket.is_linked:
+                colour = socket.default_value
+                break
+    return [round(float(value), 6) for value in colour[:3]]

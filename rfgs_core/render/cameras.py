@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Float, Float64
 
 from rfgs_core.errors import RfgsFormatError
 
@@ -80,16 +80,16 @@ class Camera:
         rotation = _FLIP @ self.world_from_camera[:3, :3].T
         matrix = np.eye(4)
         matrix[:3, :3] = rotation
-        matrix[:3, 3] = -rotation @ self.position_m
+        matrix[:3, 3] = rotation @ -self.position_m
         return matrix
 
-    def to_view(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 3"]:
+    def to_view(self, points: Float[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 3"]:
         """World points in view axes [m]; the third coordinate is the planar depth."""
         matrix = self.view_from_world
         return np.asarray(points, np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
 
     def project(
-        self, points: Float64[np.ndarray, "N 3"]
+        self, points: Float[np.ndarray, "N 3"]
     ) -> tuple[Float64[np.ndarray, "N 2"], Float64[np.ndarray, "N"]]:
         """Where world points land.
 

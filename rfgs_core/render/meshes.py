@@ -11,13 +11,16 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
-from jaxtyping import Float32, Int32
+from jaxtyping import Float, Float32, Int, Int32
 
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.render.cameras import Camera
 
 #: Triangles are cut at this planar depth [m].
 NEAR_M = 0.01
+
+#: Rounding allowed at an edge, in barycentric coordinates, so that neighbours leave no crack.
+EDGE_SHARE = 1e-9
 
 _NO_FACE = -1
 
@@ -42,7 +45,7 @@ class MeshPicture:
 
 
 def rasterize_mesh(
-    vertices: Float32[np.ndarray, "V 3"], faces: Int32[np.ndarray, "T 3"], camera: Camera
+    vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "T 3"], camera: Camera
 ) -> MeshPicture:
     """Draws both sides of every triangle.
 
@@ -140,7 +143,7 @@ def _draw_triangle(
             of_a = ((b[0] - x) * (c[1] - y) - (b[1] - y) * (c[0] - x)) / area
             of_b = ((c[0] - x) * (a[1] - y) - (c[1] - y) * (a[0] - x)) / area
             of_c = 1.0 - of_a - of_b
-            if of_a < 0.0 or of_b < 0.0 or of_c < 0.0:
+            if min(of_a, of_b, of_c) < -EDGE_SHARE:
                 continue
             nearness = of_a * a[2] + of_b * b[2] + of_c * c[2]
             if nearness > inverse_depth[row, column]:

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`rfgs render`: pictures of a run's Gaussians, alone and beside the true ones."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import tyro
+
+from rfgs_core.errors import RfgsError
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from rfgs_core.render.view import TrainedRun
+
+#: White columns between a rendered picture and the true one.
+_GAP_PX = 4
+
+_LOG = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class RenderArgs:
+    """Renders a run's Gaussians through the cameras of its dataset."""
+
+    run: tyro.conf.Positional[Path]
+    """Folder of a trained run."""
+    out: Path
+    """Folder for OUT/cam00/000001.png, and 000001_beside_true.png where a true picture exists."""
+    split: Literal["train", "test"] = "test"
+    """Pictures the shader was fitted to, or those it never saw."""
+    frames: tuple[int, ...] = ()
+    """Frames to render; all of the run if none is given."""
+    person_only: bool = False
+    """Only what moves, on mid-grey, instead of in the room."""
+
+
+def run(args: RenderArgs) -> int:
+    """Writes the pictures; exit code 0."""
+    from tqdm import tqdm
+
+    from rfgs_core.dataset.pictures import write_png
+    from rfgs_core.render.view import camera_of, fitted_shader, render_person, render_view
+    from rfgs_core.run import open_run
+
+    trained = open_run(args.run)
+    if fitted_shader(trained) is None:
+        _LOG.warning("%s: no shader has been fitted, so the Gaussians are grey", args.run)
+    draw = render_person if args.person_only else render_view
+    for name, frame in tqdm(_chosen(trained, args), desc="render", unit="picture"):
+        camera = camera_of(trained.sequence, name)
+        rendered = _bytes(draw(trained, camera, frame).rgb)
+        write_png(args.out / name / f"{frame:06d}.png", rendered)
+        true = _true_picture(trained, name, frame, args.person_only)
+        if true is not None:
+            file = args.out / name / f"{frame:06d}_beside_true.png"
+            write_png(file, _side_by_side(rendered, true))
+    return 0
+
+
+def _chosen(trained: TrainedRun, args: RenderArgs) -> list[tuple[str, int]]:
+    from rfgs_core.render.view import pictures_of
+
+    unknown = sorted(set(args.frames) - set(trained.frames))
+    if unknown:
+        raise RfgsError(
+            f"{args.run}: no frame {unknown[0]}; the run has {trained.frames[0]} to "
+            f"{trained.frames[-1]}"
+        )
+    wanted = set(args.frames or trained.frames)
+    pictures = [row for row in pictures_of(trained, args.split) if row[1] in wanted]
+    if not pictures:
+        raise RfgsError(f"{args.run}: the {args.split} split holds no picture of these frames")
+    return pictures
+
+
+def _true_picture(
+    trained: TrainedRun, name: str, frame: int, person_only: bool
+) -> np.ndarray | None:
+    from rfgs_core.render.view import camera_of, true_person
+
+    if not trained.sequence.files.image(name, frame).is_file():
+        return None
+    if person_only:
+        return _bytes(true_person(trained.sequence, camera_of(trained.sequence, name), frame))
+    return trained.sequence.image(name, frame)[..., :3]
+
+
+def _bytes(rgb: np.ndarray) -> np.ndarray:
+    return (rgb * 255.0 + 0.5).clip(0, 255).astype("uint8")
+
+
+def _side_by_side(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    import numpy as np
+
+    gap = np.full((left.shape[0], _GAP_PX, 3), 255, np.uint8)
+    return np.concatenate([left, gap, right], axis=1)

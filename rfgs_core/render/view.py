@@ -1,0 +1,208 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures of a trained run through the cameras of its dataset, and the shader's training views."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Literal, NamedTuple, Protocol
+
+import numpy as np
+import torch
+from jaxtyping import Float32, UInt8
+
+from rfgs_core.dataset.reader import Sequence
+from rfgs_core.errors import RfgsError, RfgsFormatError
+from rfgs_core.gaussians.model import Gaussians
+from rfgs_core.gaussians.ply import GaussianCloud, cloud_of
+from rfgs_core.render.cameras import Camera
+from rfgs_core.render.rasterizer import plan_splats, splat
+from rfgs_core.render.shader import MID_GREY, Shader, ShaderConfig, TrainingView, fit_shader
+from rfgs_core.render.splat import ALPHA_MIN
+
+Split = Literal["train", "test"]
+
+#: File of the fitted shader inside a run.
+SHADER_FILE = "shader.npz"
+
+
+class TrainedRun(Protocol):
+    """What rendering needs of a run; `rfgs_core.run.Run` has it."""
+
+    @property
+    def path(self) -> Path:
+        """Folder of the run."""
+        ...
+
+    @property
+    def frames(self) -> list[int]:
+        """Frames the run was trained on."""
+        ...
+
+    @property
+    def sequence(self) -> Sequence:
+        """The data."""
+        ...
+
+    def gaussians(self, frame: int) -> Gaussians:
+        """Static Gaussians, then the moving ones of a frame."""
+        ...
+
+    def attributes(self, frame: int) -> Mapping[str, np.ndarray]:
+        """Per-Gaussian arrays of the moving ones, `features` among them."""
+        ...
+
+
+class View(NamedTuple):
+    """A rendered picture of a run."""
+
+    rgb: Float32[np.ndarray, "H W 3"]
+    """Colours, sRGB in [0, 1], background included."""
+    alpha: Float32[np.ndarray, "H W"]
+    """Share of each pixel that Gaussians cover."""
+    depth: Float32[np.ndarray, "H W"]
+    """Expected planar depth of the Gaussians [m], +inf where there is none."""
+
+
+def camera_of(sequence: Sequence, name: str) -> Camera:
+    """A camera of a sequence by name.
+
+    Raises:
+        RfgsError: There is no such camera.
+    """
+    for row in sequence.cameras:
+        if row.get("name") == name:
+            return Camera.from_dict(row)
+    names = ", ".join(str(row.get("name")) for row in sequence.cameras)
+    raise RfgsError(f"{sequence.path}: no camera {name!r}; it holds {names}")
+
+
+def pictures_of(run: TrainedRun, split: Split) -> list[tuple[str, int]]:
+    """Camera and frame of each picture of a split, in order.
+
+    `train` is what the shader may see: training cameras at training frames. `test` is every other
+    picture of the run's frames.
+    """
+    held = run.sequence.splits["images"]
+    pictures = []
+    for row in run.sequence.cameras:
+        for frame in run.frames:
+            unseen = row["name"] in held["test_cameras"] or frame in held["test_frames"]
+            if unseen == (split == "test"):
+                pictures.append((str(row["name"]), frame))
+    return pictures
+
+
+def fitted_shader(run: TrainedRun) -> Shader | None:
+    """The run's shader, None while it is not fitted."""
+    path = run.path / SHADER_FILE
+    return Shader.load(path) if path.is_file() else None
+
+
+def moving_gaussians(run: TrainedRun, frame: int) -> Gaussians:
+    """The Gaussians of a frame without the static ones."""
+    everything = run.gaussians(frame)
+    count = len(run.attributes(frame)["features"])
+    rows = torch.arange(len(everything)) >= len(everything) - count
+    return everything.select(rows).detach()
+
+
+def render_view(run: TrainedRun, camera: str | Camera, frame: int) -> View:
+    """The run's Gaussians in the room.
+
+    Where the dataset has a picture of the empty room, the moving Gaussians are drawn over it (the
+    room's own Gaussians would paint it twice); otherwise all Gaussians over mid-grey.
+
+    Args:
+        run: A trained run; colours are grey until its shader is fitted.
+        camera: A camera or the name of one of the dataset's.
+        frame: Blender frame number.
+
+    Returns:
+        Picture, coverage and depth.
+    """
+    eye = camera if isinstance(camera, Camera) else camera_of(run.sequence, camera)
+    file = run.sequence.files.image_empty(eye.name)
+    if not file.is_file():
+        return _render(run, run.gaussians(frame).detach(), eye, MID_GREY)
+    empty = _colors(run.sequence.image_empty(eye.name), eye, file)
+    return _render(run, moving_gaussians(run, frame), eye, torch.from_numpy(empty))
+
+
+def render_person(run: TrainedRun, camera: str | Camera, frame: int) -> View:
+    """The moving Gaussians alone on mid-grey; arguments and result as in `render_view`."""
+    eye = camera if isinstance(camera, Camera) else camera_of(run.sequence, camera)
+    return _render(run, moving_gaussians(run, frame), eye, MID_GREY)
+
+
+def true_person(sequence: Sequence, camera: Camera, frame: int) -> Float32[np.ndarray, "H W 3"]:
+    """What moves, cut out of the true picture with the mask, on mid-grey; sRGB in [0, 1]."""
+    rgb = _colors(sequence.image(camera.name, frame), camera, sequence.files.root)
+    mask = sequence.mask(camera.name, frame)
+    return np.where(mask[..., None] > 0, rgb, np.float32(MID_GREY)).astype(np.float32)
+
+
+def training_views(run: TrainedRun) -> list[TrainingView]:
+    """The pictures the shader may see, with the frozen Gaussians in front of each camera."""
+    moving = {frame: moving_gaussians(run, frame) for frame in run.frames}
+    views = []
+    for name, frame in pictures_of(run, "train"):
+        camera = camera_of(run.sequence, name)
+        plan = plan_splats(moving[frame], camera)
+        mask = torch.from_numpy(run.sequence.mask(name, frame) > 0)
+        views.append(
+            TrainingView(
+                plan=plan,
+                features=moving[frame].features,
+                target=torch.from_numpy(true_person(run.sequence, camera, frame)),
+                region=mask | (plan.alpha >= ALPHA_MIN),
+            )
+        )
+    return views
+
+
+def fit_run_shader(
+    run: TrainedRun, config: ShaderConfig, on_step: Callable[[float], None] | None = None
+) -> Shader:
+    """Fits the shader to the run's training pictures and stores it in the run.
+
+    The Gaussians stay as they are: only `shader.npz` is written.
+    """
+    shader = fit_shader(training_views(run), config, on_step)
+    shader.save(run.path / SHADER_FILE)
+    return shader
+
+
+def colored_cloud(run: TrainedRun, frame: int, shader: Shader | None) -> GaussianCloud:
+    """Static and moving Gaussians of a frame with colours, ready for a PLY file.
+
+    The reflected power is added where the run knows it for every Gaussian.
+    """
+    gaussians = run.gaussians(frame).detach()
+    power = run.attributes(frame).get("rf_power_db")
+    known = power is not None and len(power) == len(gaussians)
+    rgb = _shade(shader, gaussians).numpy()
+    return cloud_of(gaussians, rgb, power if known else None)
+
+
+def _render(
+    run: TrainedRun, gaussians: Gaussians, camera: Camera, background: torch.Tensor | float
+) -> View:
+    drawn = splat(gaussians, _shade(fitted_shader(run), gaussians), camera)
+    picture = drawn.over(background).clamp(0.0, 1.0)
+    return View(picture.numpy(), drawn.alpha.numpy(), drawn.depth.numpy())
+
+
+def _shade(shader: Shader | None, gaussians: Gaussians) -> torch.Tensor:
+    if shader is None:
+        return torch.full((len(gaussians), 3), MID_GREY)
+    return shader.colors(gaussians.features.float())
+
+
+def _colors(picture: UInt8[np.ndarray, "H W 4"], camera: Camera, file: Any) -> np.ndarray:
+    if picture.shape[:2] != (camera.height, camera.width):
+        raise RfgsFormatError(
+            f"{file}: picture of {picture.shape[1]}×{picture.shape[0]} px, camera {camera.name} "
+            f"has {camera.width}×{camera.height}"
+        )
+    return picture[..., :3].astype(np.float32) / np.float32(255.0)

@@ -51,7 +51,8 @@ def environment_paths(
     nodes = node_frequencies(radio)
     if len(nodes) == NARROW_BAND_NODES:
         traced = _traced(bundle, radio, layout, devices, seed, radio.centre_hz)
-        return _with_amplitude(traced, np.repeat(traced.amplitude, len(nodes), axis=1))
+        # Walls hardly change over a narrow band, but an antenna's aperture goes with λ.
+        return _with_amplitude(traced, traced.amplitude * (radio.centre_hz / nodes))
     return _joined([_traced(bundle, radio, layout, devices, seed, float(f)) for f in nodes])
 
 

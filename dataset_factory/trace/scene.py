@@ -9,13 +9,15 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 import sionna.rt as rt
+from sionna.rt.radio_materials.itu import itu_material
 
 from dataset_factory.bundle import Bundle
 from rfgs_core.errors import RfgsError
 from rfgs_core.radio import Layout, Radio
+from rfgs_core.radio.constants import VACUUM_PERMITTIVITY
 from rfgs_core.radio.layout import DevicePose, rotation
 from rfgs_core.radio.materials import MATERIALS
-from rfgs_core.radio.tissue import skin_conductivity, skin_permittivity
+from rfgs_core.radio.tissue import normal_reflection, skin_conductivity, skin_permittivity
 
 #: Name of the one object that holds everything that moves.
 BODY = "moving"
@@ -54,6 +56,17 @@ def radio_material(row: dict[str, Any], index: int) -> rt.RadioMaterial:
     if row["radio_material"] == "skin":
         return rt.RadioMaterial(name=name, frequency_update_callback=_skin, **common)
     return rt.ITURadioMaterial(name=name, itu_type=row["radio_material"], **common)
+
+
+def half_space_reflection(name: str, freq_hz: np.ndarray) -> np.ndarray:
+    """Normal reflection of a thick body of a radio material, complex128, shape of `freq_hz`."""
+    if name == "skin":
+        return normal_reflection(skin_permittivity(freq_hz))
+    values = [itu_material(name, float(f)) for f in freq_hz]
+    epsilon = np.array([float(np.ravel(np.array(e))[0]) for e, _ in values])
+    sigma = np.array([float(np.ravel(np.array(s))[0]) for _, s in values])
+    loss = sigma / (2.0 * np.pi * np.asarray(freq_hz) * VACUUM_PERMITTIVITY)
+    return normal_reflection(epsilon - 1j * loss)
 
 
 def _skin(freq_hz: mi.Float) -> tuple[mi.Float, mi.Float]:

@@ -22,6 +22,52 @@ from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
 Shadow = Literal["kirchhoff", "hard"]
 
+#: Detail of the mesh that casts shadows [m]; far below the first Fresnel zone of any preset.
+DETAIL_M = 0.015
+#: Shadows that change a device pair by less than this share of its strongest path are left out.
+NEGLIGIBLE = 1e-3
+
+
+def coarse_mesh(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Thins out a mesh for its silhouette by joining vertices within cells of `DETAIL_M`.
+
+    Args:
+        vertices: Rest pose [m], shape (V, 3).
+        faces: Triangles, shape (T, 3).
+
+    Returns:
+        Indices of the vertices that are kept and triangles over them.
+    """
+    used = np.unique(faces)
+    cells = np.floor(vertices[used].astype(np.float64) / DETAIL_M).astype(np.int64)
+    _, cell = np.unique(cells, axis=0, return_inverse=True)
+    cell = cell.ravel()
+    size = np.bincount(cell)
+    mean = np.stack([np.bincount(cell, vertices[used, i]) / size for i in range(3)], axis=1)
+    away = np.linalg.norm(vertices[used] - mean[cell], axis=1)
+    order = np.lexsort((away, cell))
+    kept = used[order[np.unique(cell[order], return_index=True)[1]]]
+    of_vertex = np.zeros(len(vertices), dtype=np.int64)
+    of_vertex[used] = cell
+    thin = of_vertex[faces]
+    flat = (thin[:, 0] == thin[:, 1]) | (thin[:, 1] == thin[:, 2]) | (thin[:, 2] == thin[:, 0])
+    thin = thin[~flat]
+    _, first = np.unique(np.sort(thin, axis=1), axis=0, return_index=True)
+    return kept, thin[np.sort(first)]
+
+
+def _reach(paths: PathSet) -> np.ndarray:
+    """Fresnel coordinate up to which a shadow on each path matters, shape (path,).
+
+    At ν from its edge a screen changes a path by about 1/(√2 π ν) of its amplitude.
+    """
+    strength = np.abs(paths.amplitude).max(axis=1)
+    pair = paths.tx * (int(paths.rx.max()) + 1) + paths.rx
+    strongest = np.zeros(int(pair.max()) + 1)
+    np.maximum.at(strongest, pair, strength)
+    relative = strength / np.maximum(strongest[pair], 1e-300)
+    return np.minimum(relative / (np.sqrt(2.0) * np.pi * NEGLIGIBLE), silhouette.FAR)
+
 
 def transmission(
     paths: PathSet,
@@ -53,7 +99,7 @@ def transmission(
     for vertices, faces in bodies:
         _shade(
             paths.vertices,
-            unfolded,
+            (*unfolded, _reach(paths)),
             np.ascontiguousarray(tx),
             np.ascontiguousarray(rx),
             np.ascontiguousarray(vertices, dtype=np.float64),
@@ -109,7 +155,7 @@ def _reflections(paths: PathSet, k: np.ndarray) -> np.ndarray:
 @numba.njit(cache=True, parallel=True)
 def _shade(
     corners: np.ndarray,
-    unfolded: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
+    unfolded: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray],
     tx_offset: np.ndarray,
     rx_offset: np.ndarray,
     vertices: np.ndarray,
@@ -120,7 +166,7 @@ def _shade(
     out: np.ndarray,
 ) -> None:
     """Multiplies the factors of one body into `out`."""
-    before, after, tx_turn, rx_turn = unfolded
+    before, after, tx_turn, rx_turn, reach = unfolded
     shortest = wavelengths.min()
     for p in numba.prange(len(corners)):
         for i in range(corners.shape[1] - 1):
@@ -135,7 +181,7 @@ def _shade(
                 continue
             per_m = np.sqrt(2.0 * scale / shortest)
             runs, heights = silhouette.runs_of(
-                xy, between, faces, silhouette.WINDOW / per_m, silhouette.FAR / per_m
+                xy, between, faces, silhouette.WINDOW / per_m, reach[p] / per_m
             )
             if not len(runs):
                 continue
@@ -146,10 +192,15 @@ def _shade(
             d_1, d_2 = before[p, i] + plane, after[p, i] + length - plane
             to_tx = (axes @ tx_turn[p, i]) * (d_2 / (d_1 + d_2))
             to_rx = (axes @ rx_turn[p, i]) * (d_1 / (d_1 + d_2))
-            for t in range(tx_offset.shape[1]):
-                for r in range(rx_offset.shape[1]):
-                    shift = to_tx @ tx_offset[p, t] + to_rx @ rx_offset[p, r]
-                    for n in range(len(wavelengths)):
-                        per_m = np.sqrt(2.0 * scale / wavelengths[n])
-                        factor = silhouette.screen_factor(table, runs, heights, shift, per_m)
-                        out[p, t, r, n] *= factor
+            n_rx = rx_offset.shape[1]
+            shifts = np.zeros((2, tx_offset.shape[1] * n_rx))
+            for e in range(shifts.shape[1]):
+                t, r = e // n_rx, e % n_rx
+                for axis in range(2):
+                    shifts[axis, e] = (to_tx[axis] * tx_offset[p, t]).sum()
+                    shifts[axis, e] += (to_rx[axis] * rx_offset[p, r]).sum()
+            for n in range(len(wavelengths)):
+                per_m = np.sqrt(2.0 * scale / wavelengths[n])
+                factors = silhouette.screen_factors(table, runs, heights, shifts, per_m)
+                for e in range(len(factors)):
+                    out[p, e // n_rx, e % n_rx, n] *= factors[e]

@@ -27,28 +27,31 @@ _GAP_M = 1e-4
 
 
 def _fresnel_table() -> np.ndarray:
-    """F(ν) = ∫_0^ν e^{−jπt²/2} dt for ν ≥ 0; its last value is the limit."""
+    """F(ν) = ∫_0^ν e^{−jπt²/2} dt for ν ≥ 0 as rows real, imaginary; the limit at the end."""
     nu = np.arange(int(_TABLE_END * _TABLE_PER_UNIT) + 2) / _TABLE_PER_UNIT
     sine, cosine = fresnel(nu)
-    table = cosine - 1j * sine
-    table[-2:] = 0.5 - 0.5j
+    table = np.stack([cosine, -sine])
+    table[:, -2:] = [[0.5], [-0.5]]
     return table
 
 
 FRESNEL = _fresnel_table()
 
 
-@numba.njit(cache=True, inline="always")
-def fresnel_integral(table: np.ndarray, nu: float) -> complex:
-    """F(ν) from the table, odd in ν."""
-    place = abs(nu) * _TABLE_PER_UNIT
-    last = len(table) - 1
-    if place >= last:
-        value = table[last]
-    else:
-        i = int(place)
-        value = table[i] + (table[i + 1] - table[i]) * (place - i)
-    return value if nu >= 0.0 else -value
+@numba.njit(cache=True, fastmath={"contract", "nsz"})
+def _add_fresnel(
+    table: np.ndarray, edge: float, shift: np.ndarray, per_m: float, sign: float, out: np.ndarray
+) -> None:
+    """Adds sign · F((edge − shift) · per_m) for many shifts; `out` holds real and imaginary."""
+    last = table.shape[1] - 2
+    for e in range(len(shift)):
+        nu = (edge - shift[e]) * per_m
+        place = min(abs(nu) * _TABLE_PER_UNIT, last - 0.0)
+        i = np.int32(place)
+        share = place - i
+        signed = math.copysign(sign, nu) if sign > 0.0 else -math.copysign(sign, nu)
+        out[0, e] += signed * (table[0, i] + (table[0, i + 1] - table[0, i]) * share)
+        out[1, e] += signed * (table[1, i] + (table[1, i + 1] - table[1, i]) * share)
 
 
 @numba.njit(cache=True)
@@ -233,32 +236,33 @@ def runs_of(
 
 
 @numba.njit(cache=True)
-def screen_factor(
-    table: np.ndarray, runs: np.ndarray, heights: np.ndarray, shift: np.ndarray, per_m: float
-) -> complex:
-    """Kirchhoff factor T of a silhouette.
+def screen_factors(
+    table: np.ndarray, runs: np.ndarray, heights: np.ndarray, shifts: np.ndarray, per_m: float
+) -> np.ndarray:
+    """Kirchhoff factors T of a silhouette for several lines through its plane.
 
     Args:
         table: `FRESNEL`.
         runs: Runs of the silhouette [m], shape (N, 2).
         heights: Rows of the runs [m], shape (N, 2).
-        shift: Where the path crosses the plane [m], shape (2,).
+        shifts: Where each line crosses the plane [m], rows x and y, shape (2, line).
         per_m: Fresnel coordinate per metre, √(2 s/λ).
 
     Returns:
-        Factor on the path's amplitude; 1 without a silhouette.
+        Factors on the amplitudes, complex128, shape (line,); 1 without a silhouette.
     """
-    total = 0.0j
-    across, row = 0.0j, 0.0j
-    for i in range(len(runs)):
-        if i == 0 or heights[i, 0] != heights[i - 1, 0]:
-            total += row * across
-            across = 0.0j
-            row = fresnel_integral(table, (heights[i, 1] - shift[1]) * per_m)
-            row -= fresnel_integral(table, (heights[i, 0] - shift[1]) * per_m)
-        across += fresnel_integral(table, (runs[i, 1] - shift[0]) * per_m)
-        across -= fresnel_integral(table, (runs[i, 0] - shift[0]) * per_m)
-    total += row * across
+    total = np.zeros(shifts.shape[1], dtype=np.complex128)
+    across, row = np.zeros((2, shifts.shape[1])), np.zeros((2, shifts.shape[1]))
+    for i in range(len(runs) + 1):
+        if i == len(runs) or (i > 0 and heights[i, 0] != heights[i - 1, 0]):
+            row[:] = 0.0
+            _add_fresnel(table, heights[i - 1, 1], shifts[1], per_m, 1.0, row)
+            _add_fresnel(table, heights[i - 1, 0], shifts[1], per_m, -1.0, row)
+            total += (row[0] + 1j * row[1]) * (across[0] + 1j * across[1])
+            across[:] = 0.0
+        if i < len(runs):
+            _add_fresnel(table, runs[i, 1], shifts[0], per_m, 1.0, across)
+            _add_fresnel(table, runs[i, 0], shifts[0], per_m, -1.0, across)
     return 1.0 - 0.5j * total
 
 

@@ -1,0 +1,235 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Channel state information of a scene bundle, frame by frame."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import sionna.rt as rt
+
+from dataset_factory.bundle import Bundle, BundleFrame
+from dataset_factory.trace.bounces import BUFFER, Bounces, with_facets
+from dataset_factory.trace.direct import PosedPoints, direct_channel
+from dataset_factory.trace.environment import environment_paths, node_frequencies
+from dataset_factory.trace.points import SurfacePoints, surface_points
+from dataset_factory.trace.scene import (
+    BODY,
+    check_materials,
+    half_space_reflection,
+    mesh,
+    static_scene,
+)
+from dataset_factory.trace.shadow import Shadow, coarse_mesh, transmission
+from dataset_factory.trace.steering import steer
+from rfgs_core.errors import RfgsError
+from rfgs_core.radio import Radio, layout
+from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.radio.layout import DevicePose
+from rfgs_core.seeds import sub_seed
+
+#: Dr.Jit keeps kernels and memory of every frame; they are dropped this often [frames].
+FLUSH_EVERY = 10
+
+
+class Tracer:
+    """Traces one radio through one bundle: H = H_environment · shadow + H_people.
+
+    Example:
+        tracer = Tracer(bundle, preset("wifi"), devices)
+        csi = tracer.frame(bundle.frame(1))
+    """
+
+    def __init__(
+        self,
+        bundle: Bundle,
+        radio: Radio,
+        devices: list[DevicePose],
+        *,
+        depth: int = 2,
+        shadow: Shadow = "kirchhoff",
+        seed: int = 0,
+    ) -> None:
+        """Builds the scenes; tracing starts with the first call.
+
+        Args:
+            bundle: Scene bundle.
+            radio: Radio to simulate.
+            devices: Poses of its devices.
+            depth: Interactions of people's paths: 1 direct, 2 with one wall, 3 with two.
+            shadow: "kirchhoff", or "hard" for Sionna's all-or-nothing shadow.
+            seed: Root seed; rays and points depend on it, frames do not.
+
+        Raises:
+            RfgsError: A material does not hold in the radio's band, something moves that
+                cannot be traced, or the depth is not 1, 2 or 3.
+        """
+        if depth != 1 and depth not in BUFFER:
+            raise RfgsError(f"trace depth {depth}: expected 1, 2 or 3")
+        check_materials(bundle, radio)
+        _check_movers(bundle)
+        self._bundle, self._radio, self._devices = bundle, radio, devices
+        self._shadow, self._seed = shadow, seed
+        self._layout = layout(radio, devices)
+        self._nodes = node_frequencies(radio)
+        self.timings: dict[str, float] = dict.fromkeys(
+            ("environment", "shadow", "people_direct", "people_bounces"), 0.0
+        )
+        with self._timed("environment"):
+            self._environment = environment_paths(
+                bundle, radio, self._layout, devices, sub_seed(seed, "environment")
+            )
+        self._frames_done = 0
+        self._points = self._make_points()
+        self._outlines = self._make_outlines()
+        self._scene = static_scene(bundle, radio)
+        self._bounces: Bounces | None = None
+        if self._points is not None:
+            self._add_body()
+            if depth > 1:
+                self._bounces = Bounces(
+                    self._scene, self._layout, devices, depth, sub_seed(seed, "bounces")
+                )
+
+    def static(self) -> np.ndarray:
+        """Channel without anything that moves, complex64, shape (tx, rx, subcarrier)."""
+        return steer(self._environment, self._layout, self._radio.freq_hz, self._nodes).astype(
+            np.complex64
+        )
+
+    def frame(self, frame: BundleFrame) -> np.ndarray:
+        """Channel at one frame; the result does not depend on frames traced before.
+
+        Args:
+            frame: What moves, in place.
+
+        Returns:
+            Complex64, shape (tx, rx, subcarrier), zero where a link is not measured.
+        """
+        if self._points is None:
+            return self.static()
+        with self._timed("shadow"):
+            bodies = [(frame.vertices[kept], faces) for kept, faces in self._outlines]
+            passed = transmission(
+                self._environment, self._layout, bodies, self._nodes, self._shadow
+            )
+            channel = steer(
+                self._environment, self._layout, self._radio.freq_hz, self._nodes, passed
+            )
+        self._move(frame)
+        points = self._posed(frame)
+        with self._timed("people_direct"):
+            channel += direct_channel(
+                self._scene.mi_scene,
+                points,
+                self._layout,
+                self._devices,
+                self._gamma(self._radio.freq_hz),
+                self._radio.freq_hz,
+            )
+        if self._bounces is not None:
+            with self._timed("people_bounces"):
+                channel += self._bounced(points, self._bounces)
+        channel[~self._layout.measured] = 0.0
+        self._flush()
+        return channel.astype(np.complex64)
+
+    def _bounced(self, points: PosedPoints, bounces: Bounces) -> np.ndarray:
+        """People's paths by way of walls, shape (tx, rx, subcarrier)."""
+        paths = with_facets(
+            bounces.paths(points),
+            points,
+            self._gamma(self._nodes),
+            self._nodes,
+            self._radio.centre_hz,
+        )
+        return steer(paths, self._layout, self._radio.freq_hz, self._nodes)
+
+    def _posed(self, frame: BundleFrame) -> PosedPoints:
+        """Scattering points at a frame."""
+        assert self._points is not None
+        positions, normals = self._points.at(frame.vertices)
+        return PosedPoints(positions, normals, self._points.areas, self._points.material)
+
+    def _gamma(self, freq_hz: np.ndarray) -> dict[int, np.ndarray]:
+        """Reflection coefficients of all materials that move, by material index."""
+        assert self._points is not None
+        return {
+            int(index): half_space_reflection(
+                self._bundle.materials[int(index)]["radio_material"], freq_hz
+            )
+            for index in np.unique(self._points.material)
+        }
+
+    def _make_points(self) -> SurfacePoints | None:
+        """Points on everything that moves; None if nothing does."""
+        topology = self._bundle.topology
+        if not len(topology.faces):
+            return None
+        return surface_points(
+            topology.rest_vertices,
+            topology.faces,
+            topology.material,
+            topology.instance,
+            SPEED_OF_LIGHT / self._radio.freq_max_hz,
+            sub_seed(self._seed, "points"),
+        )
+
+    def _make_outlines(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Vertices kept and triangles of the coarse mesh of each instance."""
+        topology = self._bundle.topology
+        return [
+            coarse_mesh(topology.rest_vertices, topology.faces[topology.instance == instance])
+            for instance in np.unique(topology.instance)
+        ]
+
+    def _add_body(self) -> None:
+        """Adds everything that moves as one absorber, in its rest pose."""
+        topology = self._bundle.topology
+        body = rt.SceneObject(
+            mi_mesh=mesh(BODY, topology.rest_vertices, topology.faces),
+            name=BODY,
+            radio_material=rt.AbsorberRadioMaterial(name="absorber"),
+        )
+        self._scene.edit(add=body)
+
+    def _move(self, frame: BundleFrame) -> None:
+        """Puts the body where it is at a frame, in place."""
+        params = self._scene.mi_scene_params
+        vertices = np.ascontiguousarray(frame.vertices, dtype=np.float32)
+        params[f"{BODY}.vertex_positions"] = mi.Float(vertices.ravel())
+        params.update()
+
+    def _flush(self) -> None:
+        """Drops what Dr.Jit keeps of past frames, every few frames."""
+        self._frames_done += 1
+        if self._frames_done % FLUSH_EVERY == 0:
+            dr.flush_kernel_cache()
+            dr.flush_malloc_cache()
+
+    @contextmanager
+    def _timed(self, stage: str) -> Iterator[None]:
+        """Adds the block's wall time to a stage."""
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.timings[stage] += time.perf_counter() - start
+
+
+def _check_movers(bundle: Bundle) -> None:
+    """Refuses moving objects that the people's model does not fit.
+
+    Raises:
+        RfgsError: Naming the object.
+    """
+    for row in bundle.objects:
+        if row["moving"] and row["class"] == "vehicle":
+            raise RfgsError(
+                f"{bundle.path}: object {row['name']!r} is a moving vehicle; moving metal is not "
+                "traced yet, so mark it `ignore` or `static` in its radio properties"
+            )

@@ -29,12 +29,19 @@ LPIPS_WEIGHTS = "alexnet-owt-7be5be79.pth"
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture and which of its pixels show something that moves."""
+    """A picture, and what moves in it on its own."""
 
     rgb: Float[np.ndarray, "h w 3"]
-    """sRGB in [0, 1]."""
+    """The whole picture, sRGB in [0, 1]."""
     person: Bool[np.ndarray, "h w"]
     """Pixels of what moves."""
+    on_grey: Float[np.ndarray, "h w 3"]
+    """What moves in front of mid-grey, sRGB in [0, 1]."""
+
+    @staticmethod
+    def cut(rgb: Float[np.ndarray, "h w 3"], person: Bool[np.ndarray, "h w"]) -> Picture:
+        """A picture whose moving part is cut out with a mask."""
+        return Picture(rgb, person, np.where(person[..., None], rgb, MID_GREY))
 
 
 def psnr_db(true: Float[np.ndarray, "..."], predicted: Float[np.ndarray, "..."]) -> float:
@@ -49,18 +56,14 @@ def psnr_db(true: Float[np.ndarray, "..."], predicted: Float[np.ndarray, "..."])
 
 
 def psnr_person_db(true: Picture, predicted: Picture) -> float | None:
-    """PSNR over the union of both masks, each picture's own mask on mid-grey.
+    """PSNR of what moves, on mid-grey, over the union of both masks.
 
     A missing or surplus limb counts as grey against colour. None if both masks are empty.
     """
     union = true.person | predicted.person
     if not union.any():
         return None
-    on_grey = [
-        np.where(picture.person[..., None], picture.rgb, MID_GREY)[union]
-        for picture in (true, predicted)
-    ]
-    return psnr_db(on_grey[0], on_grey[1])
+    return psnr_db(true.on_grey[union], predicted.on_grey[union])
 
 
 def ssim(true: Float[np.ndarray, "h w 3"], predicted: Float[np.ndarray, "h w 3"]) -> float:

@@ -11,7 +11,7 @@ from rfgs_core.evaluate.image import Picture
 
 def empty_picture(empty: Float[np.ndarray, "h w 3"]) -> Picture:
     """The room without anybody."""
-    return Picture(empty, np.zeros(empty.shape[:2], dtype=bool))
+    return Picture.cut(empty, np.zeros(empty.shape[:2], dtype=bool))
 
 
 def silhouette_picture(
@@ -24,4 +24,4 @@ def silhouette_picture(
     It knows the outline, which no radio method is told; to beat it in `psnr_person` takes a
     right outline and some shading.
     """
-    return Picture(np.where(person[..., None], colour, empty), person)
+    return Picture.cut(np.where(person[..., None], colour, empty), person)

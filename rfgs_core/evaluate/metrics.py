@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`metrics.json` of a run: every metric, every control, conditions and verdicts."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from tqdm import tqdm
+
+from rfgs_core.evaluate.controls import CONTROLS, ControlResult
+from rfgs_core.evaluate.geometry import GEOMETRY_KEYS, geometry_metrics
+from rfgs_core.evaluate.image import IMAGE_KEYS
+from rfgs_core.evaluate.pictures import Values, has_pictures, mean_of, picture_metrics
+from rfgs_core.evaluate.provenance import conditions, hardware, limits, now, versions
+from rfgs_core.evaluate.rf import RF_KEYS, frame_rf, pool_rf, rf_values
+from rfgs_core.evaluate.scene import EvaluatedRun, Scene
+from rfgs_core.evaluate.verdicts import verdicts
+from rfgs_core.files import write_json
+from rfgs_core.render.view import pictures_of
+
+SCHEMA = "rfgs-metrics/1"
+#: Name of the evaluated method among the controls while they are computed alike.
+METHOD = "method"
+MEDIANS = ("element_snr_median_db", "subcarrier_snr_median_db")
+#: Module of the trainer that starts the fit on the true surface.
+ORACLE_MODULE = "rfgs_core.train.oracle"
+
+
+def evaluate_run(run: EvaluatedRun, *, oracle: bool = True) -> dict[str, Any]:
+    """Evaluates a run with all its controls and writes `metrics.json` into it.
+
+    Args:
+        run: A trained run.
+        oracle: Whether to run `oracle_init`, which trains once more.
+
+    Returns:
+        What was written.
+    """
+    start_s = time.perf_counter()
+    scene = Scene.of(run)
+    table = _Table()
+    pictures = pictures_of(run, "test") if has_pictures(run) else []
+    steps = len(run.frames) * (1 + len(CONTROLS)) + len(pictures)
+    with tqdm(total=steps, desc="evaluate", unit="step") as bar:
+        for frame in run.frames:
+            _evaluate_frame(scene, frame, table, bar.update)
+        image, image_reasons = ({}, {})
+        if pictures:
+            image, image_reasons = picture_metrics(run, bar.update)
+    _add_oracle(scene, table, oracle)
+    groups = table.groups(image)
+    metrics: dict[str, Any] = groups.pop(METHOD)
+    metrics |= {
+        "schema": SCHEMA,
+        "controls": groups,
+        "reasons": table.reasons(image, image_reasons, bool(pictures)),
+        "limits": limits(scene),
+        "trace_depth": run.sequence.trace_depth,
+        "n_gaussians": len(run.gaussians(run.frames[0])),
+        "train_s": run.config.get("train_s"),
+        "conditions": conditions(scene),
+        "hardware": hardware(),
+        "versions": versions(),
+        "date": now(),
+        "frames": table.frames(),
+    }
+    metrics["verdicts"] = verdicts(metrics)
+    metrics["eval_s"] = round(time.perf_counter() - start_s, 2)
+    write_json(run.path / "metrics.json", metrics)
+    return metrics
+
+
+class _Table:
+    """Per-frame rows of the method and of each control, and reasons for what is missing."""
+
+    def __init__(self) -> None:
+        self.rows: dict[str, dict[int, dict[str, Any]]] = {}
+        self.why: dict[str, str] = {}
+
+    def add(self, name: str, frame: int, group: str, value: dict[str, Any]) -> None:
+        """Stores one group of one frame."""
+        self.rows.setdefault(name, {}).setdefault(frame, {})[group] = value
+
+    def groups(self, image: dict[str, Values]) -> dict[str, dict[str, Values]]:
+        """All groups of all names, pooled over frames; what is missing is None."""
+        result: dict[str, dict[str, Values]] = {}
+        for name in (METHOD, *CONTROLS, "silhouette", "oracle_init"):
+            rows = list(self.rows.get(name, {}).values())
+            geometry = mean_of(
+                [row["geometry"] for row in rows if "geometry" in row], GEOMETRY_KEYS
+            )
+            result[name] = {"geometry": geometry, "image": image.get(name, _none(IMAGE_KEYS))}
+            for group in ("rf", "rf_csi"):
+                parts = [row[group] for row in rows if group in row]
+                result[name][group] = pool_rf(parts) if parts else _none((*RF_KEYS, *MEDIANS))
+        return result
+
+    def frames(self) -> list[dict[str, Any]]:
+        """Values of each frame: the method's own and those of every control."""
+        result = []
+        for frame in self.rows[METHOD]:
+            row: dict[str, Any] = {"frame": frame, "controls": {}}
+            for name, rows in self.rows.items():
+                part = {
+                    group: value if group == "geometry" else rf_values(value)
+                    for group, value in rows.get(frame, {}).items()
+                }
+                if name == METHOD:
+                    row |= part
+                else:
+                    row["controls"][name] = part
+            result.append(row)
+        return result
+
+    def reasons(
+        self, image: dict[str, Values], image_reasons: dict[str, str], pictures: bool
+    ) -> dict[str, str]:
+        """Why values are None: dotted path of a group or value → one sentence."""
+        result = {f"controls.{name}": why for name, why in self.why.items()}
+        for name, why in image_reasons.items():
+            if name == "lpips":
+                result["image.lpips"] = why
+            else:
+                result["image" if name == METHOD else f"controls.{name}.image"] = why
+        if not pictures:
+            result["image"] = "the dataset holds no pictures that the shader did not see"
+        else:
+            result["controls.*.image"] = "only empty_room and silhouette are pictures"
+        result["controls.silhouette"] = "a control of pictures; it says nothing about space"
+        result["controls.zero.rf.device_gain_mae_db"] = "a power of zero has no level in dB"
+        result["controls.empty_room.rf.device_gain_mae_db"] = "a power of zero has no level in dB"
+        return result
+
+
+def _none(keys: tuple[str, ...]) -> Values:
+    return dict.fromkeys(keys)
+
+
+def _evaluate_frame(scene: Scene, frame: int, table: _Table, on_step: Callable[[], Any]) -> None:
+    """Method and controls on one frame."""
+    reference, csi = scene.reference(frame), scene.csi(frame)
+    own = ControlResult(score=scene.score(frame), delta=scene.run.predict(frame))
+    assert own.score is not None
+    evidence = scene.evidence(frame, own.score)
+    _add(scene, table, METHOD, frame, own, reference, csi)
+    on_step()
+    for name, control in CONTROLS.items():
+        result = control(evidence)
+        _add(scene, table, name, frame, result, reference, csi)
+        on_step()
+
+
+def _add(
+    scene: Scene,
+    table: _Table,
+    name: str,
+    frame: int,
+    result: ControlResult,
+    reference: Float[np.ndarray, "n 3"],
+    csi: np.ndarray,
+) -> None:
+    """Scores one answer about one frame.
+
+    A method that brings no empty room of its own is completed with the kriged one.
+    """
+    if result.reason:
+        table.why[name] = result.reason
+    if result.score is not None:
+        geometry = geometry_metrics(result.score, scene.grid, reference, scene.voxels)
+        table.add(name, frame, "geometry", geometry)
+    if result.delta is None:
+        return
+    devices = scene.layout.tx_device, scene.layout.rx_device
+    static = scene.environment if result.static is None else result.static
+    rf = frame_rf(csi - scene.csi_static, result.delta, scene.held_out, *devices)
+    table.add(name, frame, "rf", rf)
+    both = frame_rf(csi, result.delta + static, scene.held_out, *devices)
+    table.add(name, frame, "rf_csi", both)
+
+
+def _add_oracle(scene: Scene, table: _Table, wanted: bool) -> None:
+    """The fit started on the true surface: how far this model and these data could go."""
+    if not wanted:
+        table.why["oracle_init"] = "left out with --no-oracle"
+        return
+    if importlib.util.find_spec(ORACLE_MODULE) is None:
+        table.why["oracle_init"] = "this version has no fit that starts on the true surface"
+        return
+    scores = importlib.import_module(ORACLE_MODULE).oracle_scores(scene.run)
+    for frame, score in scores.items():
+        result = ControlResult(score=score, reason="only its geometry is compared")
+        _add(scene, table, "oracle_init", frame, result, scene.reference(frame), scene.csi(frame))

@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A run as evaluation sees it: evidence, truth and the method's own answer, frame by frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from jaxtyping import Complex, Float, Float32, Float64
+
+from rfgs_core.dataset.reader import Sequence
+from rfgs_core.errors import RfgsError
+from rfgs_core.evaluate.controls.gaussian_process import krige, krige_level
+from rfgs_core.evaluate.controls.interpolation import fill
+from rfgs_core.evaluate.evidence import Evidence
+from rfgs_core.evaluate.geometry import best_voxels, reference_points, voxel_budget
+from rfgs_core.evaluate.grid import Grid, splat_gaussians
+from rfgs_core.evaluate.rf import HeldOut
+from rfgs_core.gaussians.model import Gaussians
+from rfgs_core.radio import Layout, Radio
+from rfgs_core.render.view import moving_gaussians
+from rfgs_core.seeds import sub_seed
+
+
+class EvaluatedRun(Protocol):
+    """What evaluation needs of a run; `rfgs_core.run.Run` has it."""
+
+    @property
+    def path(self) -> Path:
+        """Folder of the run."""
+        ...
+
+    @property
+    def config(self) -> dict[str, Any]:
+        """What was asked for: radio, sequence, frames, objective and seed."""
+        ...
+
+    @property
+    def frames(self) -> list[int]:
+        """Frames the run was trained on."""
+        ...
+
+    @property
+    def sequence(self) -> Sequence:
+        """The data."""
+        ...
+
+    def gaussians(self, frame: int) -> Gaussians:
+        """Static Gaussians, then the moving ones of a frame."""
+        ...
+
+    def attributes(self, frame: int) -> dict[str, np.ndarray]:
+        """Per-Gaussian arrays of the moving ones."""
+        ...
+
+    def predict(self, frame: int) -> Complex[np.ndarray, "tx rx subcarrier"]:
+        """Csi − csi_static on every measured link, held-out ones included."""
+        ...
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What all frames of a run have in common."""
+
+    run: EvaluatedRun
+    """The run."""
+    radio: Radio
+    """Its radio."""
+    layout: Layout
+    """Antenna elements of the radio."""
+    held_out: HeldOut
+    """What training must not see."""
+    grid: Grid
+    """Grid over the scene's bounds."""
+    voxels: int
+    """K, the number of voxels a method may predict."""
+    csi_static: Complex[np.ndarray, "tx rx subcarrier"]
+    """The empty room, held-out entries included."""
+    environment: Complex[np.ndarray, "tx rx subcarrier"]
+    """The empty room as kriged from its visible entries."""
+
+    @staticmethod
+    def of(run: EvaluatedRun) -> Scene:
+        """Reads what all frames share.
+
+        Raises:
+            RfgsError: Training did not name its radio, or nothing that moves has a surface.
+        """
+        sequence, name = run.sequence, run.config.get("radio")
+        if not isinstance(name, str):
+            raise RfgsError(f"{run.path / 'config.json'}: expected the name of a radio, got {name}")
+        radio, layout = sequence.radio_spec(name), sequence.layout(name)
+        held_out = HeldOut.of(
+            sequence.splits["rf"][name],
+            layout.tx_device,
+            layout.rx_device,
+            layout.measured,
+            radio.num_subcarriers,
+        )
+        grid = Grid.over(sequence.bounds_m)
+        voxels = voxel_budget(sequence.instances)
+        static = sequence.csi_static(name)
+        evidence = Evidence.hide(static, static, held_out, layout, radio.freq_hz, grid, voxels)
+        environment = fill(evidence.static, evidence, krige, krige_level)
+        return Scene(run, radio, layout, held_out, grid, voxels, static, environment)
+
+    def csi(self, frame: int) -> Complex[np.ndarray, "tx rx subcarrier"]:
+        """True channel of a frame."""
+        return self.run.sequence.csi(self.radio.name, frame)
+
+    def evidence(self, frame: int, score: Float[np.ndarray, "x y z"]) -> Evidence:
+        """What controls may see of a frame, and where the method's own `score` is centred."""
+        evidence = Evidence.hide(
+            self.csi(frame),
+            self.csi_static,
+            self.held_out,
+            self.layout,
+            self.radio.freq_hz,
+            self.grid,
+            self.voxels,
+        )
+        best = best_voxels(score, self.voxels)
+        return evidence.with_centroid(self.grid.centres(best).mean(axis=0) if len(best) else None)
+
+    def reference(self, frame: int) -> Float64[np.ndarray, "n 3"]:
+        """Points on the true moving surface [m]."""
+        vertices, faces, _ = self.run.sequence.moving_mesh(frame)
+        return reference_points(vertices, faces, seed=sub_seed(0, "reference", frame))
+
+    def score(self, frame: int) -> Float32[np.ndarray, "x y z"]:
+        """The method's score: reflected power times mass, of the moving Gaussians."""
+        gaussians = moving_gaussians(self.run, frame)
+        power_db = np.asarray(self.run.attributes(frame)["rf_power_db"], dtype=np.float64)
+        return splat_gaussians(
+            self.grid,
+            gaussians.means.numpy().astype(np.float64),
+            gaussians.covariances.numpy().astype(np.float64),
+            10.0 ** (power_db[len(power_db) - len(gaussians) :] / 10.0),
+        )
+
+    @property
+    def cross_range_m(self) -> float | None:
+        """λR/D: D the width of a device's RX array, R half the scene's diagonal [m]."""
+        own = self.layout.rx_device == self.layout.rx_device[0]
+        column, xyz = self.layout.rx_column[own], self.layout.rx_xyz[own]
+        across = xyz[column == column.max()].mean(axis=0) - xyz[column == column.min()].mean(axis=0)
+        width_m = float(np.linalg.norm(across))
+        low, high = self.run.sequence.bounds_m
+        if width_m == 0.0:
+            return None
+        return float(self.radio.wavelength_m * 0.5 * np.linalg.norm(high - low) / width_m)

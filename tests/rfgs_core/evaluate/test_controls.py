@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rfgs_core.evaluate.controls import CONTROLS
+from rfgs_core.evaluate.controls.clean import separated_peaks
+from rfgs_core.evaluate.controls.gaussian_process import krige
+from rfgs_core.evaluate.controls.linear import linear
+from rfgs_core.evaluate.controls.nearest_element import nearest
+from rfgs_core.evaluate.evidence import Evidence
+from rfgs_core.evaluate.geometry import best_voxels
+from rfgs_core.evaluate.rf import frame_rf, rf_values
+
+Make = Callable[..., object]
+ONE = np.array([[2.0, 1.7, 1.2]])
+TWO = np.array([[1.4, 1.3, 1.0], [2.6, 2.2, 1.4]])
+
+
+def rf_of(made, name: str) -> dict:
+    result = CONTROLS[name](made.evidence)
+    elements = made.evidence.layout
+    return rf_values(
+        frame_rf(made.delta, result.delta, made.held_out, elements.tx_device, elements.rx_device)
+    )
+
+
+def test_held_out_entries_are_hidden(scatterers) -> None:
+    made = scatterers(ONE)
+    for field in (made.evidence.delta, made.evidence.static):
+        np.testing.assert_array_equal(np.isnan(field), ~made.held_out.visible)
+
+
+@pytest.mark.parametrize("name", CONTROLS)
+def test_no_control_depends_on_held_out_entries(scatterers, name: str) -> None:
+    made = scatterers(ONE)
+    evidence: Evidence = made.evidence.with_centroid(ONE[0])
+    poison = np.where(made.held_out.visible, made.delta + made.static, np.nan)
+    static = np.where(made.held_out.visible, made.static, np.nan)
+    poisoned = Evidence.hide(
+        poison,
+        static,
+        made.held_out,
+        evidence.layout,
+        evidence.freq_hz,
+        evidence.grid,
+        evidence.voxels,
+    ).with_centroid(ONE[0])
+    plain, blind = CONTROLS[name](evidence), CONTROLS[name](poisoned)
+    for key in ("score", "delta", "static"):
+        first, second = getattr(plain, key), getattr(blind, key)
+        assert (first is None) == (second is None)
+        if first is not None:
+            assert np.isfinite(first).all()
+            np.testing.assert_array_equal(first, second)
+
+
+@pytest.mark.parametrize("name", CONTROLS)
+def test_every_control_says_why_it_leaves_something_out(scatterers, name: str) -> None:
+    made = scatterers(ONE, own_device_links="only")
+    result = CONTROLS[name](made.evidence.with_centroid(ONE[0]))
+    if result.score is None or result.delta is None:
+        assert result.reason
+    if result.score is not None:
+        assert result.score.shape == made.evidence.grid.shape
+    if result.delta is not None:
+        assert result.delta.shape == made.delta.shape
+
+
+@pytest.mark.parametrize("name", ["matched_filter", "matched_filter_all_sum", "clean", "omp"])
+def test_one_scatterer_is_found_where_it_is(scatterers, name: str) -> None:
+    made = scatterers(ONE)
+    score = CONTROLS[name](made.evidence).score
+    found = made.evidence.grid.centres(best_voxels(score, 20)).mean(axis=0)
+    assert np.linalg.norm(found - ONE[0]) < 0.1
+
+
+@pytest.mark.parametrize("name", ["clean", "omp"])
+def test_two_separated_scatterers_are_recovered(scatterers, name: str) -> None:
+    # The search covers both: the matched filter's blobs are wider than the points.
+    made = scatterers(TWO, voxels=2000)
+    score = CONTROLS[name](made.evidence).score
+    points, power = made.evidence.grid.centres(), score.ravel()
+    peaks = points[separated_peaks(points, power, 2)]
+    for truth in TWO:
+        assert np.linalg.norm(peaks - truth, axis=1).min() < 0.12
+
+
+def test_omp_predicts_held_out_elements_of_point_scatterers(scatterers) -> None:
+    made = scatterers(TWO, voxels=2000)
+    assert rf_of(made, "omp")["element_snr_db"] > 10.0
+
+
+def test_zero_and_empty_room_are_zero_decibels(scatterers) -> None:
+    made = scatterers(ONE)
+    for name in ("zero", "empty_room"):
+        assert rf_of(made, name)["element_snr_db"] == pytest.approx(0.0)
+
+
+def test_empty_room_predicts_hidden_static_entries(scatterers) -> None:
+    made = scatterers(ONE)
+    static = CONTROLS["empty_room"](made.evidence).static
+    error = np.abs(static - made.static)[made.held_out.element]
+    assert np.sqrt(np.mean(error**2) / np.mean(np.abs(made.static) ** 2)) < 0.2
+
+
+def test_interpolators_keep_visible_entries_and_unmeasured_links(scatterers) -> None:
+    made = scatterers(ONE, own_device_links="excluded")
+    for name in ("nearest_element", "linear", "gaussian_process"):
+        delta = CONTROLS[name](made.evidence).delta
+        visible = made.held_out.visible
+        np.testing.assert_array_equal(delta[visible], made.delta[visible])
+        assert not delta[~made.evidence.layout.measured].any()
+
+
+def ramp(x: np.ndarray) -> np.ndarray:
+    """Two waves of neighbouring directions over array columns."""
+    return np.exp(0.9j * x) + 0.4 * np.exp(0.7j * x + 1j)
+
+
+def test_kriging_and_lines_beat_the_nearest_value_on_a_phase_ramp() -> None:
+    x = np.arange(8.0)[:, None]
+    values = ramp(x)
+    error = {
+        f.__name__: np.abs(f(values[:6], x[:6], x[6:]) - values[6:]).max()
+        for f in (nearest, linear, krige)
+    }
+    assert error["krige"] < 0.1
+    assert error["krige"] < error["linear"] < error["nearest"]
+
+
+def test_kriging_bridges_a_gap_of_tones() -> None:
+    x = np.arange(32.0)[:, None]
+    values = ramp(x)
+    seen = (x[:, 0] < 16) | (x[:, 0] >= 20)
+    filled = krige(values[seen], x[seen], x[~seen])
+    assert np.abs(filled - values[~seen]).max() < 0.05
+
+
+def test_lines_extend_beyond_the_last_value_and_nearest_does_not() -> None:
+    x = np.array([[0.0], [1.0], [2.0]])
+    values = np.array([[0.0], [1.0], [2.0 + 1j]])
+    np.testing.assert_allclose(linear(values, x, np.array([[3.0], [0.5]])), [[3 + 2j], [0.5]])
+    np.testing.assert_allclose(nearest(values, x, np.array([[9.0]])), [[2 + 1j]])
+
+
+def test_hidden_device_pair_takes_the_level_of_its_neighbours(scatterers) -> None:
+    made = scatterers(ONE)
+    assert rf_of(made, "nearest_element")["device_gain_mae_db"] < 6.0
+    assert rf_of(made, "gaussian_process")["device_gain_mae_db"] < 6.0
+
+
+def test_template_stands_on_the_floor_at_the_methods_centroid(scatterers) -> None:
+    made = scatterers(ONE, voxels=1500)
+    score = CONTROLS["template"](made.evidence.with_centroid(np.array([2.0, 1.6, 0.4]))).score
+    voxels = made.evidence.grid.centres(best_voxels(score, 1500))
+    np.testing.assert_allclose(voxels.mean(axis=0), [2.0, 1.6, 0.85], atol=0.05)
+    assert np.ptp(voxels[:, 2]) == pytest.approx(1.7, abs=0.1)
+    assert np.ptp(voxels[:, 0]) == pytest.approx(0.5, abs=0.1)
+
+
+def test_template_without_a_centroid_says_so(scatterers) -> None:
+    assert "centroid" in CONTROLS["template"](scatterers(ONE).evidence).reason
+
+
+def test_different_device_variants_need_different_devices(scatterers) -> None:
+    made = scatterers(ONE, own_device_links="only")
+    assert CONTROLS["matched_filter_different_sum"](made.evidence).score is None
+    same = CONTROLS["matched_filter"](made.evidence).score
+    np.testing.assert_array_equal(same, CONTROLS["matched_filter_all_sum"](made.evidence).score)
+
+
+def test_a_silent_frame_gives_no_points(scatterers) -> None:
+    made = scatterers(ONE)
+    silent = replace(made.evidence, delta=made.evidence.delta * 0)
+    for name in ("clean", "omp"):
+        assert CONTROLS[name](silent).score is None or not CONTROLS[name](silent).score.any()

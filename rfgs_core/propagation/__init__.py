@@ -14,14 +14,26 @@ torch (`backend="torch"`), which is the definition that tests compare the former
 
 from __future__ import annotations
 
-from typing import Literal
+import importlib
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Literal, get_args
 
 from jaxtyping import Complex, Float
 from torch import Tensor
 
 from rfgs_core.propagation.geometry import EnvironmentPaths, Links, Tones
 
-__all__ = ["EnvironmentPaths", "Links", "Tones", "scatter"]
+__all__ = [
+    "EnvironmentPaths",
+    "Links",
+    "RadioGaussians",
+    "Tones",
+    "environment",
+    "propagate",
+    "scatter",
+    "shadow",
+]
 
 Backend = Literal["numba", "torch"]
 
@@ -72,14 +84,120 @@ def scatter(
         1.0
     """
     _check_groups(links, visibility)
-    if backend == "torch":
-        from rfgs_core.propagation import reference as twin
-    else:
-        # numba takes a second to import: only for those who use it.
-        from rfgs_core.propagation import fast as twin
-    return twin.scatter(
+    return _twin(backend).scatter(
         *(means, quats, scales_rf, gamma, links, tones, normals, sharpness, visibility)
     )
+
+
+def shadow(
+    means: Float[Tensor, "gaussian 3"],
+    quats: Float[Tensor, "gaussian 4"],
+    scales: Float[Tensor, "gaussian 3"],
+    alpha: Float[Tensor, "gaussian"],
+    paths: EnvironmentPaths,
+    *,
+    backend: Backend = "numba",
+) -> Complex[Tensor, "path"]:
+    """Share of each environment path that passes the Gaussians.
+
+    T = prod_i (1 - alpha_i e_i g_i): g is the Fresnel integral of a Gaussian blob across the
+    path (`rfgs_core.propagation.fresnel`), e is 1 where the blob stands beside the leg and
+    fades to 0 within `EDGE_M` of the leg's ends. Evaluated at one wavelength. Differentiable in
+    all tensors but the paths.
+
+    Args:
+        means: Centres [m].
+        quats: Orientations, w first, need not be normalised.
+        scales: Standard deviations of the opaque shape [m], positive; not the reflecting one.
+        alpha: Opacities, from 0 up to but not including 1.
+        paths: Environment paths; only their legs matter here.
+        backend: Which twin computes it.
+
+    Returns:
+        One complex factor per path, 1 where nothing stands in the way.
+    """
+    return _twin(backend).shadow(means, quats, scales, alpha, paths)
+
+
+def environment(
+    transmission: Complex[Tensor, "path"],
+    paths: EnvironmentPaths,
+    tones: Tones,
+    num_links: int,
+) -> Complex[Tensor, "link subcarrier"]:
+    """CSI of the environment's paths, the first sum of the module's formula.
+
+    Args:
+        transmission: Factor T of each path.
+        paths: Environment paths.
+        tones: Subcarriers.
+        num_links: Rows of the result.
+    """
+    from rfgs_core.propagation import reference
+
+    return reference.environment(transmission, paths, tones, num_links)
+
+
+@dataclass(frozen=True)
+class RadioGaussians:
+    """Everything of the Gaussians that the radio sees, one row each."""
+
+    means: Float[Tensor, "gaussian 3"]
+    """Centres [m]."""
+    quats: Float[Tensor, "gaussian 4"]
+    """Orientations, w first, need not be normalised."""
+    scales: Float[Tensor, "gaussian 3"]
+    """Standard deviations of the opaque shape [m]."""
+    scales_rf: Float[Tensor, "gaussian 3"]
+    """Standard deviations of the reflecting cloud [m]."""
+    gamma: Complex[Tensor, "gaussian knot"]
+    """Reflectivity [m]."""
+    alpha: Float[Tensor, "gaussian"]
+    """Opacities, below 1."""
+    normals: Float[Tensor, "gaussian 3"] | None = None
+    """Outward unit normals."""
+    sharpness: float = 0.0
+    """How fast a Gaussian disappears behind its tangent plane."""
+    visibility: Float[Tensor, "gaussian group"] | None = None
+    """Weight per group of links."""
+
+
+def propagate(
+    gaussians: RadioGaussians,
+    links: Links,
+    tones: Tones,
+    paths: EnvironmentPaths | None = None,
+    *,
+    backend: Backend = "numba",
+) -> Complex[Tensor, "link subcarrier"]:
+    """CSI of Gaussians within an environment: both sums of the module's formula.
+
+    Args:
+        gaussians: Gaussians as the radio sees them.
+        links: Pairs of antennas.
+        tones: Subcarriers.
+        paths: Paths of the empty scene; None: only what the Gaussians scatter.
+        backend: Which twin computes it.
+    """
+    g = gaussians
+    total = scatter(
+        *(g.means, g.quats, g.scales_rf, g.gamma, links, tones),
+        *(g.normals, g.sharpness, g.visibility),
+        backend=backend,
+    )
+    if paths is None:
+        return total
+    transmission = shadow(g.means, g.quats, g.scales, g.alpha, paths, backend=backend)
+    return total + environment(transmission, paths, tones, len(links))
+
+
+def _twin(backend: Backend) -> ModuleType:
+    """The module that implements a backend."""
+    if backend not in get_args(Backend):
+        raise ValueError(f"expected backend to be one of {get_args(Backend)}, got {backend!r}")
+    # numba takes a second to import: only for those who use it.
+    name = "reference" if backend == "torch" else "fast"
+    return importlib.import_module(f"rfgs_core.propagation.{name}")
 
 
 def _check_groups(links: Links, visibility: Float[Tensor, "gaussian group"] | None) -> None:

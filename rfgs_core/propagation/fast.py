@@ -12,11 +12,13 @@ from jaxtyping import Complex, Float
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
-from rfgs_core.propagation import kernels_scatter, kernels_scatter_gradient
+from rfgs_core.propagation import kernels_scatter, kernels_scatter_gradient, kernels_shadow
 from rfgs_core.propagation.covariance import covariances, packed
-from rfgs_core.propagation.geometry import Links, Tones
+from rfgs_core.propagation.fresnel import leg_frames
+from rfgs_core.propagation.geometry import EnvironmentPaths, Links, Tones
 from rfgs_core.propagation.kernels_scatter import UNROLL, Cloud, Plan
 from rfgs_core.propagation.kernels_scatter_gradient import CloudGradient
+from rfgs_core.propagation.kernels_shadow import Screens
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
 #: Tones per chunk: rounding errors of the recurrence stay below 1e-5 in float32.
@@ -168,3 +170,56 @@ def scatter(
     )
     wavelength_m = (SPEED_OF_LIGHT / tones.freq_hz).to(real)
     return total * (wavelength_m / (4 * math.pi) ** 1.5)
+
+
+class _Shadow(torch.autograd.Function):
+    """T[path] of packed Gaussians; all tensors have the Gaussian axis last."""
+
+    @staticmethod
+    def forward(
+        ctx: Any,
+        means: Tensor,
+        shape: Tensor,
+        alpha: Tensor,
+        legs: np.ndarray,
+        wavelength_m: float,
+    ) -> Tensor:
+        """Args: see `Screens`; `legs` as `LegFrames.table` lays them out."""
+        screens = Screens(
+            _rows(means, torch.float64), _rows(shape, torch.float64), _rows(alpha, alpha.dtype)
+        )
+        product = np.zeros((len(legs), 2))
+        kernels_shadow.shadow_forward(screens, legs, wavelength_m, product)
+        ctx.dtypes = (means.dtype, shape.dtype, alpha.dtype)
+        ctx.state = (screens, legs, wavelength_m, product)
+        total = torch.from_numpy(product)
+        return torch.complex(total[:, 0], total[:, 1]).to(alpha.dtype.to_complex())
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, *grads: Tensor) -> tuple[Tensor | None, ...]:
+        """Chains the gradient of T to means, shape and alpha."""
+        screens, legs, wavelength_m, product = ctx.state
+        real = screens.alpha.dtype
+        seed = grads[0].detach().numpy().conj() * (product[:, 0] + 1j * product[:, 1])
+        result = Screens(*(np.zeros(field.shape, dtype=real) for field in screens))
+        parts = np.stack([seed.real, seed.imag], axis=1).astype(real)
+        kernels_shadow.shadow_backward(screens, legs, wavelength_m, parts, result)
+        gradients = (
+            torch.from_numpy(value).to(dtype)
+            for value, dtype in zip(result, ctx.dtypes, strict=True)
+        )
+        return (*gradients, None, None)
+
+
+def shadow(
+    means: Float[Tensor, "gaussian 3"],
+    quats: Float[Tensor, "gaussian 4"],
+    scales: Float[Tensor, "gaussian 3"],
+    alpha: Float[Tensor, "gaussian"],
+    paths: EnvironmentPaths,
+) -> Complex[Tensor, "path"]:
+    """Twin of `rfgs_core.propagation.shadow` on the CPU's vector units."""
+    shape = packed(covariances(quats.to(torch.float64), scales.to(torch.float64)))
+    legs = leg_frames(paths).table().numpy()
+    return _Shadow.apply(means.T, shape, alpha.to(scales.dtype), legs, paths.wavelength_m)

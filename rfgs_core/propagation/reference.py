@@ -13,7 +13,8 @@ from jaxtyping import Complex, Float, Float64
 from torch import Tensor
 
 from rfgs_core.propagation.covariance import covariances
-from rfgs_core.propagation.geometry import Links, Tones
+from rfgs_core.propagation.fresnel import EDGE_M, leg_frames
+from rfgs_core.propagation.geometry import EnvironmentPaths, Links, Tones
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
 #: Elements of the largest intermediate array [gaussian, link, subcarrier].
@@ -116,3 +117,70 @@ def _scatter_block(
     terms = torch.polar(magnitude, phase)
     summed = torch.einsum("mf,mlf->lf", gamma_at_tones(gamma, tones), terms)
     return summed * (SPEED_OF_LIGHT / freq_hz / (4 * math.pi) ** 1.5).to(real)
+
+
+def _smooth_step(x: Float[Tensor, "..."]) -> Float[Tensor, "..."]:
+    """0 below 0, 1 above 1, 3x^2 - 2x^3 in between."""
+    x = x.clamp(0.0, 1.0)
+    return x * x * (3 - 2 * x)
+
+
+def blob_shadow(
+    offset: Float[Tensor, "... 2"], spread: Float[Tensor, "... 2 2"], kappa: Float[Tensor, "..."]
+) -> Complex[Tensor, "..."]:
+    """Fresnel integral g of a Gaussian blob, see `rfgs_core.propagation.fresnel`.
+
+    Args:
+        offset: Centre rho_0 of the blob, across the path [m].
+        spread: Covariance S of the blob, across the path [m^2].
+        kappa: Area of the Fresnel zone over 2 pi [m^2].
+    """
+    xx, yy, xy = spread[..., 0, 0], spread[..., 1, 1], spread[..., 0, 1]
+    x, y = offset[..., 0], offset[..., 1]
+    c_xx, c_yy = torch.complex(xx, -kappa), torch.complex(yy, -kappa)
+    det_c = c_xx * c_yy - xy**2
+    exponent = (c_yy * x**2 - 2 * xy * x * y + c_xx * y**2) / det_c
+    # Both factors of det C have arguments in (-pi/2, 0]: the principal root is the right one.
+    return torch.sqrt((xx * yy - xy**2) / det_c) * torch.exp(-0.5 * exponent)
+
+
+def shadow(
+    means: Float[Tensor, "gaussian 3"],
+    quats: Float[Tensor, "gaussian 4"],
+    scales: Float[Tensor, "gaussian 3"],
+    alpha: Float[Tensor, "gaussian"],
+    paths: EnvironmentPaths,
+) -> Complex[Tensor, "path"]:
+    """Twin of `rfgs_core.propagation.shadow`: the same product, written out."""
+    real = scales.dtype
+    frames = leg_frames(paths)
+    centre = means.to(torch.float64)[None] - frames.origin[:, None]
+    along = torch.einsum("pmc,pc->pm", centre, frames.along)
+    across = torch.stack([frames.first, frames.second], dim=1)
+    offset = torch.einsum("pmc,pac->pma", centre, across).to(real)
+    across = across.to(real)
+    spread = torch.einsum("pac,mcd,pbd->pmab", across, covariances(quats, scales), across)
+
+    length = frames.length[:, None]
+    inside = along.clamp(min=0.0).minimum(length)
+    before, behind = frames.before[:, None] + inside, frames.behind[:, None] + length - inside
+    total = (before + behind).clamp(min=1e-300)
+    kappa = (paths.wavelength_m / (2 * math.pi) * before * behind / total).to(real)
+    edge = _smooth_step(along / EDGE_M) * _smooth_step((length - along) / EDGE_M)
+    blocked = (alpha * edge.to(real)) * blob_shadow(offset, spread, kappa)
+    return torch.prod(1 - blocked, dim=1)
+
+
+def environment(
+    transmission: Complex[Tensor, "path"],
+    paths: EnvironmentPaths,
+    tones: Tones,
+    num_links: int,
+) -> Complex[Tensor, "link subcarrier"]:
+    """Twin of `rfgs_core.propagation.environment`."""
+    turns = paths.delay_s.to(torch.float64)[:, None] * tones.freq_hz
+    phase = (-2 * math.pi) * (turns - turns.detach().round())
+    phasors = torch.polar(torch.ones_like(phase), phase).to(transmission.dtype)
+    terms = (transmission * paths.amplitude)[:, None] * phasors
+    total = torch.zeros(num_links, tones.num_selected, dtype=terms.dtype)
+    return total.index_add(0, paths.link, terms)

@@ -23,7 +23,11 @@ from rfgs_core.render.splat import (
 
 
 def splat_plain(
-    gaussians: Gaussians, rgb: Float[Tensor, "M 3"], camera: Camera, chunk_px: int = 128
+    gaussians: Gaussians,
+    rgb: Float[Tensor, "M 3"],
+    camera: Camera,
+    rows: tuple[int, int] | None = None,
+    chunk_px: int = 128,
 ) -> Splatted:
     """Renders Gaussians in double precision, pixel by Gaussian (see `splat.py` for the formula).
 
@@ -31,6 +35,7 @@ def splat_plain(
         gaussians: M Gaussians; gradients flow into them.
         rgb: Colours in [0, 1], shape [M, 3].
         camera: Where to look from.
+        rows: First and one-past-last row of the picture to render; all of them if not given.
         chunk_px: Pixels at a time; bounds the memory to a few times chunk_px × M doubles.
 
     Returns:
@@ -42,8 +47,9 @@ def splat_plain(
     centres, inverses, depths = centres[order], torch.linalg.inv(covariances[order]), depths[order]
     opacities = torch.sigmoid(gaussians.logit_opacities.double())[order]
     values = torch.cat([rgb.double()[order], depths[:, None]], dim=1)
+    top, bottom = rows or (0, camera.height)
     sums, covers = [], []
-    for pixels in _pixel_centres(camera).split(chunk_px):
+    for pixels in _pixel_centres(top, bottom, camera.width).split(chunk_px):
         dx = pixels[:, :1] - centres[:, 0]
         dy = pixels[:, 1:] - centres[:, 1]
         power = (0.5 * inverses[:, 0, 0] * dx + inverses[:, 0, 1] * dy) * dx
@@ -55,7 +61,7 @@ def splat_plain(
         weights = alpha * before
         sums.append(weights @ values)
         covers.append(weights.sum(dim=1))
-    shape = (camera.height, camera.width)
+    shape = (bottom - top, camera.width)
     total = torch.cat(sums).reshape(*shape, 4)
     cover = torch.cat(covers).reshape(shape)
     infinite = torch.full_like(cover, torch.inf)
@@ -91,8 +97,8 @@ def project_plain(
     return centres, covariances + dilation, depth
 
 
-def _pixel_centres(camera: Camera) -> Float[Tensor, "P 2"]:
-    rows = torch.arange(camera.height, dtype=torch.float64) + 0.5
-    columns = torch.arange(camera.width, dtype=torch.float64) + 0.5
+def _pixel_centres(top: int, bottom: int, width: int) -> Float[Tensor, "P 2"]:
+    rows = torch.arange(top, bottom, dtype=torch.float64) + 0.5
+    columns = torch.arange(width, dtype=torch.float64) + 0.5
     row, column = torch.meshgrid(rows, columns, indexing="ij")
     return torch.stack([column.reshape(-1), row.reshape(-1)], dim=1)

@@ -102,7 +102,8 @@ def test_zero_and_empty_room_are_zero_decibels(scatterers) -> None:
 
 
 def test_empty_room_predicts_hidden_static_entries(scatterers) -> None:
-    made = scatterers(ONE)
+    # Within a device the direct path is 30 cm long and too curved for any interpolation.
+    made = scatterers(ONE, own_device_links="excluded")
     static = CONTROLS["empty_room"](made.evidence).static
     error = np.abs(static - made.static)[made.held_out.element]
     assert np.sqrt(np.mean(error**2) / np.mean(np.abs(made.static) ** 2)) < 0.2
@@ -113,13 +114,13 @@ def test_interpolators_keep_visible_entries_and_unmeasured_links(scatterers) -> 
     for name in ("nearest_element", "linear", "gaussian_process"):
         delta = CONTROLS[name](made.evidence).delta
         visible = made.held_out.visible
-        np.testing.assert_array_equal(delta[visible], made.delta[visible])
+        np.testing.assert_array_equal(delta[visible], made.evidence.delta[visible])
         assert not delta[~made.evidence.layout.measured].any()
 
 
 def ramp(x: np.ndarray) -> np.ndarray:
     """Two waves of neighbouring directions over array columns."""
-    return np.exp(0.9j * x) + 0.4 * np.exp(0.7j * x + 1j)
+    return np.exp(0.35j * x) + 0.4 * np.exp(0.25j * x + 1j)
 
 
 def test_kriging_and_lines_beat_the_nearest_value_on_a_phase_ramp() -> None:

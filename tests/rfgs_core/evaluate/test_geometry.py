@@ -56,7 +56,8 @@ def test_a_shifted_plane_scores_by_its_distance_alone(
     # Four centimetres per layer: 4, 8, 16 and 24 cm against thresholds of 5, 10 and 20 cm.
     result = geometry_metrics(plane_score(25 + layers), GRID, reference, 625)
     for key, value in zip(("f05", "f10", "f20"), expected, strict=True):
-        assert result[key] == pytest.approx(value, abs=0.02)
+        # At 4 cm the rim, cut to whole voxels, loses 2.5 cm of the 5 cm left sideways.
+        assert result[key] == pytest.approx(value, abs=0.03)
     assert result["centroid_m"] == pytest.approx(0.04 * layers, abs=0.01)
     assert result["chamfer_m"] == pytest.approx(0.04 * layers, abs=0.01)
 
@@ -73,9 +74,9 @@ def test_a_blind_score_everywhere_is_no_prediction_of_the_plane(reference: np.nd
     rng = np.random.default_rng(0)
     score = rng.random(GRID.shape).astype(np.float32)
     result = geometry_metrics(score, GRID, reference, 625)
-    # 1 m² of 8 m³: a random voxel lies within 10 cm with probability of about 0.2/8.
+    # 1 m² in 8 m³: P = 0.03 with the rim; R = 0.28, each point has 65 voxels within 10 cm.
     assert result["f10"] is not None
-    assert result["f10"] < 0.06
+    assert result["f10"] == pytest.approx(2 * 0.032 * 0.28 / 0.312, abs=0.02)
 
 
 def test_an_empty_score_predicts_nothing_and_scores_zero(reference: np.ndarray) -> None:

@@ -60,8 +60,8 @@ def scatter(
         means: Centres [m].
         quats: Orientations, w first, need not be normalised.
         scales_rf: Standard deviations of the reflecting cloud [m], positive.
-        gamma: Reflectivity [m] at knots spread evenly over the band, linear in between; its
-            square times 1 over one square metre is the radar cross-section of a point.
+        gamma: Reflectivity [m], the complex root of the radar cross-section, at knots spread
+            evenly over the band and linear in between.
         links: Pairs of antennas.
         tones: Subcarriers.
         normals: Outward unit normals; None: every Gaussian is seen from all sides.
@@ -151,7 +151,7 @@ class RadioGaussians:
     scales_rf: Float[Tensor, "gaussian 3"]
     """Standard deviations of the reflecting cloud [m]."""
     gamma: Complex[Tensor, "gaussian knot"]
-    """Reflectivity [m]."""
+    """Reflectivity at knots over the band [m]."""
     alpha: Float[Tensor, "gaussian"]
     """Opacities, below 1."""
     normals: Float[Tensor, "gaussian 3"] | None = None

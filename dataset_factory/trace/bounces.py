@@ -9,6 +9,8 @@ and at every frequency, which the solver could not do. Wall coefficients stay at
 
 from __future__ import annotations
 
+from typing import Any
+
 import mitsuba as mi
 import numpy as np
 import sionna.rt as rt
@@ -53,12 +55,13 @@ class Bounces:
         self._depth, self._seed = depth, seed
         self._solver = RCSSolver(deterministic=True)
         self._rcs, self._cpm = ConstantRCS(1.0), ConstantCPM()
-        box = scene.mi_scene.bbox()
-        low = np.array(box.min).ravel()
-        place = [float(low[0]), float(low[1]), float(low[2]) - 1.0]
+        mi_scene: Any = scene.mi_scene
+        low = np.array(mi_scene.bbox().min, dtype=np.float64).ravel()
+        place: Any = [low[0].item(), low[1].item(), low[2].item() - 1.0]
+        origin: Any = [0.0, 0.0, 0.0]
         self._carrier = SensingTarget(
             name="carrier",
-            scattering_model=ScatteringModel([0.0, 0.0, 0.0], rcs=self._rcs, cpm=self._cpm),
+            scattering_model=ScatteringModel(origin, rcs=self._rcs, cpm=self._cpm),
             length=1e-3,
             width=1e-3,
             height=1e-3,

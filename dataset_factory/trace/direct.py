@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
-import mitsuba as mi
 import numpy as np
 
 from dataset_factory.trace.facets import facet_sum
@@ -35,7 +35,7 @@ class PosedPoints:
 
 
 def direct_channel(
-    mi_scene: mi.Scene,
+    mi_scene: Any,
     points: PosedPoints,
     layout: Layout,
     devices: list[DevicePose],
@@ -48,7 +48,7 @@ def direct_channel(
     scene with the body in it; distances and facets are exact per element and tone.
 
     Args:
-        mi_scene: Scene with everything that moves in place.
+        mi_scene: Mitsuba scene with everything that moves in place.
         points: Scattering points.
         layout: Antenna elements.
         devices: Poses of the devices, for polarisation.

@@ -62,7 +62,8 @@ def half_space_reflection(name: str, freq_hz: np.ndarray) -> np.ndarray:
     """Normal reflection of a thick body of a radio material, complex128, shape of `freq_hz`."""
     if name == "skin":
         return normal_reflection(skin_permittivity(freq_hz))
-    values = [itu_material(name, float(f)) for f in freq_hz]
+    model: Any = itu_material
+    values = [model(name, float(f)) for f in freq_hz]
     epsilon = np.array([float(np.ravel(np.array(e))[0]) for e, _ in values])
     sigma = np.array([float(np.ravel(np.array(s))[0]) for _, s in values])
     loss = sigma / (2.0 * np.pi * np.asarray(freq_hz) * VACUUM_PERMITTIVITY)
@@ -156,11 +157,11 @@ def euler_angles(quat_wxyz: tuple[float, float, float, float]) -> tuple[float, f
     return float(np.arctan2(r[1, 0], r[0, 0])), beta, float(np.arctan2(r[2, 1], r[2, 2]))
 
 
-def visible(mi_scene: mi.Scene, origins: np.ndarray, target: np.ndarray) -> np.ndarray:
+def visible(mi_scene: Any, origins: np.ndarray, target: np.ndarray) -> np.ndarray:
     """Whether nothing stands between points and one place.
 
     Args:
-        mi_scene: Scene to test in.
+        mi_scene: Mitsuba scene to test in.
         origins: Starting points [m], shape (point, 3).
         target: End point [m], shape (3,).
 

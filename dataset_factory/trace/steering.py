@@ -19,6 +19,8 @@ from dataset_factory.trace.paths import PathSet
 from rfgs_core.radio import Layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
+_BLOCK = 128
+
 
 @dataclass(frozen=True)
 class Images:
@@ -110,19 +112,17 @@ def steer(
     for a, b in np.unique(np.stack([paths.tx, paths.rx], axis=1), axis=0):
         of_pair = np.flatnonzero((paths.tx == a) & (paths.rx == b))
         tx, rx = np.flatnonzero(layout.tx_device == a), np.flatnonzero(layout.rx_device == b)
-        shape = (len(of_pair), len(tx), len(rx), paths.amplitude.shape[1])
-        gain = np.broadcast_to(paths.amplitude[of_pair][:, None, None, :], shape)
+        passed = np.ones((0, 0, 0, 0), dtype=np.complex128)
         if transmission is not None:
-            gain = gain * transmission[of_pair]
-        tx_centre = paths.vertices[of_pair[0], 0]
+            passed = transmission[of_pair]
+        ends = np.stack([paths.vertices[of_pair[0], 0], paths.vertices[of_pair[0], -1]])
+        offsets = np.einsum("pij,ej->pei", seen.mirror[of_pair], layout.tx_xyz[tx] - ends[0])
         out[np.ix_(tx, rx)] = _steer(
-            np.ascontiguousarray(gain),
+            (paths.amplitude[of_pair], passed),
             seen.one_sided[of_pair],
-            seen.seen_from_tx[of_pair],
-            seen.seen_from_rx[of_pair],
-            np.einsum("pij,ej->pei", seen.mirror[of_pair], layout.tx_xyz[tx] - tx_centre),
-            seen.middle_m[of_pair],
-            np.stack([paths.vertices[of_pair[0], 0], paths.vertices[of_pair[0], -1]]),
+            (seen.seen_from_tx[of_pair], seen.seen_from_rx[of_pair], seen.middle_m[of_pair]),
+            np.ascontiguousarray(offsets),
+            ends,
             np.ascontiguousarray(layout.tx_xyz[tx]),
             np.ascontiguousarray(layout.rx_xyz[rx]),
             (left, share, float(wavenumber[0]), step),
@@ -146,41 +146,96 @@ def _distance(a: np.ndarray, b: np.ndarray) -> float:
     return math.sqrt(x * x + y * y + z * z)
 
 
+@numba.njit(cache=True, inline="always")
+def _path_to(
+    one_sided: bool,
+    seen: tuple[np.ndarray, np.ndarray, float],
+    image_offset: np.ndarray,
+    ends: np.ndarray,
+    tx: np.ndarray,
+    rx: np.ndarray,
+) -> tuple[float, float]:
+    """Length of a path between two elements [m] and its amplitude relative to the centres'."""
+    seen_from_tx, seen_from_rx, middle_m = seen
+    if one_sided:
+        d = _distance(rx - image_offset, seen_from_rx)
+        return d, _distance(ends[1], seen_from_rx) / d
+    at_tx, at_rx = _distance(tx, seen_from_tx), _distance(rx, seen_from_rx)
+    scale = _distance(ends[0], seen_from_tx) / at_tx * _distance(ends[1], seen_from_rx) / at_rx
+    return at_tx + middle_m + at_rx, scale
+
+
+@numba.njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
+def _add_block(
+    phasor: np.ndarray, turn: np.ndarray, gain: np.ndarray, tones: tuple, out: np.ndarray
+) -> None:
+    """Adds a block of paths to every tone of one link.
+
+    Args:
+        phasor: Real and imaginary part at the first tone, shape (2, path); changed.
+        turn: Factor from tone to tone, shape (2, path).
+        gain: Amplitudes, shape (node, 2, path).
+        tones: Left node of each tone and share of the right one.
+        out: Channel of the link, shape (subcarrier,).
+    """
+    left, share = tones
+    for f in range(len(left)):
+        low = gain[left[f]]
+        high = gain[min(left[f] + 1, len(gain) - 1)]
+        part = share[f]
+        rest = 1.0 - part
+        sum_re, sum_im = 0.0, 0.0
+        for j in range(phasor.shape[1]):
+            re, im = phasor[0, j], phasor[1, j]
+            a_re = rest * low[0, j] + part * high[0, j]
+            a_im = rest * low[1, j] + part * high[1, j]
+            sum_re += a_re * re - a_im * im
+            sum_im += a_re * im + a_im * re
+            phasor[0, j] = re * turn[0, j] - im * turn[1, j]
+            phasor[1, j] = re * turn[1, j] + im * turn[0, j]
+        out[f] += complex(sum_re, sum_im)
+
+
 @numba.njit(cache=True, parallel=True)
 def _steer(
-    gain: np.ndarray,
+    gain: tuple[np.ndarray, np.ndarray],
     one_sided: np.ndarray,
-    seen_from_tx: np.ndarray,
-    seen_from_rx: np.ndarray,
+    seen: tuple[np.ndarray, np.ndarray, np.ndarray],
     image_offset: np.ndarray,
-    middle_m: np.ndarray,
     ends: np.ndarray,
     tx_xyz: np.ndarray,
     rx_xyz: np.ndarray,
     tones: tuple[np.ndarray, np.ndarray, float, float],
 ) -> np.ndarray:
     """Channel of one device pair, shape (tx, rx, subcarrier)."""
+    amplitude, passed = gain
     left, share, k_0, k_step = tones
-    n_paths, n_tx, n_rx, n_nodes = gain.shape
+    n_paths, n_nodes = amplitude.shape
+    n_tx, n_rx = len(tx_xyz), len(rx_xyz)
     out = np.zeros((n_tx, n_rx, len(left)), dtype=np.complex128)
     for link in numba.prange(n_tx * n_rx):
         t, r = link // n_rx, link % n_rx
-        for p in range(n_paths):
-            at_rx = _distance(rx_xyz[r], seen_from_rx[p])
-            if one_sided[p]:
-                x = rx_xyz[r] - seen_from_rx[p] - image_offset[p, t]
-                d = math.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
-                scale = _distance(ends[1], seen_from_rx[p]) / d
-            else:
-                at_tx = _distance(tx_xyz[t], seen_from_tx[p])
-                d = at_tx + middle_m[p] + at_rx
-                scale = _distance(ends[0], seen_from_tx[p]) / at_tx
-                scale *= _distance(ends[1], seen_from_rx[p]) / at_rx
-            phasor = scale * complex(math.cos(k_0 * d), -math.sin(k_0 * d))
-            turn = complex(math.cos(k_step * d), -math.sin(k_step * d))
-            for f in range(len(left)):
-                right = min(left[f] + 1, n_nodes - 1)
-                a = (1.0 - share[f]) * gain[p, t, r, left[f]] + share[f] * gain[p, t, r, right]
-                out[t, r, f] += a * phasor
-                phasor *= turn
+        phasor, turn = np.zeros((2, _BLOCK)), np.zeros((2, _BLOCK))
+        block = np.zeros((n_nodes, 2, _BLOCK))
+        for first in range(0, n_paths, _BLOCK):
+            size = min(_BLOCK, n_paths - first)
+            phasor[:] = 0.0
+            block[:] = 0.0
+            for j in range(size):
+                p = first + j
+                corners = (seen[0][p], seen[1][p], seen[2][p])
+                d, scale = _path_to(
+                    one_sided[p], corners, image_offset[p, t], ends, tx_xyz[t], rx_xyz[r]
+                )
+                phasor[0, j] = scale * math.cos(k_0 * d)
+                phasor[1, j] = -scale * math.sin(k_0 * d)
+                turn[0, j] = math.cos(k_step * d)
+                turn[1, j] = -math.sin(k_step * d)
+                for n in range(n_nodes):
+                    value = amplitude[p, n]
+                    if passed.size:
+                        value *= passed[p, t, r, n]
+                    block[n, 0, j] = value.real
+                    block[n, 1, j] = value.imag
+            _add_block(phasor, turn, block, (left, share), out[t, r])
     return out

@@ -73,7 +73,8 @@ class Tracer:
         check_materials(bundle, radio)
         _check_movers(bundle)
         self._bundle, self._radio, self._devices = bundle, radio, devices
-        self._shadow, self._seed = shadow, seed
+        self._shadow: Shadow = shadow
+        self._seed = seed
         self._layout = layout(radio, devices)
         self._nodes = node_frequencies(radio)
         self.timings: dict[str, float] = dict.fromkeys(

@@ -4,6 +4,10 @@
 Works as an extension of Blender 4.2 and newer and as a package beside pip `bpy`.
 """
 
+import atexit
+
+import bpy
+
 from . import command, operators, panels, properties
 
 _MODULES = (properties, operators, panels, command)
@@ -13,9 +17,13 @@ def register() -> None:
     """Registers everything; called by Blender when the extension is enabled."""
     for module in _MODULES:
         module.register()
+    if bpy.app.module:
+        # Blender as a Python module crashes or hangs at exit on classes still registered.
+        atexit.register(unregister)
 
 
 def unregister() -> None:
     """Takes back everything that `register` added."""
+    atexit.unregister(unregister)
     for module in reversed(_MODULES):
         module.unregister()

@@ -6,7 +6,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from . import register, unregister
+from . import register
 from .cli import USER_ERROR, run
 
 
@@ -19,10 +19,7 @@ def main(arguments: list[str]) -> int:
         sys.stderr.write(f"error: expected {program} export|groundtruth|import …\n")
         return USER_ERROR
     register()
-    try:
-        return run(arguments[2:], program, Path(arguments[1]))
-    finally:
-        unregister()
+    return run(arguments[2:], program, Path(arguments[1]))
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ from .cameras import cameras_ready, find_devices, find_views
 from .errors import AddonError
 from .files import replacing, replacing_folder, write_json
 from .frames import chosen_frames, file_label, file_sha256, unit_scale
+from .lights import light_guesses
 from .materials import MaterialTable
 from .naming import Names
 from .people import Instance, action_label, find_instances, joints, segments
@@ -104,6 +105,7 @@ def export_bundle(
             views, view_guesses = find_views(scene, cameras, resolution)
             devices, device_guesses = find_devices(scene)
             content.guesses += camera_guesses + view_guesses + device_guesses
+            content.guesses += light_guesses(scene)
             table = MaterialTable()
             objects = _write_objects(target, content, table)
             _write_topology(scene, target, content, table)

@@ -20,6 +20,7 @@ from .errors import AddonError
 from .exr import read_exr, write_exr
 from .files import replacing
 from .frames import chosen_frames, unit_scale
+from .lights import lights_ready
 from .state import Keeper, kept, show_what_renders
 
 #: Depths above this are misses; Cycles writes 1e10 [Blender units].
@@ -66,7 +67,7 @@ def render_groundtruth(
         show_what_renders(keeper, scene)
         content = read_content(scene)
         low, high = (corner / unit_scale(scene) for corner in content.box())
-        with cameras_ready(scene, low, high):
+        with cameras_ready(scene, low, high), lights_ready(scene):
             views = find_views(scene, cameras, resolution)[0]
             _number_instances(keeper, content)
             _configure(keeper, scene, views[0])

@@ -19,6 +19,7 @@ from .files import replacing
 from .frames import file_label
 from .gaussians import Display, Imported, import_gaussians
 from .groundtruth import can_denoise, keep_format, render_to
+from .lights import lights_ready
 from .state import Keeper, kept, show_what_renders
 
 #: Gaussians that vote for the picture's camera.
@@ -93,7 +94,7 @@ def render_picture(
         scene.camera = camera
         _configure(keeper, scene, width, height)
         halves = []
-        with replacing(picture.path) as temporary:
+        with lights_ready(scene), replacing(picture.path) as temporary:
             for hidden in (imported.objects, moving):
                 with _invisible(hidden):
                     render_to(scene, temporary)

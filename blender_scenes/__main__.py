@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`python -m blender_scenes list` and `python -m blender_scenes build [NAME] [--out FILE]`."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import os
+import sys
+from pathlib import Path
+
+from blender_scenes.catalogue import scenes
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Runs the command; returns the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m blender_scenes", description=__doc__)
+    commands = parser.add_subparsers(dest="command", required=True)
+    commands.add_parser("list", help="print the scenes there are")
+    build = commands.add_parser("build", help="build a scene's .blend from code")
+    build.add_argument("name", nargs="?", default="living_room_walk", help="which scene")
+    build.add_argument("--out", type=Path, help="where to; default: beside the catalogue")
+    args = parser.parse_args(arguments)
+    known = scenes()
+    if args.command == "list":
+        for scene in known.values():
+            frames = f"{scene.frame_start}:{scene.frame_end} at {scene.fps} fps"
+            sys.stdout.write(f"{scene.name}  {frames}  {scene.description}\n")
+        return 0
+    if args.name not in known:
+        sys.stderr.write(f"error: no scene {args.name!r}; there are: {', '.join(known)}\n")
+        return 2
+    return _build(known[args.name].name, args.out or known[args.name].path)
+
+
+def _build(name: str, out: Path) -> int:
+    if not out.resolve().parent.is_dir():
+        sys.stderr.write(f"error: {out.parent}: no such folder; make it first\n")
+        return 2
+    try:
+        builder = importlib.import_module(f"blender_scenes.{name}")
+        builder.build(out)
+    except ModuleNotFoundError as error:
+        if error.name not in ("anny", "bpy", "torch"):
+            raise
+        sys.stderr.write(
+            f"error: {error.name} is missing; install it: pip install -e '.[scenes]'\n"
+        )
+        return 2
+    sys.stdout.write(f"wrote {out} ({out.stat().st_size / 1e6:.2f} MB)\n")
+    return 0
+
+
+if __name__ == "__main__":
+    code = main()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    # bpy may wait for ever on its own threads when the interpreter takes it down.
+    os._exit(code)

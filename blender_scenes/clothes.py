@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Clothes and hair that replace skin: the body's own surface, reshaped and coloured by region.
+
+A second shell over the skin would be lost to the ray tracer, which needs a centimetre between
+sheets; so a shirt is the torso's surface, smoothed and pushed outwards.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from blender_scenes.body import Body
+
+LIMBS = ("head", "torso", "arm", "hand", "leg", "foot")
+
+_BONES_OF_LIMB = {
+    "head": ("head", "neck02", "neck03"),
+    "torso": ("spine", "clavicle", "root", "pelvis", "neck01", "shoulder"),
+    "arm": ("upperarm", "lowerarm"),
+    "hand": ("wrist", "finger"),
+    "leg": ("upperleg", "lowerleg"),
+    "foot": ("foot", "toe"),
+}
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A plane that parts two materials on some limbs."""
+
+    limbs: tuple[str, ...]
+    """Limbs it applies to."""
+    side: int
+    """1 only where x > 0, -1 only where x < 0, 0 everywhere."""
+    point: np.ndarray
+    """A point on the plane [m]."""
+    normal: np.ndarray
+    """Its normal; `beyond` is on this side."""
+
+    def beyond(self, points: np.ndarray, limbs: np.ndarray) -> np.ndarray:
+        """Whether each of `points` [N, 3] on `limbs` [N] lies beyond the plane."""
+        applies = np.isin(limbs, [LIMBS.index(limb) for limb in self.limbs])
+        if self.side:
+            applies &= points[:, 0] * self.side > 0
+        return applies & ((points - self.point) @ self.normal > 0)
+
+
+def limb_weights(body: Body) -> np.ndarray:
+    """Share of each limb in each vertex, shape (V, 6)."""
+    return np.stack([body.share(*_BONES_OF_LIMB[limb]) for limb in LIMBS], axis=1)
+
+
+def cuts(body: Body) -> dict[str, Cut]:
+    """The borders between skin, hair and clothes, by name."""
+    up = np.array([0.0, 0.0, 1.0])
+    head, neck = body.head("head"), body.head("neck01")
+    made = {
+        "hairline": Cut(("head",), 0, head + [0.0, -0.098, 0.112], np.array([0.0, 0.60, 0.80])),
+        "collar": Cut(
+            ("torso", "head"), 0, neck + [0.0, -0.01, 0.002], np.array([0.0, -0.42, 0.91])
+        ),
+        "waist": Cut(("torso", "leg"), 0, body.head("spine04") + [0.0, 0.0, -0.015], -up),
+        "sole": Cut(("foot",), 0, np.array([0.0, 0.0, 0.017]), -up),
+    }
+    for name, side in (("L", 1), ("R", -1)):
+        shoulder, elbow = body.head(f"upperarm01.{name}"), body.head(f"lowerarm01.{name}")
+        axis = (elbow - shoulder) / np.linalg.norm(elbow - shoulder)
+        made[f"sleeve.{name}"] = Cut(("arm",), side, shoulder + 0.72 * (elbow - shoulder), axis)
+        ankle = body.head(f"foot.{name}")
+        made[f"shoe.{name}"] = Cut(("leg", "foot"), side, ankle + [0.0, 0.0, 0.018], -up)
+    return made
+
+
+def surface_of(points: np.ndarray, limbs: np.ndarray, borders: dict[str, Cut]) -> np.ndarray:
+    """Name of the surface at each of `points` [N, 3] in the rest pose.
+
+    Args:
+        points: Points on the skin [m], shape (N, 3).
+        limbs: Index in `LIMBS` of the limb each lies on, shape (N,).
+        borders: Result of `cuts`.
+    """
+    beyond = {name: cut.beyond(points, limbs) for name, cut in borders.items()}
+    torso, arm, leg, foot = (limbs == LIMBS.index(n) for n in ("torso", "arm", "leg", "foot"))
+    shoe = foot | leg
+    shoe &= beyond["shoe.L"] | beyond["shoe.R"]
+    bare = arm & (beyond["sleeve.L"] | beyond["sleeve.R"])
+    names = np.full(len(points), "skin", dtype=object)
+    names[beyond["hairline"]] = "hair"
+    names[(torso | (limbs == 0)) & ~beyond["collar"] & ~beyond["hairline"]] = "shirt"
+    names[arm & ~bare] = "shirt"
+    names[((torso & beyond["waist"]) | leg | foot) & ~shoe] = "trousers"
+    names[shoe] = "shoes"
+    names[shoe & beyond["sole"]] = "soles"
+    return names.astype(str)
+
+
+def dress(body: Body) -> Body:
+    """Smooths the skin under clothes and pushes it outwards by the cloth's thickness."""
+    limbs = limb_weights(body)
+    surface = surface_of(body.vertices, limbs.argmax(axis=1), cuts(body))
+    neighbours = _neighbours(body.faces, len(body.vertices))
+    vertices = body.vertices
+    for name, rounds, push in (
+        ("shirt", 22, 0.014),
+        ("trousers", 14, 0.010),
+        ("shoes", 8, 0.006),
+        ("hair", 12, 0.016),
+    ):
+        inside = (surface == name) | ((name == "shoes") & (surface == "soles"))
+        # Fade over a few rings of vertices, so that hems have no spikes.
+        mask = inside.astype(np.float64)
+        for _ in range(3):
+            mask = np.minimum(mask, neighbours(mask))
+        for _ in range(rounds):
+            vertices = vertices + 0.6 * mask[:, None] * (neighbours(vertices) - vertices)
+        normals = _normals(vertices, body.faces)
+        vertices = vertices + push * np.where(inside, 0.35 + 0.65 * mask, 0.0)[:, None] * normals
+    vertices[:, 2] = np.maximum(vertices[:, 2], 0.0)
+    return replace(body, vertices=vertices)
+
+
+def _neighbours(faces: np.ndarray, count: int):  # noqa: ANN202
+    """A function that averages a vertex quantity over each vertex's neighbours."""
+    pairs = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    degree = np.bincount(pairs[:, 0], minlength=count).astype(np.float64)
+
+    def average(values: np.ndarray) -> np.ndarray:
+        total = np.zeros_like(values)
+        np.add.at(total, pairs[:, 0], values[pairs[:, 1]])
+        return total / (degree[:, None] if values.ndim == 2 else degree)
+
+    return average
+
+
+def _normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Unit vertex normals, shape (V, 3), weighted by area."""
+    a, b, c = (vertices[faces[:, corner]] for corner in range(3))
+    flat = np.cross(b - a, c - a)
+    total = np.zeros_like(vertices)
+    for corner in range(3):
+        np.add.at(total, faces[:, corner], flat)
+    return total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12)

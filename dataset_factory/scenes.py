@@ -41,8 +41,7 @@ def catalogue() -> list[Scene]:
         RfgsError: The list is missing or damaged.
     """
     file = catalogue_file()
-    value = read_json(file)
-    rows = (value.get("scenes") or []) if isinstance(value, dict) else value
+    rows = read_json(file)
     try:
         return [
             Scene(
@@ -50,12 +49,12 @@ def catalogue() -> list[Scene]:
                 blend=inside(file.parent, row["file"]),
                 description=row["description"],
                 fps=row["fps"],
-                frames=_frames_text(row["frames"]),
+                frames=f"{row['frame_start']}:{row['frame_end']}",
             )
             for row in rows
         ]
     except (TypeError, KeyError) as error:
-        raise RfgsFormatError(f"{file}: expected name, file, description, fps, frames") from error
+        raise RfgsFormatError(f"{file}: expected rows with {error}") from error
 
 
 def find_scene(name: str) -> Scene:
@@ -92,9 +91,3 @@ def find_scene(name: str) -> Scene:
 def blend_digest(scene: Scene) -> str:
     """SHA-256 of the Blender file."""
     return sha256(scene.blend)
-
-
-def _frames_text(frames: object) -> str:
-    if isinstance(frames, list) and len(frames) == 2:
-        return f"{frames[0]}:{frames[1]}"
-    return str(frames)

@@ -19,6 +19,16 @@ from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json, sha256
 
 
+def checksum_faults(path: Path) -> list[str]:
+    """Faults of `dataset.json` and the manifest; finds any change of any byte."""
+    file = path / "dataset.json"
+    faults = _caught(lambda: _info_faults(file))
+    if not faults:
+        manifest = read_dataset_info(file).manifest_sha256
+        faults += _caught(lambda: _manifest_faults(path, manifest))
+    return faults
+
+
 def validate(path: Path) -> list[str]:
     """Checks schema, checksums, counts, numbers, markers and physics.
 
@@ -34,13 +44,10 @@ def validate(path: Path) -> list[str]:
     file = path / "dataset.json"
     if not file.is_file():
         raise RfgsError(f"{path}: no dataset there; expected a folder with dataset.json")
-    faults = _caught(lambda: _info_faults(file))
-    if faults:
+    faults = checksum_faults(path)
+    if any(fault.startswith(f"{file}:") for fault in faults):
         return faults
     info = read_dataset_info(file)
-    if not info.manifest_sha256:
-        return [f"{file}: unfinished; run the same rfgs-factory generate again"]
-    faults += _caught(lambda: _manifest_faults(path, info.manifest_sha256))
     for name in info.sequences:
         faults += _caught(lambda name=name: _sequence_faults(Sequence(path / name, name), info.has))
     return list(dict.fromkeys(faults))
@@ -63,6 +70,8 @@ def _info_faults(file: Path) -> Iterator[str]:
         yield f"{file}: content differs from the digest it holds"
     elif file.read_text("utf-8") != json.dumps(value, indent=1, sort_keys=True) + "\n":
         yield f"{file}: altered after it was written"
+    elif not value["manifest_sha256"]:
+        yield f"{file}: unfinished; run the same rfgs-factory generate again"
 
 
 def _manifest_faults(path: Path, manifest_sha256: str) -> Iterator[str]:

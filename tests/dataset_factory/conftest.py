@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A real Blender file and a real dataset made from it, small enough for quick tests."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from dataset_factory.blender import Blender
+from dataset_factory.generate import Job, generate
+from dataset_factory.plan import make_plan
+from dataset_factory.scenes import find_scene
+
+ROOT = Path(__file__).resolve().parents[2]
+
+BuildScene = Callable[..., Path]
+MakeJob = Callable[..., Job]
+Factory = Callable[..., subprocess.CompletedProcess[str]]
+
+
+def build(out: Path, moving: str, wall: str, scale: str) -> Path:
+    builder = Path(__file__).with_name("build_tiny_scene.py")
+    subprocess.run(
+        [sys.executable, str(builder), str(out), moving, wall, scale],
+        check=True,
+        capture_output=True,
+        timeout=120,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    return out
+
+
+@pytest.fixture(scope="session")
+def build_scene(tmp_path_factory: pytest.TempPathFactory) -> BuildScene:
+    """Builds a scene: `build_scene(moving=True, wall="concrete", scale=1.0)`."""
+
+    def make(moving: bool = True, wall: str = "concrete", scale: float = 1.0) -> Path:
+        out = tmp_path_factory.mktemp("scene") / "box_room.blend"
+        return build(out, "moving" if moving else "still", wall, str(scale))
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def box_room(build_scene: BuildScene) -> Path:
+    """A box of a person's size that walks through a concrete room of 3 x 3 x 2.5 m."""
+    return build_scene()
+
+
+@pytest.fixture(scope="session")
+def make_job(box_room: Path) -> MakeJob:
+    """A job of two frames, one camera of 32 px, Wi-Fi at depth 1."""
+
+    def make(out: Path, *, frames: str = "1:2", workers: int = 1, seed: int = 0) -> Job:
+        plan = make_plan(
+            find_scene(str(box_room)),
+            ("wifi",),
+            frames,
+            cameras=1,
+            resolution=32,
+            samples=2,
+            depth=1,
+            seed=seed,
+            shadow="kirchhoff",
+            images=True,
+        )
+        return Job(out, plan, Blender(box_room), workers)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def box_dataset(make_job: MakeJob, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A finished dataset; copy it before changing anything."""
+    out = tmp_path_factory.mktemp("factory") / "dataset"
+    assert generate(make_job(out))
+    return out
+
+
+@pytest.fixture
+def box_copy(box_dataset: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(box_dataset, tmp_path / "dataset"))
+
+
+@pytest.fixture(scope="session")
+def data_of() -> Callable[[Path], dict[str, bytes]]:
+    """All bytes of a dataset but its log."""
+
+    def read(path: Path) -> dict[str, bytes]:
+        return {
+            name.as_posix(): (path / name).read_bytes()
+            for name in (file.relative_to(path) for file in path.rglob("*") if file.is_file())
+            if name.parts[0] != "log"
+        }
+
+    return read
+
+
+@pytest.fixture(scope="session")
+def unfinish() -> Callable[[Path], None]:
+    """Takes a finished dataset back to the state before its manifest was written."""
+
+    def back(path: Path) -> None:
+        from rfgs_core.dataset.schema import read_dataset_info
+        from rfgs_core.dataset.writer import write_dataset_info
+
+        info = read_dataset_info(path / "dataset.json")
+        versions = {key: value for key, value in info.versions.items() if key != "blender"}
+        write_dataset_info(path, replace(info, versions=versions, manifest_sha256=""))
+        (path / "MANIFEST.sha256").unlink()
+
+    return back
+
+
+@pytest.fixture(scope="session")
+def factory() -> Factory:
+    """Runs `rfgs-factory` in a process of its own."""
+
+    def run(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, "-m", "dataset_factory", *arguments],
+            capture_output=True,
+            text=True,
+            timeout=240,
+            cwd=ROOT,
+            env={**os.environ, **environment},
+        )
+
+    return run

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Bad input gets one clear line and a non-zero exit."""
+
+from __future__ import annotations
+
+import errno
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from dataset_factory import cli
+from dataset_factory.plan import frame_runs, parse_frames
+from rfgs_core.dataset.csi_store import chunk_file
+from rfgs_core.errors import RfgsError
+
+Factory = Callable[..., subprocess.CompletedProcess[str]]
+BuildScene = Callable[..., Path]
+
+
+def one_line(answer: subprocess.CompletedProcess[str]) -> str:
+    """The only error line of a failed command."""
+    assert answer.returncode not in (0, None), answer
+    assert "Traceback" not in answer.stderr, answer.stderr
+    lines = [line for line in answer.stderr.splitlines() if line.startswith("error:")]
+    assert len(lines) == 1, answer.stderr
+    return lines[0]
+
+
+def test_scenes_lists_the_catalogue(factory: Factory) -> None:
+    answer = factory("scenes")
+    assert answer.returncode == 0 and "living_room_walk" in answer.stdout
+
+
+def test_help_teaches(factory: Factory) -> None:
+    answer = factory("--help")
+    assert answer.returncode == 0
+    assert all(word in answer.stdout for word in ("generate", "validate", "preview", "--radio"))
+    assert one_line(factory("destroy")).startswith("error: unknown command 'destroy'")
+
+
+@pytest.mark.parametrize(
+    ("scene", "radio", "more", "words"),
+    [
+        ("missing.blend", "wifi", [], ["missing.blend", "no such Blender file"]),
+        ("nowhere", "wifi", [], ["no scene 'nowhere'", "living_room_walk"]),
+        ("text.blend", "wifi", [], ["text.blend", "not a Blender file"]),
+        ("room", "lora", [], ["unknown radio 'lora'", "mmwave, wifi"]),
+        ("room", "wifi", ["--frames", "5"], ["--frames '5'", "FIRST:LAST"]),
+        ("room", "wifi", ["--frames", "9:1"], ["FIRST <= LAST"]),
+        ("room", "wifi", ["--depth", "0"], ["--depth 0"]),
+        ("room", "wifi", ["--workers", "0"], ["--workers 0"]),
+        ("room", "wifi", ["--frames", "90:95"], ["90:95"]),
+        ("room", "wifi", ["--blender", "/no/blender"], ["/no/blender: no such program"]),
+    ],
+)
+def test_wrong_requests(
+    factory: Factory,
+    box_room: Path,
+    tmp_path: Path,
+    scene: str,
+    radio: str,
+    more: list[str],
+    words: list[str],
+) -> None:
+    (tmp_path / "text.blend").write_text("this is a letter, no Blender file")
+    target = {"room": str(box_room), "nowhere": "nowhere"}.get(scene, str(tmp_path / scene))
+    out = str(tmp_path / "out")
+    line = one_line(factory("generate", target, "--radio", radio, "--out", out, *more))
+    assert all(word in line for word in words), line
+
+
+@pytest.mark.parametrize(
+    ("scene", "words"),
+    [
+        ({"moving": False}, ["no moving mesh"]),
+        ({"wall": "floorboard"}, ["'floorboard'", "50 to 100 GHz", "5.72 to 5.88 GHz", "choose"]),
+        ({"scale": 0.1}, ["0.17 m tall", "unit scale"]),
+    ],
+)
+def test_unsuitable_scenes(
+    factory: Factory, build_scene: BuildScene, tmp_path: Path, scene: dict, words: list[str]
+) -> None:
+    out = tmp_path / "out"
+    blend = str(build_scene(**scene))
+    line = one_line(factory("generate", blend, "--radio", "wifi", "--out", str(out)))
+    assert all(word in line for word in words), line
+    assert not (out / "dataset.json").exists()
+
+
+def test_missing_and_old_llvm(factory: Factory, box_room: Path, tmp_path: Path) -> None:
+    arguments = ["generate", str(box_room), "--radio", "wifi", "--out", str(tmp_path / "out")]
+    line = one_line(factory(*arguments, DRJIT_LIBLLVM_PATH=str(tmp_path / "libLLVM.so")))
+    assert "no LLVM" in line and "libllvm19" in line
+
+
+def test_truncated_chunk_is_named(factory: Factory, box_copy: Path) -> None:
+    file = chunk_file(box_copy / "box_room/radio/wifi/csi.zarr", 0)
+    file.write_bytes(file.read_bytes()[:100])
+    answer = factory("validate", str(box_copy))
+    assert answer.returncode == 1
+    assert f"fault: {file}: truncated" in answer.stdout
+    assert str(file) in one_line(factory("preview", str(box_copy)))
+
+
+def test_ambiguous_sequence(factory: Factory, box_copy: Path) -> None:
+    from dataclasses import replace
+
+    from rfgs_core.dataset import open_dataset
+    from rfgs_core.dataset.writer import finish_dataset
+
+    (box_copy / "box_room").rename(box_copy / "one")
+    finish_dataset(box_copy, replace(open_dataset(box_copy).info, sequences=["one", "two"]))
+    assert "ambiguous sequence: it holds one, two" in one_line(factory("preview", str(box_copy)))
+
+
+def test_full_disk(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    box_room: Path,
+    tmp_path: Path,
+) -> None:
+    def full(*_args: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device", "csi.zarr")
+
+    monkeypatch.setattr("dataset_factory.generate.write_json", full)
+    command = ["generate", str(box_room), "--radio", "wifi", "--out", str(tmp_path / "out")]
+    assert cli.main(command) == 2
+    assert "error: the disk is full while writing csi.zarr" in capsys.readouterr().err
+
+
+def test_preview_draws_pictures_and_channels(factory: Factory, box_copy: Path) -> None:
+    answer = factory("preview", str(box_copy))
+    assert answer.returncode == 0, answer.stderr
+    page = Path(answer.stdout.strip())
+    text = page.read_text()
+    assert text.count("data:image/png;base64,") == 4 and "http" not in text
+    assert {file.name for file in page.parent.glob("*.png")} == {
+        "pictures.png",
+        "layers.png",
+        "wifi_profiles.png",
+        "wifi_delay_angle.png",
+    }
+    assert factory("validate", str(box_copy)).returncode == 0
+
+
+def test_frames_are_parsed_and_grouped() -> None:
+    assert parse_frames("10:45:5") == [10, 15, 20, 25, 30, 35, 40, 45]
+    assert parse_frames("-1:1") == [-1, 0, 1]
+    for text in ("", "1", "1:2:0", "a:b", "1:2:3:4", "3:1"):
+        with pytest.raises(RfgsError):
+            parse_frames(text)
+    assert frame_runs([]) == []
+    assert frame_runs([4]) == ["4:4:1"]
+    frames = [1, 2, 3, 7, 10, 13, 14]
+    runs = frame_runs(frames)
+    assert [frame for run in runs for frame in parse_frames(run)] == frames and len(runs) == 3

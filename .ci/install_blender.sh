@@ -53,14 +53,17 @@ install_suite() {
   done
   cp /etc/resolv.conf "$staging/etc/resolv.conf" 2>/dev/null || true
   DEBIAN_FRONTEND=noninteractive chroot "$staging" \
-    apt-get install -y --no-install-recommends blender python3-numpy python3-cattr >>"$log" 2>&1 || return 1
+    apt-get install -y --no-install-recommends blender python3-numpy \
+    python3-cattr python3-requests >>"$log" 2>&1 || return 1
   chroot "$staging" apt-get clean
   rm -rf "$dir/root"
   mv "$staging" "$dir/root"
 }
 
 suite=sid
-if ! install_suite sid; then
+if [ -x "$dir/root/usr/bin/blender" ]; then
+  suite="as installed before"
+elif ! install_suite sid; then
   echo "Debian unstable cannot be installed here (see $dir/install-sid.log); trying Debian 13's Blender 4.3" >&2
   rm -rf "$dir/.staging-sid"
   suite=trixie
@@ -71,32 +74,45 @@ if ! install_suite sid; then
 fi
 
 # The loader and every library come from the folder, so the host's own versions do not matter.
-cat >"$dir/blender" <<'WRAPPER'
+cat >"$dir/run" <<'WRAPPER'
 #!/bin/sh
-# Runs the Blender below this folder with its own libraries.
+# Runs a program below this folder with the folder's own libraries: run PROGRAM [ARGUMENT...]
 here=$(cd "$(dirname "$(readlink -f "$0")")" && pwd)
 root=$here/root
 arch=$(basename "$(dirname "$(ls -d "$root"/usr/lib/*-linux-gnu*/libc.so.6)")")
 lib=$root/usr/lib/$arch
 loader=$(ls "$root"/usr/lib64/ld-linux-*.so.* "$lib"/ld-linux-*.so.* 2>/dev/null | head -n 1)
-resources=$(ls -d "$root"/usr/share/blender/[0-9]* 2>/dev/null | head -n 1)
-[ -n "$resources" ] || resources=$root/usr/share/blender
-python=$(ls -d "$root"/usr/lib/python3.[0-9]* | head -n 1)
+export PYTHONHOME="$root/usr" LIBGL_DRIVERS_PATH="$lib/dri"
+unset PYTHONPATH
+program=$root/usr/bin/$1
+shift
+exec "$loader" --library-path "$lib:$lib/blas:$lib/lapack:$lib/pulseaudio:$root/usr/lib" \
+  "$program" "$@"
+WRAPPER
+cat >"$dir/blender" <<'WRAPPER'
+#!/bin/sh
+# Runs the Blender below this folder.
+here=$(cd "$(dirname "$(readlink -f "$0")")" && pwd)
+resources=$(ls -d "$here"/root/usr/share/blender/[0-9]* 2>/dev/null | head -n 1)
+[ -n "$resources" ] || resources=$here/root/usr/share/blender
 export BLENDER_SYSTEM_RESOURCES="$resources"
 export BLENDER_SYSTEM_SCRIPTS="$resources/scripts"
 export BLENDER_SYSTEM_DATAFILES="$resources/datafiles"
-export BLENDER_SYSTEM_PYTHON="$root/usr" PYTHONHOME="$root/usr"
-export LIBGL_DRIVERS_PATH="$lib/dri"
-unset PYTHONPATH
-case "$python" in '') echo "no Python below $root" >&2; exit 2 ;; esac
-exec "$loader" --library-path "$lib:$lib/blas:$lib/lapack:$lib/pulseaudio:$root/usr/lib" \
-  "$root/usr/bin/blender" "$@"
+export BLENDER_SYSTEM_PYTHON="$here/python"
+exec "$here/run" blender "$@"
 WRAPPER
-chmod +x "$dir/blender"
+# Blender starts its Python by name, for example to install extensions.
+mkdir -p "$dir/python/bin"
+ln -sfn ../root/usr/lib "$dir/python/lib"
+for python in "$dir"/root/usr/bin/python3.[0-9]*; do
+  name=$(basename "$python")
+  printf '#!/bin/sh\nexec "%s/run" %s "$@"\n' "$dir" "$name" >"$dir/python/bin/$name"
+done
+chmod +x "$dir/run" "$dir/blender" "$dir"/python/bin/*
 
 version=$(version_of "$dir/blender")
 [ -n "$version" ] || fail "$dir/blender does not start; try: $dir/blender --version"
-echo "Blender $version (Debian $suite) is ready: $dir/blender"
+echo "Blender $version (Debian, $suite) is ready: $dir/blender"
 case "$version" in
   [0-4].*) echo "warning: this is older than 5.0; tests against Blender 5 need BLENDER=/path/to/a/newer/one" >&2 ;;
 esac

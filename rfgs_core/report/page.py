@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From metrics and figures to one self-contained HTML page."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from rfgs_core.report.tables import Table
+
+
+@dataclass(frozen=True)
+class Shot:
+    """One embedded picture."""
+
+    uri: str
+    """Data URI."""
+    caption: str
+    """What it shows."""
+
+
+@dataclass(frozen=True)
+class Card:
+    """One headline number."""
+
+    value: str
+    """Number as shown."""
+    label: str
+    """What it is."""
+    note: str
+    """What stands beside it."""
+    tone: str = ""
+    """`won`, `lost` or nothing."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One sentence of judgement."""
+
+    tone: str
+    """`won`, `lost` or `open`."""
+    word: str
+    """Won, Lost or Not decided."""
+    text: str
+    """The rest of the sentence."""
+
+
+@dataclass(frozen=True)
+class RunSection:
+    """Everything about one run."""
+
+    anchor: str
+    """Fragment of the section."""
+    title: str
+    """Heading."""
+    cards: list[Card]
+    """Headline numbers."""
+    verdicts: list[Verdict]
+    """Won and lost comparisons."""
+    channel: Shot
+    """Amplitudes and delay profile."""
+    delay_angle: Shot
+    """Delay–angle images."""
+    shape: Shot
+    """Gaussians beside the true mesh."""
+    f10: Shot
+    """F10 per frame."""
+    views: list[list[Shot]]
+    """Rows of true, rendered and person-only pictures."""
+    tables: list[Table]
+    """Metrics beside controls."""
+    limits: list[tuple[str, str]]
+    """Names and values."""
+    conditions: list[tuple[str, str]]
+    """Names and values."""
+    reasons: list[tuple[str, str]]
+    """Why values are missing."""
+
+
+@dataclass(frozen=True)
+class Page:
+    """The whole page."""
+
+    title: str
+    """Heading."""
+    lead: str
+    """One sentence under it."""
+    scene: list[Shot]
+    """Pictures of the scene."""
+    runs: list[RunSection]
+    """One section per run."""
+    timings: list[tuple[str, str, float]]
+    """Stage, duration and share of the longest in percent."""
+    provenance: list[tuple[str, str]]
+    """Names and values."""
+    blender: list[Shot] = field(default_factory=list)
+    """Gaussians imported into Blender."""
+
+
+def _environment() -> Environment:
+    return Environment(
+        loader=PackageLoader("rfgs_core.report", "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+
+
+def render_page(page: Page) -> str:
+    """The page as HTML."""
+    return _environment().get_template("template.html.j2").render(page=page)
+
+
+def comparison_page(rows: list[list[str]], notes: list[str]) -> str:
+    """A comparison of two runs as HTML."""
+    template = _environment().get_template("compare.html.j2")
+    return template.render(head=rows[0], rows=rows[1:], notes=notes)
+
+
+def pairs(values: dict[str, Any]) -> list[tuple[str, str]]:
+    """Known entries of a dictionary as names in words and text."""
+    return [(name.replace("_", " "), str(value)) for name, value in values.items() if value]
+
+
+def stage_times(timings: dict[str, float]) -> list[tuple[str, str, float]]:
+    """Stages in order with duration in words and share of the longest in percent."""
+    longest = max(timings.values(), default=0.0)
+    return [
+        (name, duration(seconds), 100.0 * seconds / longest if longest > 0 else 0.0)
+        for name, seconds in timings.items()
+    ]
+
+
+def duration(seconds: float) -> str:
+    """A time in words.
+
+    Example:
+        >>> duration(75.2)
+        '1 min 15 s'
+    """
+    if seconds < 60:
+        return f"{seconds:.1f} s"
+    return f"{int(seconds // 60)} min {int(seconds % 60)} s"
+
+
+def image_file(path: Path) -> bytes | None:
+    """Bytes of a picture, None where there is none."""
+    return path.read_bytes() if path.is_file() else None

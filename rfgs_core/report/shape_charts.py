@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The true surface, the Gaussians and the matched filter from three sides."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+
+from rfgs_core.evaluate.controls.matched_filter import default_score
+from rfgs_core.evaluate.geometry import best_voxels
+from rfgs_core.evaluate.scene import Scene
+from rfgs_core.render.view import moving_gaussians
+from rfgs_core.report.charts import TRUTH, figure_uri, new_figure
+
+#: Title, horizontal and vertical axis of each side.
+SIDES = (("front", 0, 2), ("side", 1, 2), ("top", 0, 1))
+#: Margin around the true person and everything that is predicted [m].
+MARGIN_M = 0.25
+#: Gaussians are coloured over this range below the strongest [dB].
+RANGE_DB = 20.0
+#: At most so many points of the true surface are drawn.
+DRAWN = 5000
+
+
+def shape_chart(scene: Scene, frame: int) -> str:
+    """Three rows (truth, Gaussians, matched filter) by three sides."""
+    reference = scene.reference(frame)[:DRAWN]
+    score = scene.score(frame)
+    own = scene.grid.centres(best_voxels(score, scene.voxels))
+    evidence = scene.evidence(frame, score)
+    filtered = scene.grid.centres(best_voxels(default_score(evidence), scene.voxels))
+    means, power_db = _strong_gaussians(scene, frame)
+    low, high = _frame_bounds(scene, [reference, own, filtered])
+    with new_figure(10.5, 10.0) as figure:
+        axes = figure.subplots(3, 3)
+        for column, (side, across, up) in enumerate(SIDES):
+            for row in range(3):
+                axis = axes[row, column]
+                faint = 0.35 if row == 0 else 0.12
+                axis.scatter(
+                    reference[:, across], reference[:, up], s=1.2, c=TRUTH, alpha=faint, lw=0
+                )
+                axis.set(
+                    xlim=(low[across], high[across]),
+                    ylim=(low[up], high[up]),
+                    aspect="equal",
+                    xlabel="xyz"[across] + " [m]",
+                    ylabel="xyz"[up] + " [m]",
+                )
+            axes[0, column].set_title(f"true mesh, {side}")
+            axes[1, column].set_title(f"RF-GS Gaussians, {side}")
+            axes[2, column].set_title(f"matched filter, best {scene.voxels} voxels, {side}")
+            points = axes[1, column].scatter(
+                means[:, across],
+                means[:, up],
+                s=5,
+                c=power_db,
+                cmap="plasma",
+                vmin=-RANGE_DB,
+                vmax=0,
+                alpha=0.8,
+                lw=0,
+            )
+            axes[2, column].scatter(
+                filtered[:, across], filtered[:, up], s=5, c="#3f88c5", alpha=0.35, lw=0
+            )
+        bar = figure.colorbar(points, ax=axes[1, :], shrink=0.8, pad=0.01)
+        bar.set_label("reflected power [dB]")
+        bar.outline.set_visible(False)  # type: ignore[operator]
+        return figure_uri(figure)
+
+
+def _strong_gaussians(
+    scene: Scene, frame: int
+) -> tuple[Float[np.ndarray, "M 3"], Float[np.ndarray, "M"]]:
+    """Centres and power below the strongest [dB] of the Gaussians worth drawing, weak first."""
+    gaussians = moving_gaussians(scene.run, frame)
+    power_db = np.asarray(scene.run.attributes(frame)["rf_power_db"], dtype=np.float64)
+    power_db = power_db[len(power_db) - len(gaussians) :]
+    means = gaussians.means.numpy()
+    if len(means) == 0:
+        return means, power_db
+    power_db = power_db - power_db.max()
+    order = np.argsort(power_db)
+    order = order[power_db[order] > -RANGE_DB]
+    return means[order], power_db[order]
+
+
+def _frame_bounds(
+    scene: Scene, clouds: list[Float[np.ndarray, "n 3"]]
+) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+    """Common limits of all panels: what is shown, within the scene."""
+    points = np.concatenate(clouds)
+    low, high = scene.run.sequence.bounds_m
+    return (
+        np.maximum(points.min(axis=0) - MARGIN_M, low),
+        np.minimum(points.max(axis=0) + MARGIN_M, high),
+    )

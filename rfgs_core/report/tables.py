@@ -1,0 +1,227 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tables of metrics: the method beside its controls, and two runs beside each other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+METHOD_LABEL = "RF-GS"
+
+
+@dataclass(frozen=True)
+class Column:
+    """One metric of a table."""
+
+    key: str
+    """Key within its group of `metrics.json`."""
+    label: str
+    """Heading."""
+    unit: str
+    """Unit, empty for a ratio."""
+    higher_is_better: bool
+    """Direction in which the metric improves."""
+    digits: int
+    """Decimal places shown."""
+    explanation: str
+    """One sentence for readers who do not know it."""
+
+
+#: Group of `metrics.json` → title and columns.
+GROUPS: dict[str, tuple[str, tuple[Column, ...]]] = {
+    "geometry": (
+        "Geometry of what moves",
+        (
+            Column("f05", "F5", "", True, 3, "F-score at 5 cm, K voxels, mean over frames"),
+            Column("f10", "F10", "", True, 3, "F-score at 10 cm, K voxels, mean over frames"),
+            Column("f20", "F20", "", True, 3, "F-score at 20 cm, K voxels, mean over frames"),
+            Column("f10_best", "F10 best K", "", True, 3, "best F10 over the number of voxels"),
+            Column("chamfer_m", "Chamfer", "m", False, 3, "mean of both mean nearest distances"),
+            Column("centroid_m", "centroid", "m", False, 3, "distance between the centroids"),
+            Column("height_m", "height", "m", False, 3, "error of the vertical extent"),
+            Column("tracked", "tracked", "", True, 2, "share of frames with centroid in 0.5 m"),
+        ),
+    ),
+    "rf": (
+        "Held-out channel, csi − csi_static",
+        (
+            Column("element_snr_db", "elements", "dB", True, 1, "SNR on unseen array columns"),
+            Column("subcarrier_snr_db", "subcarriers", "dB", True, 1, "SNR on unseen tones"),
+            Column("device_gain_mae_db", "pair gain", "dB", False, 1, "error on unseen pairs"),
+            Column("delay_profile_corr", "delay profile", "", True, 2, "correlation, unseen links"),
+        ),
+    ),
+    "rf_csi": (
+        "Held-out channel, whole csi (secondary)",
+        (
+            Column("element_snr_db", "elements", "dB", True, 1, "SNR on unseen array columns"),
+            Column("subcarrier_snr_db", "subcarriers", "dB", True, 1, "SNR on unseen tones"),
+            Column("device_gain_mae_db", "pair gain", "dB", False, 1, "error on unseen pairs"),
+            Column("delay_profile_corr", "delay profile", "", True, 2, "correlation, unseen links"),
+        ),
+    ),
+    "image": (
+        "Pictures the shader never saw (display)",
+        (
+            Column("psnr", "PSNR", "dB", True, 1, "whole picture"),
+            Column("psnr_person", "PSNR person", "dB", True, 1, "true ∪ predicted mask on grey"),
+            Column("ssim", "SSIM", "", True, 3, "structural similarity"),
+            Column("lpips", "LPIPS", "", False, 3, "learned distance"),
+        ),
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One value of a table."""
+
+    text: str
+    """Value as shown, a dash where there is none."""
+    best: bool = False
+    """Whether no competitor is better."""
+    why: str = ""
+    """Why there is no value."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One method or control."""
+
+    label: str
+    """Name."""
+    kind: str
+    """`method`, `control` or `ceiling`."""
+    cells: list[Cell]
+    """One per column."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A group of metrics, method first."""
+
+    title: str
+    """Heading."""
+    columns: tuple[Column, ...]
+    """Metrics."""
+    rows: list[Row]
+    """Method, controls, ceiling."""
+    losses: list[str]
+    """In words: where a control does at least as well as the method."""
+
+
+def metric_tables(metrics: Mapping[str, Any]) -> list[Table]:
+    """All tables of a run; controls without any value of a group are left out of it."""
+    return [_table(metrics, group) for group in GROUPS if metrics.get(group)]
+
+
+def _table(metrics: Mapping[str, Any], group: str) -> Table:
+    title, columns = GROUPS[group]
+    values = {METHOD_LABEL: metrics[group]}
+    for name, control in metrics["controls"].items():
+        part = control.get(group) or {}
+        # A required control stays visible, with the reason, even if it has no value here.
+        if any(part.get(column.key) is not None for column in columns) or _is_wanted(name, group):
+            values[name] = part
+    best = {column.key: _best(values, column) for column in columns}
+    rows = []
+    for name, part in values.items():
+        cells = [
+            Cell(
+                text=show(part.get(column.key), column.digits),
+                best=part.get(column.key) is not None
+                and part[column.key] == best[column.key]
+                and name != "oracle_init",
+                why=_reason(metrics, name, group, column.key),
+            )
+            for column in columns
+        ]
+        rows.append(Row(name, _kind(name), cells))
+    return Table(title, columns, rows, _losses(values, columns))
+
+
+def _is_wanted(name: str, group: str) -> bool:
+    return name == "oracle_init" and group == "geometry"
+
+
+def _kind(name: str) -> str:
+    return {METHOD_LABEL: "method", "oracle_init": "ceiling"}.get(name, "control")
+
+
+def _best(values: Mapping[str, Mapping[str, Any]], column: Column) -> float | None:
+    known = [
+        part[column.key]
+        for name, part in values.items()
+        if name != "oracle_init" and part.get(column.key) is not None
+    ]
+    if not known:
+        return None
+    return max(known) if column.higher_is_better else min(known)
+
+
+def _losses(values: Mapping[str, Mapping[str, Any]], columns: tuple[Column, ...]) -> list[str]:
+    """Sentences on every metric in which a control does at least as well."""
+    sentences = []
+    own = values[METHOD_LABEL]
+    for column in columns:
+        mine = own.get(column.key)
+        if mine is None:
+            continue
+        sign = 1.0 if column.higher_is_better else -1.0
+        better = [
+            f"{name} ({show(part[column.key], column.digits)})"
+            for name, part in values.items()
+            if _kind(name) == "control"
+            and part.get(column.key) is not None
+            and sign * part[column.key] >= sign * mine
+        ]
+        if better:
+            unit = f" {column.unit}" if column.unit else ""
+            sentences.append(
+                f"{column.label}: {METHOD_LABEL} ({show(mine, column.digits)}{unit}) loses to "
+                f"{', '.join(better)}."
+            )
+    return sentences
+
+
+def _reason(metrics: Mapping[str, Any], name: str, group: str, key: str) -> str:
+    """The stored reason nearest to a missing value."""
+    reasons = metrics.get("reasons", {})
+    start = "" if name == METHOD_LABEL else f"controls.{name}."
+    paths = [f"{start}{group}.{key}", f"{start}{group}", start.rstrip("."), f"{group}.{key}", group]
+    if group == "image":
+        paths.append("controls.*.image")
+    return next((reasons[path] for path in paths if path in reasons), "not computed")
+
+
+def show(value: float | None, digits: int) -> str:
+    """A number with fixed decimals and a true minus sign; a dash for None."""
+    return "–" if value is None else f"{value:.{digits}f}".replace("-", "−")
+
+
+def text_table(metrics: Mapping[str, Any]) -> str:
+    """All tables for a terminal; the best value of a column carries a star."""
+    blocks = []
+    for table in metric_tables(metrics):
+        heads = ["", *(f"{c.label} [{c.unit}]" if c.unit else c.label for c in table.columns)]
+        body = [[row.label, *(_starred(cell) for cell in row.cells)] for row in table.rows]
+        blocks.append(f"{table.title}  (* best)\n{align([heads, *body])}")
+    return "\n".join(blocks) + "\n"
+
+
+def _starred(cell: Cell) -> str:
+    return f"{cell.text}{'*' if cell.best else ' '}"
+
+
+def align(rows: list[list[str]]) -> str:
+    """Rows of text in columns: the first to the left, the others to the right."""
+    width = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    lines = []
+    for row in rows:
+        cells = [
+            row[0].ljust(width[0]),
+            *(c.rjust(w) for c, w in zip(row[1:], width[1:], strict=True)),
+        ]
+        lines.append("  ".join(cells).rstrip())
+    return "\n".join(lines) + "\n"

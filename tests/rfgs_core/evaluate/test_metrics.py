@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rfgs_core.evaluate.controls import CONTROLS
+from rfgs_core.evaluate.geometry import GEOMETRY_KEYS
+from rfgs_core.evaluate.image import IMAGE_KEYS
+from rfgs_core.evaluate.metrics import evaluate_run
+from rfgs_core.evaluate.rf import RF_KEYS
+from rfgs_core.evaluate.verdicts import LOST, WON, verdicts
+
+REQUIRED = (
+    "zero",
+    "nearest_element",
+    "matched_filter",
+    "template",
+    "empty_room",
+    "silhouette",
+    "oracle_init",
+)
+
+
+@pytest.fixture
+def metrics(surface_run) -> dict[str, Any]:
+    return evaluate_run(surface_run, oracle=False)
+
+
+def walk(value: Any, path: str = ""):
+    if isinstance(value, dict):
+        for key, part in value.items():
+            yield from walk(part, f"{path}.{key}")
+    elif isinstance(value, list):
+        for index, part in enumerate(value):
+            yield from walk(part, f"{path}[{index}]")
+    else:
+        yield path, value
+
+
+def test_metrics_hold_every_promised_group(metrics, surface_run) -> None:
+    stored = json.loads((surface_run.path / "metrics.json").read_text())
+    assert stored == metrics
+    for groups in (metrics, *(metrics["controls"][name] for name in (*REQUIRED, *CONTROLS))):
+        assert set(groups["geometry"]) == set(GEOMETRY_KEYS)
+        assert set(RF_KEYS) <= set(groups["rf"])
+        assert set(groups["image"]) == set(IMAGE_KEYS)
+    assert set(metrics["limits"]) == {"range_resolution_m", "cross_range_m"}
+    assert metrics["trace_depth"] == 1
+    assert metrics["n_gaussians"] == 600
+    assert metrics["train_s"] == 1.5
+    assert [row["frame"] for row in metrics["frames"]] == [1, 2]
+    for path, value in walk(metrics):
+        assert not isinstance(value, float) or math.isfinite(value), path
+
+
+def test_gaussians_on_the_surface_find_it_and_their_channel_counts(metrics) -> None:
+    # The ball has 1.1 m² of surface, K follows from 1.6 m²: precision suffers a little.
+    assert metrics["geometry"]["f10"] > 0.95
+    assert metrics["geometry"]["centroid_m"] < 0.03
+    assert metrics["rf"]["element_snr_db"] == pytest.approx(20.0, abs=1e-3)
+    assert metrics["rf"]["subcarrier_snr_db"] == pytest.approx(20.0, abs=1e-3)
+    assert metrics["rf"]["device_gain_mae_db"] == pytest.approx(0.915, abs=1e-3)
+    assert metrics["controls"]["zero"]["rf"]["element_snr_db"] == pytest.approx(0.0, abs=1e-9)
+    assert any(line.startswith(WON) and "matched_filter" in line for line in metrics["verdicts"])
+
+
+def test_missing_values_have_reasons(metrics) -> None:
+    assert "--no-oracle" in metrics["reasons"]["controls.oracle_init"]
+    if metrics["image"]["lpips"] is None:
+        assert metrics["reasons"]["image.lpips"]
+    assert metrics["controls"]["linear"]["geometry"]["f10"] is None
+    assert metrics["reasons"]["controls.linear"]
+
+
+def test_pictures_have_their_controls(metrics) -> None:
+    assert metrics["image"]["psnr"] is not None
+    silhouette = metrics["controls"]["silhouette"]["image"]
+    empty = metrics["controls"]["empty_room"]["image"]
+    # The ball is one colour, so the silhouette is almost the true picture.
+    assert silhouette["psnr_person"] > 35.0 > empty["psnr_person"]
+    assert silhouette["psnr"] > empty["psnr"]
+
+
+def test_a_displaced_fit_is_reported_as_losing(surface_run) -> None:
+    surface_run.shift_m = np.array([0.8, 0.0, 0.0])
+    metrics = evaluate_run(surface_run, oracle=False)
+    assert metrics["geometry"]["f10"] < 0.1
+    assert metrics["geometry"]["tracked"] == 0.0
+    assert metrics["geometry"]["centroid_m"] == pytest.approx(0.8, abs=0.05)
+    line = metrics["verdicts"][0]
+    assert line.startswith(LOST)
+    assert "half a metre" in line
+
+
+def judged(own: float, control: float, oracle: float | None) -> str:
+    def group(f10: float | None) -> dict[str, Any]:
+        return {"geometry": {"f05": f10, "f10": f10}, "rf": {}, "image": {}}
+
+    controls = {name: group(None) for name in CONTROLS} | {
+        "matched_filter": group(control),
+        "oracle_init": group(oracle),
+    }
+    limits = {"range_resolution_m": 0.9, "cross_range_m": 0.6}
+    return verdicts({**group(own), "controls": controls, "limits": limits})[0]
+
+
+def test_a_lost_comparison_says_whether_the_optimisation_is_at_fault() -> None:
+    assert judged(0.5, 0.4, None) == "Won: F10 0.500 against 0.400 of matched_filter (+0.100)."
+    assert "optimisation is at fault" in judged(0.4, 0.5, 0.8)
+    assert "data and the model set the limit" in judged(0.4, 0.5, 0.45)
+    assert "not known" in judged(0.4, 0.5, None)
+
+
+def test_evaluation_is_repeatable(metrics, surface_run) -> None:
+    again = evaluate_run(surface_run, oracle=False)
+    for key in ("geometry", "rf", "rf_csi", "image", "controls", "frames"):
+        assert again[key] == metrics[key], key

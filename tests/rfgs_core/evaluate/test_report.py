@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from rfgs_core.cli.compare import CompareArgs
+from rfgs_core.cli.compare import run as compare
+from rfgs_core.errors import RfgsError
+from rfgs_core.evaluate.metrics import evaluate_run
+from rfgs_core.report import write_demo_report, write_run_report
+from rfgs_core.report.tables import metric_tables, show, text_table
+
+HEADINGS = (
+    "What the radio measures",
+    "Gaussians beside the true mesh",
+    "Rendered beside true views",
+    "Every metric beside its controls",
+    "Resolution limits",
+    "Conditions",
+    "Time of each stage",
+    "Provenance",
+)
+
+
+@pytest.fixture
+def evaluated(surface_run):
+    surface_run.path.joinpath("config.json").write_text("{}")
+    evaluate_run(surface_run, oracle=False)
+    return surface_run
+
+
+def assert_whole(html: str) -> None:
+    for heading in HEADINGS:
+        assert heading in html, heading
+    # Text only: base64 may hold any letters.
+    text = re.sub(r"data:image/png;base64,[A-Za-z0-9+/=]+", "", html)
+    assert not re.search(r"\b(nan|None|inf|undefined)\b", text)
+    assert not re.search(r"(src|href)=\"(https?:)?//", text)
+    assert text.count("<table") == text.count("</table>")
+
+
+def test_run_report_has_every_section_and_nothing_missing(evaluated) -> None:
+    html = write_run_report(evaluated).read_text("utf-8")
+    assert_whole(html)
+    assert html.count("data:image/png") >= 4 + 4
+    for name in ("matched_filter", "template", "oracle_init", "silhouette", "nearest_element"):
+        assert name in html
+    assert "loses to" in html
+
+
+def test_demo_report_shows_runs_times_and_the_blender_picture(evaluated, tmp_path: Path) -> None:
+    demo = tmp_path / "demo"
+    demo.mkdir()
+    (demo / "inspect.png").write_bytes(b"\x89PNG")
+    path = write_demo_report(demo, [evaluated], {"generate": 75.2, "train wifi": 12.0})
+    html = path.read_text("utf-8")
+    assert_whole(html)
+    assert path == demo / "report.html"
+    assert "1 min 15 s" in html and "train wifi" in html
+    assert "imported into Blender" in html
+
+
+def test_report_before_evaluation_says_what_to_do(surface_run) -> None:
+    surface_run.path.joinpath("config.json").write_text("{}")
+    with pytest.raises(RfgsError, match="rfgs eval"):
+        write_run_report(surface_run)
+
+
+def test_tables_mark_the_best_and_say_who_wins(evaluated) -> None:
+    metrics = json.loads((evaluated.path / "metrics.json").read_text())
+    geometry = metric_tables(metrics)[0]
+    assert geometry.rows[0].kind == "method"
+    assert geometry.rows[0].cells[1].best
+    rf = metric_tables(metrics)[1]
+    assert any("loses to" in line for line in rf.losses) == (not rf.rows[0].cells[0].best)
+    assert "F10" in text_table(metrics)
+
+
+def test_missing_numbers_are_dashes_and_minus_signs_are_true() -> None:
+    assert show(None, 2) == "–"
+    assert show(-1.25, 1) == "−1.2"
+
+
+def test_compare_prints_and_writes_both_kinds(evaluated, tmp_path: Path, capsys) -> None:
+    other = tmp_path / "other"
+    other.mkdir()
+    for name in ("config.json", "metrics.json"):
+        shutil.copy(evaluated.path / name, other / name)
+    metrics = json.loads((other / "metrics.json").read_text())
+    metrics["geometry"]["f10"] = 0.1
+    metrics["conditions"]["radio"] = "mmwave"
+    (other / "metrics.json").write_text(json.dumps(metrics))
+    for suffix in ("md", "html"):
+        out = tmp_path / f"table.{suffix}"
+        assert compare(CompareArgs(evaluated.path, other, out)) == 0
+        assert "geometry.f10" in out.read_text("utf-8")
+    text = capsys.readouterr().out
+    assert "Not the same conditions: radio: wifi against mmwave" in text
+    row = next(line for line in text.splitlines() if line.startswith("geometry.f10 "))
+    assert row.endswith(evaluated.path.name)
+
+
+@pytest.mark.parametrize("make", [False, True])
+def test_compare_refuses_what_is_no_evaluated_run(evaluated, tmp_path: Path, make: bool) -> None:
+    other = tmp_path / "not_a_run"
+    other.mkdir()
+    if make:
+        (other / "config.json").write_text("{}")
+    with pytest.raises(RfgsError, match="rfgs eval" if make else "config.json"):
+        compare(CompareArgs(evaluated.path, other))
+
+
+def test_compare_refuses_other_file_types(evaluated, tmp_path: Path) -> None:
+    with pytest.raises(RfgsError, match=r"\.md or \.html"):
+        compare(CompareArgs(evaluated.path, evaluated.path, tmp_path / "table.pdf"))

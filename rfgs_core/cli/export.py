@@ -7,10 +7,14 @@ import logging
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import tyro
 
 from rfgs_core.errors import RfgsError
+
+if TYPE_CHECKING:
+    from rfgs_core.render.view import TrainedRun
 
 _LOG = logging.getLogger(__name__)
 
@@ -29,13 +33,23 @@ class ExportArgs:
 
 def run(args: ExportArgs) -> int:
     """Writes the file; exit code 0."""
+    from rfgs_core.run import open_run
+
+    export_run(open_run(args.run), args)
+    return 0
+
+
+def export_run(trained: TrainedRun, args: ExportArgs) -> None:
+    """Writes one frame of an opened run.
+
+    Raises:
+        RfgsError: The file name does not end in .ply, or the run has no such frame.
+    """
     from rfgs_core.gaussians.ply import write_ply
     from rfgs_core.render.view import colored_cloud, fitted_shader
-    from rfgs_core.run import open_run
 
     if args.out.suffix.lower() != ".ply":
         raise RfgsError(f"{args.out}: expected a file name ending in .ply")
-    trained = open_run(args.run)
     frame = trained.frames[0] if args.frame is None else args.frame
     if frame not in trained.frames:
         raise RfgsError(
@@ -47,4 +61,3 @@ def run(args: ExportArgs) -> int:
     cloud = colored_cloud(trained, frame, shader)
     write_ply(args.out, cloud)
     sys.stdout.write(f"{args.out}: {len(cloud)} Gaussians of frame {frame}\n")
-    return 0

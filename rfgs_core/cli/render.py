@@ -41,13 +41,23 @@ class RenderArgs:
 
 def run(args: RenderArgs) -> int:
     """Writes the pictures; exit code 0."""
+    from rfgs_core.run import open_run
+
+    render_run(open_run(args.run), args)
+    return 0
+
+
+def render_run(trained: TrainedRun, args: RenderArgs) -> None:
+    """Writes the pictures of an opened run.
+
+    Raises:
+        RfgsError: The run has no such frame, or the split no picture of it.
+    """
     from tqdm import tqdm
 
     from rfgs_core.dataset.pictures import write_png
     from rfgs_core.render.view import camera_of, fitted_shader, render_person, render_view
-    from rfgs_core.run import open_run
 
-    trained = open_run(args.run)
     if fitted_shader(trained) is None:
         _LOG.warning("%s: no shader has been fitted, so the Gaussians are grey", args.run)
     draw = render_person if args.person_only else render_view
@@ -59,7 +69,6 @@ def run(args: RenderArgs) -> int:
         if true is not None:
             file = args.out / name / f"{frame:06d}_beside_true.png"
             write_png(file, _side_by_side(rendered, true))
-    return 0
 
 
 def _chosen(trained: TrainedRun, args: RenderArgs) -> list[tuple[str, int]]:

@@ -8,6 +8,8 @@ bytes for any number of threads.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,6 +26,9 @@ from rfgs_core.render.tiles import TILE_PX, TiledSplats, tile_splats
 
 #: A pixel is finished when less light than this passes; bounds the error of stopping early.
 LIGHT_MIN = 1e-5
+
+#: Pictures with fewer tile entries are drawn by one thread: waking others takes longer.
+SMALL_ENTRIES = 4096
 
 
 @dataclass(frozen=True)
@@ -80,8 +85,19 @@ def splat(gaussians: Gaussians, rgb: Float[Tensor, "M 3"], camera: Camera) -> Sp
 
 def _blend(values: np.ndarray, tiles: TiledSplats) -> np.ndarray:
     picture = np.zeros((tiles.height, tiles.width, values.shape[1]))
-    _blend_tiles(picture, values, tiles.splats, tiles.starts, tiles.entries)
+    with _threads_for(tiles):
+        _blend_tiles(picture, values, tiles.splats, tiles.starts, tiles.entries)
     return picture
+
+
+@contextmanager
+def _threads_for(tiles: TiledSplats) -> Iterator[None]:
+    before = numba.get_num_threads()
+    numba.set_num_threads(1 if len(tiles.entries) < SMALL_ENTRIES else before)
+    try:
+        yield
+    finally:
+        numba.set_num_threads(before)
 
 
 class _Blend(torch.autograd.Function):
@@ -99,7 +115,8 @@ class _Blend(torch.autograd.Function):
         tiles: TiledSplats = ctx.tiles
         towards = np.ascontiguousarray(grad.detach().cpu().numpy().astype(np.float64))
         shares = np.zeros((len(tiles.entries), towards.shape[2]))
-        _blend_backward_tiles(shares, towards, tiles.splats, tiles.starts, tiles.entries)
+        with _threads_for(tiles):
+            _blend_backward_tiles(shares, towards, tiles.splats, tiles.starts, tiles.entries)
         total = np.zeros(ctx.shape)
         _sum_shares(total, shares, tiles.entries, tiles.rows)
         return torch.from_numpy(total).to(grad), None

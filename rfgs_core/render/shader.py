@@ -9,7 +9,8 @@ finished `SplatPlan` and features without gradient, so pictures cannot reach the
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -154,6 +155,13 @@ def fit_shader(
     """
     if not views:
         raise RfgsError("no training picture to fit the shader to; the test split holds them all")
+    with _one_thread():
+        return _fit(views, config, on_step)
+
+
+def _fit(
+    views: Sequence[TrainingView], config: ShaderConfig, on_step: Callable[[float], None] | None
+) -> Shader:
     rms = _feature_rms([view.features for view in views])
     generator = torch.Generator().manual_seed(sub_seed(config.seed, "shader"))
     weights = {
@@ -172,6 +180,20 @@ def fit_shader(
             on_step(float(loss.detach()))
     final = _standardised(weights, rms)
     return Shader(W1=final.W1.detach(), W2=final.W2.detach(), W3=final.W3.detach())
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Sums of matrices in one order, so that the shader does not depend on the machine's cores.
+
+    The matrices are small, one thread is also the faster choice.
+    """
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
 
 
 def _standardised(weights: dict[str, Tensor], rms: Tensor) -> Shader:

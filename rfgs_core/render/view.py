@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, Protocol
 
@@ -14,7 +15,7 @@ from jaxtyping import Float32, UInt8
 from rfgs_core.dataset.reader import Sequence
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.gaussians.model import Gaussians
-from rfgs_core.gaussians.ply import GaussianCloud, cloud_of
+from rfgs_core.gaussians.ply import GaussianCloud, cloud_of, read_ply, write_ply
 from rfgs_core.render.cameras import Camera
 from rfgs_core.render.rasterizer import plan_splats, splat
 from rfgs_core.render.shader import MID_GREY, Shader, ShaderConfig, TrainingView, fit_shader
@@ -166,11 +167,38 @@ def fit_run_shader(
 ) -> Shader:
     """Fits the shader to the run's training pictures and stores it in the run.
 
-    The Gaussians stay as they are: only `shader.npz` is written.
+    Writes `shader.npz` and the colours in the run's PLY files; everything else in them keeps its
+    bytes.
     """
     shader = fit_shader(training_views(run), config, on_step)
     shader.save(run.path / SHADER_FILE)
+    color_run_files(run, shader)
     return shader
+
+
+def color_run_files(run: TrainedRun, shader: Shader | None) -> None:
+    """Sets the colours of the run's PLY files, those that exist; grey without a shader.
+
+    Raises:
+        RfgsFormatError: A file holds another number of Gaussians than the run.
+    """
+    first = run.frames[0]
+    everything = run.gaussians(first).detach()
+    static = torch.arange(len(everything)) < len(everything) - len(moving_gaussians(run, first))
+    sets = {"point_cloud.ply": everything, "gaussians/static.ply": everything.select(static)}
+    for frame in run.frames:
+        sets[f"gaussians/{frame:06d}.ply"] = moving_gaussians(run, frame)
+    for name, gaussians in sets.items():
+        path = run.path / name
+        if not path.is_file():
+            continue
+        stored = read_ply(path)
+        if len(stored) != len(gaussians):
+            raise RfgsFormatError(
+                f"{path}: holds {len(stored)} Gaussians, the run {len(gaussians)}"
+            )
+        colored = cloud_of(gaussians, _shade(shader, gaussians).numpy())
+        write_ply(path, replace(stored, f_dc=colored.f_dc))
 
 
 def colored_cloud(run: TrainedRun, frame: int, shader: Shader | None) -> GaussianCloud:

@@ -10,7 +10,7 @@ import torch
 
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.render.bench import bench_raster, random_cloud
-from rfgs_core.render.rasterizer import plan_splats, splat
+from rfgs_core.render.rasterizer import SMALL_ENTRIES, plan_splats, splat
 from rfgs_core.render.reference import splat_plain
 from rfgs_core.render.splat import NEAR_M
 
@@ -143,7 +143,8 @@ def test_geometry_gets_no_gradient(camera, gaussians) -> None:
 
 
 def test_bytes_do_not_depend_on_the_number_of_threads() -> None:
-    cloud, rgb, eye = random_cloud(800, 64, seed=6)
+    cloud, rgb, eye = random_cloud(3000, 64, seed=6)
+    assert len(plan_splats(cloud, eye).tiles.entries) > SMALL_ENTRIES
 
     def draw() -> tuple[bytes, bytes]:
         colors = rgb.clone().requires_grad_()

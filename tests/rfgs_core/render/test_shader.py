@@ -10,13 +10,17 @@ import pytest
 import torch
 
 from rfgs_core.errors import RfgsError, RfgsFormatError
+from rfgs_core.gaussians import Gaussians
+from rfgs_core.gaussians.ply import cloud_of, write_ply
 from rfgs_core.render.shader import Shader, ShaderConfig, fit_shader
 from rfgs_core.render.view import (
     SHADER_FILE,
     camera_of,
+    color_run_files,
     colored_cloud,
     fit_run_shader,
     fitted_shader,
+    moving_gaussians,
     pictures_of,
     render_person,
     render_view,
@@ -135,6 +139,35 @@ def test_pictures_leave_gaussians_untouched(hand_made_run) -> None:
         assert value.grad is None
         assert value.detach().numpy().tobytes() == content
     assert [path.name for path in hand_made_run.path.iterdir()] == [SHADER_FILE]
+
+
+def test_only_colours_change_in_the_files_of_a_run(hand_made_run) -> None:
+    files = {f"gaussians/{frame:06d}.ply": cloud for frame, cloud in hand_made_run.clouds.items()}
+    files["point_cloud.ply"] = hand_made_run.clouds[hand_made_run.frames[0]]
+    power = {
+        name: np.linspace(-70, -50, len(cloud), dtype=np.float32) for name, cloud in files.items()
+    }
+    for name, cloud in files.items():
+        write_ply(hand_made_run.path / name, cloud_of(cloud, None, power[name]))
+    shader = fit_run_shader(hand_made_run, QUICK)
+    for name, cloud in files.items():
+        expected = cloud_of(cloud, shader.colors(cloud.features).numpy(), power[name])
+        write_ply(hand_made_run.path / "expected.ply", expected)
+        content = (hand_made_run.path / name).read_bytes()
+        assert content == (hand_made_run.path / "expected.ply").read_bytes()
+    write_ply(hand_made_run.path / "point_cloud.ply", cloud_of(Gaussians.none()))
+    with pytest.raises(RfgsFormatError, match="holds 0 Gaussians"):
+        color_run_files(hand_made_run, shader)
+
+
+def test_static_gaussians_come_before_the_moving_ones(hand_made_run, gaussians) -> None:
+    moving = hand_made_run.clouds[1]
+    attributes = hand_made_run.attributes(1)
+    hand_made_run.clouds[1] = Gaussians.join(gaussians([[9.0, 9.0, 9.0]]), moving)
+    hand_made_run.attributes = lambda frame: attributes
+    assert torch.equal(moving_gaussians(hand_made_run, 1).means, moving.means)
+    # Reflected power is known of the moving ones alone, so the joined file does not claim it.
+    assert colored_cloud(hand_made_run, 1, None).rf_power_db is None
 
 
 def test_unseen_pictures_get_better_and_test_pictures_do_not_count(hand_made_run) -> None:

@@ -100,7 +100,7 @@ class ShaderConfig:
         """Rate and steps of a training recipe.
 
         `paper` has its learning rate 1e-4 and 10,000 steps (section 3.6), one picture each.
-        `rfgs` takes a fiftieth of the steps at a larger rate: the features are standardised.
+        `rfgs` takes far fewer steps at a larger rate: the features are standardised.
 
         Raises:
             RfgsError: The recipe is unknown.
@@ -108,7 +108,7 @@ class ShaderConfig:
         if recipe == "paper":
             return ShaderConfig(learning_rate=1e-4, steps=10_000, pictures_per_step=1, seed=seed)
         if recipe == "rfgs":
-            return ShaderConfig(learning_rate=1e-2, steps=200, seed=seed)
+            return ShaderConfig(learning_rate=1e-2, steps=150, pictures_per_step=3, seed=seed)
         raise RfgsError(f"unknown recipe {recipe!r}; expected paper or rfgs")
 
 

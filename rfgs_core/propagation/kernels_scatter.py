@@ -18,6 +18,7 @@ results do not depend on the number of threads.
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -76,7 +77,7 @@ class Plan(NamedTuple):
 @njit(inline="always", **OPTIONS)
 def _leg(x: float, y: float, z: float) -> Any:
     """Length of a vector, its inverse and the unit vector."""
-    length = np.sqrt(x * x + y * y + z * z)
+    length = math.sqrt(x * x + y * y + z * z)
     inverse = 1.0 / length
     return length, inverse, x * inverse, y * inverse, z * inverse
 

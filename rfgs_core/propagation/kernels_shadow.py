@@ -9,6 +9,7 @@ Gaussian seen edge-on cancels. The rest runs in the precision of the Gaussians, 
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,8 +20,11 @@ from rfgs_core.propagation.lanes import FAST_MATH, LANES, exponential, sine_cosi
 
 #: Below this exponent a shadow is left out: e^-18 = 1.5e-8.
 LOWEST_EXPONENT = -18.0
-#: Keeps divisions finite; determinants squared lie above for any blob over a tenth of a millimetre.
+#: Keeps divisions finite, where `max` would keep the compiler from making vector code; squared
+#: determinants of any blob over a tenth of a millimetre lie far above it.
 _TINY = 1e-36
+#: Products below this are zero: no denormal numbers, which the processor handles very slowly.
+_LEAST = 1e-15
 
 #: Rows of the work array, one number per Gaussian of the block in each.
 _X, _Y, _KAPPA, _SLOPE, _EDGE, _EDGE_SLOPE, _ALPHA, _XX, _YY, _XY, _DET, _LOG = range(12)
@@ -99,13 +103,13 @@ def _spread(screens: Screens, leg: np.ndarray, first: int, n: int, w: np.ndarray
         xx, yy = _form(screens.shape, i, f2), _form(screens.shape, i, s2)
         xy = _form(screens.shape, i, fs)
         w[_XX, b], w[_YY, b], w[_XY, b] = xx, yy, xy
-        w[_DET, b] = xx * yy - xy * xy
+        w[_DET, b] = abs(xx * yy - xy * xy)
     for b in range(n):
         x, y, kappa = w[_X, b], w[_Y, b], w[_KAPPA, b]
         xx, yy, xy = w[_XX, b], w[_YY, b], w[_XY, b]
         p, q = w[_DET, b] - kappa * kappa, -kappa * (xx + yy)
         u, v = yy * x * x + xx * y * y - (xy + xy) * x * y, -kappa * (x * x + y * y)
-        w[_LOG, b] = half * (u * p + v * q) / max(p * p + q * q, tiny)
+        w[_LOG, b] = half * (u * p + v * q) / (p * p + q * q + tiny)
 
 
 @njit(**_OPTIONS)
@@ -116,9 +120,10 @@ def _compact(n: int, w: np.ndarray, index: np.ndarray) -> int:
         if w[_EDGE, b] > 0.0 and w[_LOG, b] > LOWEST_EXPONENT:
             index[kept] = b
             kept += 1
-    for row in range(_ROWS):
-        for m in range(kept):
-            w[row, m] = w[row, index[m]]
+    if kept < n:
+        for row in range(_ROWS):
+            for m in range(kept):
+                w[row, m] = w[row, index[m]]
     return kept
 
 
@@ -135,7 +140,7 @@ def _blob(w: np.ndarray, b: int) -> Any:
     x, y, kappa, det = w[_X, b], w[_Y, b], w[_KAPPA, b], w[_DET, b]
     xx, yy, xy = w[_XX, b], w[_YY, b], w[_XY, b]
     p, q = det - kappa * kappa, kappa * (xx + yy)
-    norm = real(1.0) / max(p * p + q * q, real(_TINY))
+    norm = real(1.0) / (p * p + q * q + real(_TINY))
     mr, mi = p * norm, q * norm
     vxr, vxi = _product(mr, mi, yy * x - xy * y, -kappa * x)
     vyr, vyi = _product(mr, mi, xx * y - xy * x, -kappa * y)
@@ -143,10 +148,11 @@ def _blob(w: np.ndarray, b: int) -> Any:
     # Principal root of det S / det C, which lies in the upper half plane; the larger of its
     # parts comes from a sum, the other one from it, so that nothing cancels.
     ar, ai = det * mr, det * mi
-    size = np.sqrt(ar * ar + ai * ai)
-    large = np.sqrt(real(0.5) * (size + abs(ar)))
-    small = real(0.5) * ai / max(large, real(_TINY))
-    root_r, root_i = (large, small) if ar > real(0.0) else (small, large)
+    size = math.sqrt(ar * ar + ai * ai)
+    large = math.sqrt(real(0.5) * (size + abs(ar)))
+    small = real(0.5) * ai / (large + real(_TINY))
+    root_r = large if ar > real(0.0) else small
+    root_i = small if ar > real(0.0) else large
     turns = (x * vxi + y * vyi) * real(-0.25 / np.pi)
     sine, cosine = sine_cosine_of_turns(real(turns - np.floor(turns + real(0.5))))
     level = exponential(w[_LOG, b])
@@ -156,12 +162,15 @@ def _blob(w: np.ndarray, b: int) -> Any:
 
 @njit(**_OPTIONS)
 def _multiply(n: int, w: np.ndarray, tr: np.ndarray, ti: np.ndarray) -> None:
-    """Multiplies the running products by 1 - alpha e g."""
-    one = w.dtype.type(1.0)
+    """Multiplies the running products by 1 - alpha e g; -300 dB and less become zero."""
+    one, zero, least = w.dtype.type(1.0), w.dtype.type(0.0), w.dtype.type(_LEAST**2)
     for b in range(n):
         gr, gi, _, _, _, _, _, _ = _blob(w, b)
         weight = w[_ALPHA, b] * w[_EDGE, b]
-        tr[b], ti[b] = _product(tr[b], ti[b], one - weight * gr, -weight * gi)
+        x, y = _product(tr[b], ti[b], one - weight * gr, -weight * gi)
+        alive = x * x + y * y > least
+        tr[b] = x if alive else zero
+        ti[b] = y if alive else zero
 
 
 @njit(parallel=True, **_OPTIONS)
@@ -201,14 +210,14 @@ def _differentiate(n: int, w: np.ndarray, seed: np.ndarray) -> None:
         kappa, xx, yy, xy = w[_KAPPA, b], w[_XX, b], w[_YY, b], w[_XY, b]
         alpha, edge = w[_ALPHA, b], w[_EDGE, b]
         cr, ci = one - alpha * edge * gr, -alpha * edge * gi
-        norm = -one / max(cr * cr + ci * ci, real(1e-12))
+        norm = -one / (cr * cr + ci * ci + real(_TINY))
         hr, hi = _product(seed[0], seed[1], cr * norm, -ci * norm)
         hr, hi = _product(hr, hi, gr, gi)
         w[_ALPHA, b], w[_EDGE, b] = hr * edge, hr * alpha
         hr, hi = hr * alpha * edge, hi * alpha * edge
         w[_X, b], w[_Y, b] = hi * vxi - hr * vxr, hi * vyi - hr * vyr
 
-        inverse = one / max(w[_DET, b], real(_TINY))
+        inverse = one / (w[_DET, b] + real(_TINY))
         sqr, sqi = _product(vxr, vxi, vxr, vxi)
         tqr, tqi = _product(vyr, vyi, vyr, vyi)
         mixr, mixi = _product(vxr, vxi, vyr, vyi)
@@ -258,6 +267,8 @@ def shadow_backward(
         first = block * LANES
         n = min(LANES, total - first)
         for path in range(legs.shape[0]):
+            if abs(seed[path, 0]) + abs(seed[path, 1]) < _LEAST**2:
+                continue
             _project(screens, legs[path], wavelength_m, first, n, w)
             _spread(screens, legs[path], first, n, w)
             kept = _compact(n, w, index)

@@ -123,6 +123,11 @@ def _first_rank(rank, origin, voxel, points, radius):
     return out
 
 
+def _f_score(precision: np.ndarray, recall: np.ndarray) -> np.ndarray:
+    """F = 2PR/(P+R), zero where both are."""
+    return 2.0 * precision * recall / np.maximum(precision + recall, 1e-30)
+
+
 def f_score_curve(
     ranked: Int64[np.ndarray, "k"],
     distance_m: Float[np.ndarray, "k"],
@@ -132,9 +137,6 @@ def f_score_curve(
 ) -> Float64[np.ndarray, "k"]:
     """F-score at one threshold if only the first 1, 2, … of the ranked voxels are predicted.
 
-    Precision is the share of predicted centres within the threshold of the reference, recall
-    the share of reference points within the threshold of a predicted centre, F = 2PR/(P+R).
-
     Args:
         ranked: Flat voxel indices, best first.
         distance_m: Distance of each of them to the nearest reference point [m].
@@ -142,16 +144,14 @@ def f_score_curve(
         reference: Points on the true surface [m].
         threshold_m: Distance that counts as a hit [m].
     """
-    count = np.arange(1, len(ranked) + 1)
-    precision = np.cumsum(distance_m <= threshold_m) / count
+    precision = np.cumsum(distance_m <= threshold_m) / np.arange(1, len(ranked) + 1)
     rank = np.full(grid.size, np.iinfo(np.int64).max, dtype=np.int64)
     rank[ranked] = np.arange(len(ranked))
     first = _first_rank(
         rank.reshape(grid.shape), np.asarray(grid.origin_m), grid.voxel_m, reference, threshold_m
     )
     covered = np.bincount(first[first < len(ranked)], minlength=len(ranked))
-    recall = np.cumsum(covered) / len(reference)
-    return 2.0 * precision * recall / np.maximum(precision + recall, 1e-30)
+    return _f_score(precision, np.cumsum(covered) / len(reference))
 
 
 def geometry_metrics(
@@ -161,6 +161,9 @@ def geometry_metrics(
     k: int,
 ) -> dict[str, float | None]:
     """Geometry group of one frame.
+
+    Precision is the share of predicted centres within a threshold of the reference, recall the
+    share of reference points within it of a predicted centre, F = 2PR/(P+R).
 
     Args:
         score: Score per voxel; only positive scores can be predicted.
@@ -182,17 +185,16 @@ def geometry_metrics(
         nothing: dict[str, float | None] = dict.fromkeys(GEOMETRY_KEYS)
         return nothing | {"f05": 0.0, "f10": 0.0, "f20": 0.0, "f10_best": 0.0, "tracked": 0.0}
     centres = grid.centres(ranked)
-    distance_m = KDTree(reference).query(centres, workers=-1)[0]
-    last = min(k, len(ranked)) - 1
+    predicted = centres[: min(k, len(ranked))]
+    distance_m = KDTree(reference).query(centres)[0]
+    back_m = KDTree(predicted).query(reference)[0]
     result: dict[str, float | None] = {}
     for name, threshold_m in THRESHOLDS_M.items():
-        curve = f_score_curve(ranked, distance_m, grid, reference, threshold_m)
-        result[name] = float(curve[last])
-        if name == "f10":
-            result["f10_best"] = float(curve.max())
-    predicted = centres[: last + 1]
-    back_m = KDTree(predicted).query(reference, workers=-1)[0]
-    result["chamfer_m"] = float(0.5 * (distance_m[: last + 1].mean() + back_m.mean()))
+        precision = np.mean(distance_m[: len(predicted)] <= threshold_m)
+        result[name] = float(_f_score(precision, np.mean(back_m <= threshold_m)))
+    curve = f_score_curve(ranked, distance_m, grid, reference, THRESHOLDS_M["f10"])
+    result["f10_best"] = float(curve.max())
+    result["chamfer_m"] = float(0.5 * (distance_m[: len(predicted)].mean() + back_m.mean()))
     centroid_m = float(np.linalg.norm(predicted.mean(axis=0) - reference.mean(axis=0)))
     result["centroid_m"] = centroid_m
     result["height_m"] = abs(_height_m(predicted) - _height_m(reference))

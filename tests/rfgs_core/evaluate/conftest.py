@@ -17,6 +17,7 @@ from rfgs_core.dataset.splits import radio_split
 from rfgs_core.evaluate.evidence import Evidence
 from rfgs_core.evaluate.geometry import reference_points
 from rfgs_core.evaluate.grid import Grid
+from rfgs_core.evaluate.metrics import evaluate_run
 from rfgs_core.evaluate.rf import HeldOut
 from rfgs_core.gaussians.model import FEATURE_DIM, Gaussians
 from rfgs_core.radio import Radio, layout, place_devices
@@ -32,11 +33,8 @@ class SurfaceRun:
     path: Path
     sequence: Sequence
     shift_m: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    frames: list[int] = field(default_factory=lambda: [1, 2])
     config: dict[str, Any] = field(default_factory=lambda: {"radio": "wifi", "train_s": 1.5})
-
-    @property
-    def frames(self) -> list[int]:
-        return self.sequence.frames
 
     def gaussians(self, frame: int) -> Gaussians:
         vertices, faces, _ = self.sequence.moving_mesh(frame)
@@ -63,6 +61,15 @@ class SurfaceRun:
 def surface_run(tiny_dataset: Path, tmp_path: Path) -> SurfaceRun:
     """A run on the tiny dataset that knows the surface and 90 % of the channel."""
     return SurfaceRun(tmp_path, open_dataset(tiny_dataset).sequence())
+
+
+@pytest.fixture(scope="module")
+def evaluated_run(tiny_dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> SurfaceRun:
+    """The same run, evaluated once per module; nothing in its folder is changed."""
+    run = SurfaceRun(tmp_path_factory.mktemp("run"), open_dataset(tiny_dataset).sequence())
+    run.path.joinpath("config.json").write_text("{}")
+    evaluate_run(run, oracle=False)
+    return run
 
 
 def small_radio(**changes: Any) -> Radio:

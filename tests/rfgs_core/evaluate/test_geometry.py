@@ -11,6 +11,7 @@ from rfgs_core.errors import RfgsError
 from rfgs_core.evaluate import geometry
 from rfgs_core.evaluate.geometry import (
     best_voxels,
+    f_score_curve,
     geometry_metrics,
     reference_points,
     voxel_budget,
@@ -95,6 +96,16 @@ def test_f_scores_agree_with_plain_nearest_neighbour_searches(reference: np.ndar
     precision = np.mean(KDTree(reference).query(predicted)[0] <= 0.05)
     recall = np.mean(KDTree(predicted).query(reference)[0] <= 0.05)
     assert result["f05"] == pytest.approx(2 * precision * recall / (precision + recall), abs=1e-9)
+
+
+def test_the_curve_over_k_agrees_with_single_budgets(reference: np.ndarray) -> None:
+    rng = np.random.default_rng(2)
+    score = plane_score(26) * rng.random(GRID.shape).astype(np.float32)
+    ranked = best_voxels(score, 400)
+    distance_m = KDTree(reference).query(GRID.centres(ranked))[0]
+    curve = f_score_curve(ranked, distance_m, GRID, reference, 0.1)
+    for k in (1, 37, 400):
+        assert curve[k - 1] == pytest.approx(geometry_metrics(score, GRID, reference, k)["f10"])
 
 
 def test_best_k_is_never_worse_than_the_nominal_one(reference: np.ndarray) -> None:

@@ -11,7 +11,6 @@ import pytest
 from rfgs_core.cli.compare import CompareArgs
 from rfgs_core.cli.compare import run as compare
 from rfgs_core.errors import RfgsError
-from rfgs_core.evaluate.metrics import evaluate_run
 from rfgs_core.report import write_demo_report, write_run_report
 from rfgs_core.report.tables import metric_tables, show, text_table
 
@@ -27,13 +26,6 @@ HEADINGS = (
 )
 
 
-@pytest.fixture
-def evaluated(surface_run):
-    surface_run.path.joinpath("config.json").write_text("{}")
-    evaluate_run(surface_run, oracle=False)
-    return surface_run
-
-
 def assert_whole(html: str) -> None:
     for heading in HEADINGS:
         assert heading in html, heading
@@ -44,8 +36,8 @@ def assert_whole(html: str) -> None:
     assert text.count("<table") == text.count("</table>")
 
 
-def test_run_report_has_every_section_and_nothing_missing(evaluated) -> None:
-    html = write_run_report(evaluated).read_text("utf-8")
+def test_run_report_has_every_section_and_nothing_missing(evaluated_run) -> None:
+    html = write_run_report(evaluated_run).read_text("utf-8")
     assert_whole(html)
     assert html.count("data:image/png") >= 4 + 4
     for name in ("matched_filter", "template", "oracle_init", "silhouette", "nearest_element"):
@@ -53,11 +45,13 @@ def test_run_report_has_every_section_and_nothing_missing(evaluated) -> None:
     assert "loses to" in html
 
 
-def test_demo_report_shows_runs_times_and_the_blender_picture(evaluated, tmp_path: Path) -> None:
+def test_demo_report_shows_runs_times_and_the_blender_picture(
+    evaluated_run, tmp_path: Path
+) -> None:
     demo = tmp_path / "demo"
     demo.mkdir()
     (demo / "inspect.png").write_bytes(b"\x89PNG")
-    path = write_demo_report(demo, [evaluated], {"generate": 75.2, "train wifi": 12.0})
+    path = write_demo_report(demo, [evaluated_run], {"generate": 75.2, "train wifi": 12.0})
     html = path.read_text("utf-8")
     assert_whole(html)
     assert path == demo / "report.html"
@@ -71,8 +65,8 @@ def test_report_before_evaluation_says_what_to_do(surface_run) -> None:
         write_run_report(surface_run)
 
 
-def test_tables_mark_the_best_and_say_who_wins(evaluated) -> None:
-    metrics = json.loads((evaluated.path / "metrics.json").read_text())
+def test_tables_mark_the_best_and_say_who_wins(evaluated_run) -> None:
+    metrics = json.loads((evaluated_run.path / "metrics.json").read_text())
     geometry = metric_tables(metrics)[0]
     assert geometry.rows[0].kind == "method"
     assert geometry.rows[0].cells[1].best
@@ -86,35 +80,37 @@ def test_missing_numbers_are_dashes_and_minus_signs_are_true() -> None:
     assert show(-1.25, 1) == "−1.2"
 
 
-def test_compare_prints_and_writes_both_kinds(evaluated, tmp_path: Path, capsys) -> None:
+def test_compare_prints_and_writes_both_kinds(evaluated_run, tmp_path: Path, capsys) -> None:
     other = tmp_path / "other"
     other.mkdir()
     for name in ("config.json", "metrics.json"):
-        shutil.copy(evaluated.path / name, other / name)
+        shutil.copy(evaluated_run.path / name, other / name)
     metrics = json.loads((other / "metrics.json").read_text())
     metrics["geometry"]["f10"] = 0.1
     metrics["conditions"]["radio"] = "mmwave"
     (other / "metrics.json").write_text(json.dumps(metrics))
     for suffix in ("md", "html"):
         out = tmp_path / f"table.{suffix}"
-        assert compare(CompareArgs(evaluated.path, other, out)) == 0
+        assert compare(CompareArgs(evaluated_run.path, other, out)) == 0
         assert "geometry.f10" in out.read_text("utf-8")
     text = capsys.readouterr().out
     assert "Not the same conditions: radio: wifi against mmwave" in text
     row = next(line for line in text.splitlines() if line.startswith("geometry.f10 "))
-    assert row.endswith(evaluated.path.name)
+    assert row.endswith(evaluated_run.path.name)
 
 
 @pytest.mark.parametrize("make", [False, True])
-def test_compare_refuses_what_is_no_evaluated_run(evaluated, tmp_path: Path, make: bool) -> None:
+def test_compare_refuses_what_is_no_evaluated_run(
+    evaluated_run, tmp_path: Path, make: bool
+) -> None:
     other = tmp_path / "not_a_run"
     other.mkdir()
     if make:
         (other / "config.json").write_text("{}")
     with pytest.raises(RfgsError, match="rfgs eval" if make else "config.json"):
-        compare(CompareArgs(evaluated.path, other))
+        compare(CompareArgs(evaluated_run.path, other))
 
 
-def test_compare_refuses_other_file_types(evaluated, tmp_path: Path) -> None:
+def test_compare_refuses_other_file_types(evaluated_run, tmp_path: Path) -> None:
     with pytest.raises(RfgsError, match=r"\.md or \.html"):
-        compare(CompareArgs(evaluated.path, evaluated.path, tmp_path / "table.pdf"))
+        compare(CompareArgs(evaluated_run.path, evaluated_run.path, tmp_path / "table.pdf"))

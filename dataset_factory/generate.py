@@ -15,7 +15,7 @@ from typing import Any
 
 from tqdm import tqdm
 
-from dataset_factory.blender import Blender
+from dataset_factory.blender import Blender, Progress
 from dataset_factory.bundle import Bundle, read_bundle, sanitised
 from dataset_factory.devices import check_scene, choose_devices
 from dataset_factory.encode import encode_empty, encode_frame, rendered_whole
@@ -187,7 +187,7 @@ def _export(job: Job) -> Bundle:
         logger.info("exporting the scene from Blender")
         arguments = ["--out", str(fresh), *_picture_size(job)]
         frames = ["--frames", job.plan.frames] if job.plan.frames else []
-        with _bar("export") as progress:
+        with _bar("export", "frame") as progress:
             job.blender.run("export", *arguments, *frames, progress=progress)
         read_bundle(fresh)
         fresh.rename(target)
@@ -295,8 +295,8 @@ def _encode(job: Job, rendered: Path, cameras: list[str], frames: list[int]) -> 
 
 
 @contextmanager
-def _bar(name: str) -> Iterator:
-    with tqdm(desc=name, unit="picture", leave=True) as bar:
+def _bar(name: str, unit: str = "picture") -> Iterator[Progress]:
+    with tqdm(desc=name, unit=unit) as bar:
 
         def progress(done: int, total: int) -> None:
             bar.total = total

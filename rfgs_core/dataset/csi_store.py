@@ -132,17 +132,22 @@ def digest(value: np.ndarray) -> str:
 
 
 def open_csi(path: Path) -> xarray.Dataset:
-    """Opens a store lazily.
+    """Opens a store; channels are read when used.
 
     Raises:
-        RfgsFormatError: It is missing or its metadata is damaged.
+        RfgsFormatError: It is missing, or its metadata or a coordinate is damaged.
     """
     import xarray
 
+    name = ""
     try:
-        return xarray.open_zarr(path, consolidated=False, chunks=None, zarr_format=3)
-    except (FileNotFoundError, ValueError, KeyError, TypeError, RuntimeError) as error:
-        raise RfgsFormatError(f"{path}: damaged or missing CSI store ({error})") from error
+        data = xarray.open_zarr(path, consolidated=False, chunks=None, zarr_format=3)
+        # Coordinates are small; reading them now finds damage here, not deep in a caller.
+        for name in data.coords:
+            data[name].load()
+    except (OSError, ValueError, KeyError, TypeError, RuntimeError) as error:
+        raise RfgsFormatError(f"{path / str(name)}: damaged or missing ({error})") from error
+    return data
 
 
 def _recorded(marker: Path) -> str:

@@ -62,7 +62,7 @@ def main(out: str, moving: str, wall: str, scale: str) -> None:
     lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "POINT"))
     lamp.data.energy, lamp.location = 100.0, (1.5, 1.5, 2.3)
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    camera.data.lens, camera.location = 20.0, (1.5, -1.0, 1.6)
+    camera.data.lens, camera.location = 20.0, (1.5, 0.15, 1.5)
     camera.rotation_euler = (1.45, 0.0, 0.0)
     for item in (lamp, camera):
         scene.collection.objects.link(item)

@@ -114,6 +114,7 @@ def test_a_run_stopped_while_tidying_up_is_complete(
     assert data_of(box_copy) == data_of(box_dataset)
 
 
+@pytest.mark.slow
 def test_a_lost_frame_is_traced_again_by_another_number_of_workers(
     make_job: MakeJob,
     box_copy: Path,

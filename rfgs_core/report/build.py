@@ -37,6 +37,8 @@ from rfgs_core.report.tables import metric_tables, show
 
 #: Pictures of the scene and rows of rendered views, at most.
 SCENE_SHOTS, VIEW_ROWS = 4, 4
+#: Pictures at least this wide are large enough to lead the page [px].
+HERO_PX = 400
 #: Controls drawn beside the method frame by frame.
 DRAWN = {"matched_filter": CONTROL, "template": "#6a994e", "oracle_init": "#b8a1d9"}
 #: Pictures a demo may leave beside its report, with their captions.
@@ -113,6 +115,7 @@ def _write(
             "to channel state information alone; colours are added afterwards, for display."
         ),
         scene=_scene_shots(first),
+        hero=bool(first.sequence.cameras) and first.sequence.cameras[0]["width"] >= HERO_PX,
         runs=[_section(run, part) for run, part in runs],
         timings=stage_times(dict(timings)),
         provenance=_provenance(first, metrics, command),
@@ -182,7 +185,7 @@ def _cards(metrics: dict[str, Any]) -> list[Card]:
             if value is not None:
                 beside.append(f"{name} {show(value, 3)}")
                 tones.append(name == "oracle_init" or own[key] > value)
-        tone = "won" if all(tones) else "lost"
+        tone = "" if not tones else "won" if all(tones) else "lost"
         cards.append(Card(show(own[key], 3), label, ", ".join(beside), tone))
     cards.append(
         Card(

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 if TYPE_CHECKING:
+    from matplotlib.colors import LinearSegmentedColormap
     from matplotlib.figure import Figure
 
 #: Text and frame of figures: readable on white and on near-black.
@@ -48,6 +49,13 @@ def new_figure(width_in: float, height_in: float) -> Iterator[Figure]:
 
     with matplotlib.rc_context(_STYLE):
         yield Figure(figsize=(width_in, height_in), layout="constrained")
+
+
+def power_colours() -> LinearSegmentedColormap:
+    """Weak to strong, of medium lightness throughout: visible on light and dark pages."""
+    from matplotlib.colors import LinearSegmentedColormap
+
+    return LinearSegmentedColormap.from_list("power", ["#7aa6c2", "#d9a03c", "#d6331f"])
 
 
 def figure_uri(figure: Figure) -> str:

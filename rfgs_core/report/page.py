@@ -90,6 +90,8 @@ class Page:
     """One sentence under it."""
     scene: list[Shot]
     """Pictures of the scene."""
+    hero: bool
+    """Whether the first of them is fine enough to be shown large."""
     runs: list[RunSection]
     """One section per run."""
     timings: list[tuple[str, str, float]]

@@ -10,7 +10,7 @@ from rfgs_core.evaluate.controls.matched_filter import default_score
 from rfgs_core.evaluate.geometry import best_voxels
 from rfgs_core.evaluate.scene import Scene
 from rfgs_core.render.view import moving_gaussians
-from rfgs_core.report.charts import TRUTH, figure_uri, new_figure
+from rfgs_core.report.charts import CONTROL, TRUTH, figure_uri, new_figure, power_colours
 
 #: Title, horizontal and vertical axis of each side.
 SIDES = (("front", 0, 2), ("side", 1, 2), ("top", 0, 1))
@@ -31,40 +31,27 @@ def shape_chart(scene: Scene, frame: int) -> str:
     filtered = scene.grid.centres(best_voxels(default_score(evidence), scene.voxels))
     means, power_db = _strong_gaussians(scene, frame)
     low, high = _frame_bounds(scene, [reference, own, filtered])
+    titles = ("true mesh", "RF-GS Gaussians", "matched filter")
     with new_figure(10.5, 10.0) as figure:
         axes = figure.subplots(3, 3)
         for column, (side, across, up) in enumerate(SIDES):
-            for row in range(3):
-                axis = axes[row, column]
-                faint = 0.35 if row == 0 else 0.12
-                axis.scatter(
-                    reference[:, across], reference[:, up], s=1.2, c=TRUTH, alpha=faint, lw=0
-                )
+            for axis, title in zip(axes[:, column], titles, strict=True):
+                faint = 0.35 if title == "true mesh" else 0.12
+                axis.scatter(*reference[:, [across, up]].T, s=1.2, c=TRUTH, alpha=faint, lw=0)
                 axis.set(
+                    title=f"{title}, {side}",
                     xlim=(low[across], high[across]),
                     ylim=(low[up], high[up]),
                     aspect="equal",
                     xlabel="xyz"[across] + " [m]",
                     ylabel="xyz"[up] + " [m]",
                 )
-            axes[0, column].set_title(f"true mesh, {side}")
-            axes[1, column].set_title(f"RF-GS Gaussians, {side}")
-            axes[2, column].set_title(f"matched filter, best {scene.voxels} voxels, {side}")
-            points = axes[1, column].scatter(
-                means[:, across],
-                means[:, up],
-                s=5,
-                c=power_db,
-                cmap="plasma",
-                vmin=-RANGE_DB,
-                vmax=0,
-                alpha=0.8,
-                lw=0,
-            )
-            axes[2, column].scatter(
-                filtered[:, across], filtered[:, up], s=5, c="#3f88c5", alpha=0.35, lw=0
-            )
-        bar = figure.colorbar(points, ax=axes[1, :], shrink=0.8, pad=0.01)
+            style = {"cmap": power_colours(), "vmin": -RANGE_DB, "vmax": 0.0, "alpha": 0.8}
+            shown = means[:, [across, up]].T
+            points = axes[1, column].scatter(*shown, s=5, c=power_db, lw=0, **style)
+            shown = filtered[:, [across, up]].T
+            axes[2, column].scatter(*shown, s=5, c=CONTROL, alpha=0.35, lw=0)
+        bar = figure.colorbar(points, ax=axes, shrink=0.3, pad=0.01)
         bar.set_label("reflected power [dB]")
         bar.outline.set_visible(False)  # type: ignore[operator]
         return figure_uri(figure)

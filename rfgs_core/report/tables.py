@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from rfgs_core.evaluate.controls import CONTROLS
+
 METHOD_LABEL = "RF-GS"
 
 
@@ -53,7 +55,7 @@ GROUPS: dict[str, tuple[str, tuple[Column, ...]]] = {
         ),
     ),
     "rf_csi": (
-        "Held-out channel, whole csi (secondary)",
+        "Held-out channel, whole csi (secondary; who brings no empty room gets the kriged one)",
         (
             Column("element_snr_db", "elements", "dB", True, 1, "SNR on unseen array columns"),
             Column("subcarrier_snr_db", "subcarriers", "dB", True, 1, "SNR on unseen tones"),
@@ -119,26 +121,34 @@ def metric_tables(metrics: Mapping[str, Any]) -> list[Table]:
 def _table(metrics: Mapping[str, Any], group: str) -> Table:
     title, columns = GROUPS[group]
     values = {METHOD_LABEL: metrics[group]}
-    for name, control in metrics["controls"].items():
-        part = control.get(group) or {}
-        # A required control stays visible, with the reason, even if it has no value here.
+    for name in sorted(metrics["controls"], key=_place):
+        part = metrics["controls"][name].get(group) or {}
+        # The ceiling stays visible, with the reason, even if it has no value.
         if any(part.get(column.key) is not None for column in columns) or _is_wanted(name, group):
             values[name] = part
     best = {column.key: _best(values, column) for column in columns}
     rows = []
     for name, part in values.items():
-        cells = [
-            Cell(
-                text=show(part.get(column.key), column.digits),
-                best=part.get(column.key) is not None
-                and part[column.key] == best[column.key]
-                and name != "oracle_init",
-                why=_reason(metrics, name, group, column.key),
-            )
-            for column in columns
-        ]
+        cells = []
+        for column in columns:
+            value = _rounded(part, column)
+            wins = value is not None and value == best[column.key] and name != "oracle_init"
+            why = _reason(metrics, name, group, column.key)
+            cells.append(Cell(show(part.get(column.key), column.digits), wins, why))
         rows.append(Row(name, _kind(name), cells))
     return Table(title, columns, rows, _losses(values, columns))
+
+
+def _place(name: str) -> tuple[int, str]:
+    """Order of controls: as they are listed in the code, the ceiling last."""
+    order = [*CONTROLS, "silhouette", "oracle_init"]
+    return (order.index(name) if name in order else len(order), name)
+
+
+def _rounded(part: Mapping[str, Any], column: Column) -> float | None:
+    """A value as shown: what looks equal counts as equal."""
+    value = part.get(column.key)
+    return None if value is None else round(float(value), column.digits)
 
 
 def _is_wanted(name: str, group: str) -> bool:
@@ -150,32 +160,26 @@ def _kind(name: str) -> str:
 
 
 def _best(values: Mapping[str, Mapping[str, Any]], column: Column) -> float | None:
-    known = [
-        part[column.key]
-        for name, part in values.items()
-        if name != "oracle_init" and part.get(column.key) is not None
-    ]
+    parts = [_rounded(part, column) for name, part in values.items() if name != "oracle_init"]
+    known = [value for value in parts if value is not None]
     if not known:
         return None
     return max(known) if column.higher_is_better else min(known)
 
 
 def _losses(values: Mapping[str, Mapping[str, Any]], columns: tuple[Column, ...]) -> list[str]:
-    """Sentences on every metric in which a control does at least as well."""
+    """Sentences on every metric in which a control does better."""
     sentences = []
-    own = values[METHOD_LABEL]
     for column in columns:
-        mine = own.get(column.key)
+        mine = _rounded(values[METHOD_LABEL], column)
         if mine is None:
             continue
-        sign = 1.0 if column.higher_is_better else -1.0
-        better = [
-            f"{name} ({show(part[column.key], column.digits)})"
-            for name, part in values.items()
-            if _kind(name) == "control"
-            and part.get(column.key) is not None
-            and sign * part[column.key] >= sign * mine
-        ]
+        better = []
+        for name, part in values.items():
+            value = _rounded(part, column)
+            if _kind(name) == "control" and value is not None and value != mine:
+                if (value > mine) == column.higher_is_better:
+                    better.append(f"{name} ({show(value, column.digits)})")
         if better:
             unit = f" {column.unit}" if column.unit else ""
             sentences.append(

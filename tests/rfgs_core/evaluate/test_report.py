@@ -75,6 +75,19 @@ def test_tables_mark_the_best_and_say_who_wins(evaluated_run) -> None:
     assert "F10" in text_table(metrics)
 
 
+def test_what_looks_equal_is_no_loss_and_controls_keep_their_order(evaluated_run) -> None:
+    metrics = json.loads((evaluated_run.path / "metrics.json").read_text())
+    metrics["geometry"]["f10"] = 0.70000
+    metrics["controls"]["clean"]["geometry"]["f10"] = 0.70001
+    metrics["controls"]["omp"]["geometry"]["f10"] = 0.8
+    table = metric_tables(metrics)[0]
+    line = next(line for line in table.losses if line.startswith("F10:"))
+    assert "omp (0.800)" in line and "clean" not in line
+    labels = [row.label for row in table.rows]
+    assert labels[:3] == ["RF-GS", "zero", "empty_room"]
+    assert labels[-1] == "oracle_init"
+
+
 def test_missing_numbers_are_dashes_and_minus_signs_are_true() -> None:
     assert show(None, 2) == "–"
     assert show(-1.25, 1) == "−1.2"

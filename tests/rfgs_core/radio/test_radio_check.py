@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scenes a radio cannot be traced in are refused with a remedy."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rfgs_core.radio import DevicePose, preset
+from rfgs_core.radio.check import check, check_devices, winding_number
+
+BOUNDS_M = np.array([[0.0, 0.0, 0.0], [6.0, 5.0, 2.7]])
+QUADS = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+
+
+def box(low: list[float], high: list[float]) -> tuple[np.ndarray, np.ndarray]:
+    corners = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+    vertices = np.array(low) + corners * (np.array(high) - np.array(low))
+    faces = [tri for a, b, c, d in QUADS for tri in ((a, b, c), (a, c, d))]
+    return vertices.astype(np.float32), np.array(faces, np.int32)
+
+
+def at(*position: float) -> DevicePose:
+    return DevicePose("ap", position, (1.0, 0.0, 0.0, 0.0))
+
+
+def test_a_closed_box_winds_once_around_its_inside() -> None:
+    points = np.array([[0.5, 0.5, 0.5], [0.01, 0.5, 0.99], [1.5, 0.5, 0.5], [9.0, 9.0, 9.0]])
+    turns = winding_number(points, *box([0, 0, 0], [1, 1, 1]))
+    assert np.allclose(np.abs(turns), [1, 1, 0, 0], atol=1e-6)
+
+
+def test_presets_suit_a_living_room() -> None:
+    materials = [{"name": "Wall", "radio_material": "plasterboard"}]
+    for name in ("wifi", "mmwave"):
+        assert check(preset(name), BOUNDS_M, materials) == []
+
+
+def test_delays_that_alias_are_refused() -> None:
+    coarse = replace(preset("wifi"), num_subcarriers=8)
+    problems = check(coarse, BOUNDS_M, [])
+    assert len(problems) == 1 and "15.0 m" in problems[0] and "more subcarriers" in problems[0]
+
+
+@pytest.mark.parametrize(
+    ("radio", "kind", "words"),
+    [
+        ("wifi", "floorboard", ["'Parquet'", "50 to 100 GHz", "5.72 to 5.88 GHz", "wood"]),
+        ("mmwave", "brick", ["'Parquet'", "1 to 40 GHz", "60 to 64 GHz"]),
+        ("wifi", "kryptonite", ["unknown radio material 'kryptonite'"]),
+    ],
+)
+def test_materials_outside_their_band_are_named(radio: str, kind: str, words: list[str]) -> None:
+    problems = check(preset(radio), BOUNDS_M, [{"name": "Parquet", "radio_material": kind}])
+    assert len(problems) == 1 and all(word in problems[0] for word in words), problems
+
+
+def test_devices_in_furniture_or_outside_are_named() -> None:
+    room, cupboard = box([0, 0, 0], [6, 5, 2.7]), box([1, 1, 0], [2, 2, 2])
+    meshes = [("Room", *room), ("Cupboard", *cupboard)]
+    radio = preset("wifi")
+    assert check_devices(radio, BOUNDS_M, [at(3.0, 3.0, 1.0)], meshes) == []
+    inside = check_devices(radio, BOUNDS_M, [at(1.5, 1.5, 1.0)], meshes)
+    assert len(inside) == 1 and "'Cupboard'" in inside[0] and "'ap'" in inside[0]
+    outside = check_devices(radio, BOUNDS_M, [at(-1.0, 1.5, 1.0)], meshes)
+    assert len(outside) == 1 and "outside the scene" in outside[0]

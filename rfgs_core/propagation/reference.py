@@ -74,7 +74,8 @@ def scatter(
     """Twin of `rfgs_core.propagation.scatter`: the same sum, written out."""
     total = torch.zeros(len(links), tones.num_selected, dtype=gamma.dtype)
     rows = max(1, MAX_ELEMENTS // max(1, len(links) * tones.num_selected))
-    for first in range(0, means.shape[0], rows):
+    # At least once: without Gaussians the result still hangs on the graph.
+    for first in range(0, max(means.shape[0], 1), rows):
         part = slice(first, first + rows)
         total = total + _scatter_block(
             *(means[part], covariances(quats[part], scales_rf[part]), gamma[part], links, tones),
@@ -181,6 +182,6 @@ def environment(
     turns = paths.delay_s.to(torch.float64)[:, None] * tones.freq_hz
     phase = (-2 * math.pi) * (turns - turns.detach().round())
     phasors = torch.polar(torch.ones_like(phase), phase).to(transmission.dtype)
-    terms = (transmission * paths.amplitude)[:, None] * phasors
+    terms = (transmission * paths.amplitude.to(transmission.dtype))[:, None] * phasors
     total = torch.zeros(num_links, tones.num_selected, dtype=terms.dtype)
     return total.index_add(0, paths.link, terms)

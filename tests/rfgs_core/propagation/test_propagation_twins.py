@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The compiled model against its plain torch twin, in values, gradients and bytes."""
+
+from __future__ import annotations
+
+import numba
+import pytest
+import torch
+
+from rfgs_core.bench import PropagationBench, bench_propagation
+from rfgs_core.propagation import Links, Tones, scatter, shadow
+
+SCATTER = ("means", "quats", "scales_rf", "gamma", "normals", "visibility")
+SHADOW = ("means", "quats", "scales", "alpha")
+BANDS = [(5.72e9, 2.5e6, 1), (60e9, 12.5e6, 1), (3.1e9, 12.3e6, 4)]
+
+
+def doubled(cloud: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
+    """The same values in double precision, as fresh leaves."""
+    return {
+        name: value.detach()
+        .to(torch.complex128 if value.is_complex() else torch.float64)
+        .requires_grad_(True)
+        for name, value in cloud.items()
+    }
+
+
+def value_and_gradients(run, cloud) -> dict[str, torch.Tensor]:
+    """Output and gradients of a random real function of it."""
+    output = run(cloud)
+    generator = torch.Generator().manual_seed(5)
+    weight = torch.randn(*output.shape, 2, generator=generator, dtype=torch.float64)
+    grads = torch.autograd.grad((torch.view_as_real(output) * weight).sum(), list(cloud.values()))
+    return {"output": output.detach(), **dict(zip(cloud, grads, strict=True))}
+
+
+def assert_twins_agree(run, cloud, tolerance: float = 1e-4) -> None:
+    fast = value_and_gradients(lambda values: run(values, "numba"), cloud)
+    plain = value_and_gradients(lambda values: run(values, "torch"), doubled(cloud))
+    for name, expected in plain.items():
+        error = (fast[name] - expected).norm() / expected.norm()
+        assert error < tolerance, f"{name}: {error:.1e}"
+        assert expected.norm() > 0, name
+
+
+@pytest.mark.parametrize(("f0", "df", "knots"), BANDS)
+def test_scatter_twins_agree(make_cloud, make_links, f0, df, knots) -> None:
+    every = make_cloud(301, f0, knots)
+    cloud = {name: every[name] for name in SCATTER}
+    links, tones = make_links(13), Tones(f0, df, 131, blocks=((0, 70), (90, 41)))
+
+    def run(values, backend):
+        return scatter(**values, links=links, tones=tones, sharpness=3.0, backend=backend)
+
+    assert_twins_agree(run, cloud)
+
+
+@pytest.mark.parametrize("wavelength_m", [0.052, 0.0048])
+def test_shadow_twins_agree(make_cloud, make_paths, wavelength_m) -> None:
+    every = make_cloud(201)
+    cloud = {name: every[name] for name in SHADOW}
+    paths = make_paths(17, wavelength_m)
+
+    def run(values, backend):
+        return shadow(**values, paths=paths, backend=backend)
+
+    assert_twins_agree(run, cloud)
+
+
+@pytest.mark.parametrize("count", [1, 127, 128, 129])
+def test_any_number_of_gaussians_will_do(make_cloud, make_links, make_paths, count) -> None:
+    every = make_cloud(count)
+    links, tones, paths = make_links(3), Tones(5.72e9, 2.5e6, 7), make_paths(3, 0.05)
+    assert_twins_agree(
+        lambda values, backend: scatter(
+            **values, links=links, tones=tones, sharpness=1.0, backend=backend
+        ),
+        {name: every[name] for name in SCATTER},
+    )
+    assert_twins_agree(
+        lambda values, backend: shadow(**values, paths=paths, backend=backend),
+        {name: every[name] for name in SHADOW},
+    )
+
+
+def test_no_gaussians_scatter_nothing_and_block_nothing(make_cloud, make_links, make_paths) -> None:
+    every = make_cloud(0)
+    cloud = {name: every[name] for name in SCATTER}
+    for backend in ("numba", "torch"):
+        csi = scatter(**cloud, links=make_links(3), tones=Tones(5e9, 1e6, 5), backend=backend)
+        assert csi.shape == (3, 5)
+        assert not csi.any()
+        screens = {name: every[name] for name in SHADOW}
+        through = shadow(**screens, paths=make_paths(4, 0.05), backend=backend)
+        assert torch.equal(through, torch.ones(4, dtype=torch.complex64))
+    csi.abs().sum().backward()
+    assert every["means"].grad.shape == (0, 3)
+
+
+@pytest.mark.parametrize("backend", ["numba", "torch"])
+@pytest.mark.parametrize("knots", [1, 3])
+def test_scatter_gradients_pass_gradcheck(make_cloud, make_links, backend, knots) -> None:
+    every = make_cloud(4, knots=knots, dtype=torch.float64)
+    links, tones = make_links(3), Tones(5.8e9, 20e6, 9, blocks=((0, 3), (4, 4)))
+
+    def run(*values):
+        named = dict(zip(SCATTER, values, strict=True))
+        csi = scatter(**named, links=links, tones=tones, sharpness=3.0, backend=backend)
+        return torch.view_as_real(csi) * 1e3
+
+    values = [every[name] for name in SCATTER]
+    assert torch.autograd.gradcheck(run, values, eps=1e-7, atol=1e-5, rtol=1e-4)
+
+
+@pytest.mark.parametrize("backend", ["numba", "torch"])
+def test_shadow_gradients_pass_gradcheck(make_cloud, make_paths, backend) -> None:
+    every = make_cloud(4, dtype=torch.float64)
+    paths = make_paths(3, 0.05)
+
+    def run(*values):
+        through = shadow(**dict(zip(SHADOW, values, strict=True)), paths=paths, backend=backend)
+        return torch.view_as_real(through)
+
+    values = [every[name] for name in SHADOW]
+    assert torch.autograd.gradcheck(run, values, eps=1e-7, atol=1e-6, rtol=1e-4)
+
+
+def test_same_bytes_for_any_number_of_threads(make_cloud, make_links, make_paths) -> None:
+    every = make_cloud(700)
+    links, tones, paths = make_links(9), Tones(5.72e9, 2.5e6, 33), make_paths(7, 0.05)
+
+    def run() -> list[torch.Tensor]:
+        csi = scatter(*(every[name] for name in SCATTER[:4]), links, tones, every["normals"], 2.0)
+        through = shadow(*(every[name] for name in SHADOW), paths)
+        loss = csi.abs().sum() + through.abs().sum()
+        wanted = ("means", "quats", "scales", "scales_rf", "gamma", "alpha", "normals")
+        grads = torch.autograd.grad(loss, [every[name] for name in wanted])
+        return [csi.detach(), through.detach(), *grads]
+
+    threads = numba.get_num_threads()
+    first = run()
+    try:
+        numba.set_num_threads(1)
+        second = run()
+    finally:
+        numba.set_num_threads(threads)
+    assert all(torch.equal(a, b) for a, b in zip(first, second, strict=True))
+
+
+def test_memory_does_not_grow_with_links_times_gaussians(make_cloud, make_links) -> None:
+    """What backward keeps is inputs and one CSI, nothing per Gaussian and link."""
+    every = make_cloud(50)
+    csi = scatter(*(every[name] for name in SCATTER[:4]), make_links(200), Tones(5.72e9, 2.5e6, 64))
+    kept, nodes = 0, [csi.grad_fn]
+    while nodes:
+        node = nodes.pop()
+        if node is None:
+            continue
+        saved = getattr(node, "saved_tensors", ())
+        kept += sum(value.numel() for value in saved if value is not None)
+        nodes.extend(parent for parent, _ in node.next_functions)
+    assert kept < 50 * 200
+
+
+def test_bad_input_is_named(make_cloud, make_links) -> None:
+    every = make_cloud(2)
+    links, tones = make_links(4), Tones(5e9, 1e6, 4)
+    cloud = {name: every[name] for name in SCATTER[:4]}
+    with pytest.raises(ValueError, match=r"expected groups within 0\.\.0"):
+        scatter(**cloud, links=links, tones=tones, visibility=torch.ones(2, 1))
+    with pytest.raises(ValueError, match="expected backend to be one of"):
+        scatter(**cloud, links=links, tones=tones, backend="cuda")
+    with pytest.raises(ValueError, match=r"expected tone blocks within 0\.\.3"):
+        Tones(5e9, 1e6, 4, blocks=((2, 3),))
+    with pytest.raises(ValueError, match="expected f0 > 0"):
+        Tones(0.0, 1e6, 4)
+    with pytest.raises(ValueError, match="expected rx_xyz of shape"):
+        Links(torch.zeros(3, 3), torch.zeros(2, 3))
+
+
+def test_the_bench_reports_a_faster_and_equal_twin() -> None:
+    size = PropagationBench(num_gaussians=1500, num_links=8, num_tones=64, repeats=2)
+    result = bench_propagation(size)
+    assert result["max_relative_error"] < 1e-4
+    assert result["forward_ratio"] > 3
+    assert result["forward_backward_ratio"] > 3
+    assert all(isinstance(value, str | int | float) for value in result.values())

@@ -5,6 +5,6 @@ from __future__ import annotations
 
 from jaxtyping import install_import_hook
 
-install_import_hook(
-    ["rfgs_core.radio", "rfgs_core.encode", "rfgs_core.gaussians"], "beartype.beartype"
-)
+# Packages with numba kernels are left out: the hook would wrap a kernel that calls another, and
+# numba's cache cannot store the wrapper.
+install_import_hook(["rfgs_core.radio", "rfgs_core.gaussians"], "beartype.beartype")

@@ -31,6 +31,7 @@ CONTROLS: dict[str, Control] = {
     "clean": clean.control,
     "omp": omp.control,
     "template": template.control,
+    "template_filled": template.filled,
 }
 
 __all__ = ["CONTROLS", "Control", "ControlResult", "Evidence"]

@@ -164,6 +164,15 @@ def test_template_stands_on_the_floor_at_the_methods_centroid(scatterers) -> Non
     assert np.ptp(voxels[:, 0]) == pytest.approx(0.5, abs=0.1)
 
 
+def test_filled_template_stays_inside_the_ellipsoid(scatterers) -> None:
+    made = scatterers(ONE, voxels=1500)
+    evidence = made.evidence.with_centroid(np.array([2.0, 1.6, 0.4]))
+    score = CONTROLS["template_filled"](evidence).score
+    voxels = made.evidence.grid.centres(best_voxels(score, 1500))
+    radius = np.linalg.norm((voxels - [2.0, 1.6, 0.85]) / [0.25, 0.20, 0.85], axis=1)
+    assert radius.max() < 0.85
+
+
 def test_template_without_a_centroid_says_so(scatterers) -> None:
     assert "centroid" in CONTROLS["template"](scatterers(ONE).evidence).reason
 

@@ -21,6 +21,7 @@ from .exr import read_exr, write_exr
 from .files import replacing
 from .frames import chosen_frames, unit_scale
 from .lights import lights_ready
+from .png import strip_metadata
 from .state import Keeper, kept, show_what_renders
 
 #: Depths above this are misses; Cycles writes 1e10 [Blender units].
@@ -122,7 +123,6 @@ def _configure(keeper: Keeper, scene: bpy.types.Scene, view: View) -> None:
         "use_placeholder": False,
     }.items():
         keeper.set(render, name, value)
-    # Without this, dates and render times go into the files and no two are equal.
     for name in dir(render):
         if name.startswith("use_stamp"):
             keeper.set(render, name, False)
@@ -208,6 +208,7 @@ def render_to(scene: bpy.types.Scene, path: Path) -> None:
     set_format(scene, "PNG")
     with replacing(path) as temporary:
         _write_still(scene, temporary)
+        strip_metadata(temporary)
 
 
 def _write_still(scene: bpy.types.Scene, path: Path) -> None:

@@ -139,7 +139,8 @@ def _choose_camera(
     centre, reach = 0.5 * (low + high), max(float(np.linalg.norm(high - low)), 0.5)
     camera = bpy.data.objects.new("RFGS picture", bpy.data.cameras.new("RFGS picture"))
     camera[_MADE] = True
-    place = centre + reach * np.array([1.0, -1.2, 0.5])
+    camera.data.angle = np.radians(60)
+    place = centre + 1.6 * reach * np.array([0.6, -0.74, 0.3])
     camera.matrix_world = mathutils.Matrix(look_at(place, centre).tolist())
     scene.collection.objects.link(camera)
     return camera

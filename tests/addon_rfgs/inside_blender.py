@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tests that need `bpy` in their own process; `test_inside_blender.py` runs this file."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+from plyfile import PlyData, PlyElement
+
+import addon_rfgs
+from addon_rfgs import exr, naming, ply, rig, tables
+from addon_rfgs.errors import AddonError
+from addon_rfgs.frames import chosen_frames
+
+COLUMNS = [
+    *("x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2", "opacity"),
+    *(f"scale_{i}" for i in range(3)),
+    *(f"rot_{i}" for i in range(4)),
+]
+
+
+def splats(path: Path, count: int = 50, grey: bool = False) -> dict[str, np.ndarray]:
+    rng = np.random.default_rng(1)
+    rows = np.zeros(count, [(name, "<f4") for name in COLUMNS])
+    for name in COLUMNS:
+        rows[name] = rng.normal(size=count)
+    if grey:
+        for name in ("f_dc_0", "f_dc_1", "f_dc_2"):
+            rows[name] = 0
+    PlyData([PlyElement.describe(rows, "vertex")]).write(str(path))
+    return {name: rows[name] for name in COLUMNS}
+
+
+def test_gaussians_written_by_plyfile_are_read_with_activations(tmp_path: Path) -> None:
+    rows = splats(tmp_path / "a.ply")
+    cloud = ply.read_gaussians(tmp_path / "a.ply")
+    np.testing.assert_array_equal(cloud.means[:, 2], rows["z"])
+    np.testing.assert_allclose(cloud.opacities, 1 / (1 + np.exp(-rows["opacity"])), rtol=1e-6)
+    np.testing.assert_allclose(cloud.scales[:, 1], np.exp(rows["scale_1"]), rtol=1e-6)
+    np.testing.assert_allclose(np.linalg.norm(cloud.quats, axis=1), 1, rtol=1e-6)
+    np.testing.assert_allclose(
+        cloud.quats[:, 0] * np.abs(rows["rot_1"]),
+        np.abs(cloud.quats[:, 1]) * rows["rot_0"],
+        rtol=1e-5,
+    )
+    expected = np.clip(0.5 + 0.28209479177387814 * rows["f_dc_2"], 0, 1)
+    np.testing.assert_allclose(cloud.colors[:, 2], expected, rtol=1e-6)
+
+
+def test_mesh_is_read_back_by_plyfile(tmp_path: Path) -> None:
+    vertices = np.arange(12, dtype=np.float32).reshape(4, 3)
+    faces = np.array([[0, 1, 2], [2, 1, 3]], np.int32)
+    ply.write_mesh(tmp_path / "m.ply", vertices, faces)
+    data = PlyData.read(str(tmp_path / "m.ply"))
+    np.testing.assert_array_equal(np.stack([data["vertex"][axis] for axis in "xyz"], 1), vertices)
+    np.testing.assert_array_equal(np.vstack(data["face"]["vertex_indices"]), faces)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda data: data[:-7], "truncated"),
+        (lambda data: b"", "expected a PLY"),
+        (lambda data: b"\x00" * 400, "expected a PLY"),
+        (lambda data: data.replace(b"opacity", b"opakity"), "lack opacity"),
+        (lambda data: data.replace(b"binary_little_endian", b"ascii"), "binary_little_endian"),
+        (lambda data: data.replace(b"float x", b"quark x"), "not understood"),
+        (lambda data: data[:-4] + struct.pack("<f", float("nan")), "not finite"),
+        (lambda data: data.replace(b"element vertex 50", b"element vertex 99999999"), "truncated"),
+    ],
+)
+def test_bad_ply_gets_one_line(tmp_path: Path, change, message: str) -> None:
+    path = tmp_path / "bad.ply"
+    splats(path)
+    path.write_bytes(change(path.read_bytes()))
+    with pytest.raises(AddonError, match=message) as caught:
+        ply.read_gaussians(path)
+    assert "\n" not in str(caught.value) and str(path) in str(caught.value)
+
+
+def test_exr_agrees_with_openexr(tmp_path: Path) -> None:
+    library = pytest.importorskip("OpenEXR")
+    rng = np.random.default_rng(2)
+    planes = {name: rng.normal(size=(37, 23)).astype(np.float32) for name in ("a.Z", "b.X")}
+    planes["a.Z"][3, 4] = np.inf
+    exr.write_exr(tmp_path / "ours.exr", planes)
+    theirs = library.File(str(tmp_path / "ours.exr"), separate_channels=True).channels()
+    for name, plane in planes.items():
+        np.testing.assert_array_equal(theirs[name].pixels, plane)
+    for compression in (library.NO_COMPRESSION, library.ZIPS_COMPRESSION, library.ZIP_COMPRESSION):
+        header = {"compression": compression, "type": library.scanlineimage}
+        library.File(header, dict(planes)).write(str(tmp_path / "theirs.exr"))
+        for name, plane in exr.read_exr(tmp_path / "theirs.exr").items():
+            np.testing.assert_array_equal(plane, planes[name])
+
+
+def test_names_are_safe_and_unique() -> None:
+    names = naming.Names()
+    made = [names.unique(text) for text in ("Wall é__1", "Wall_e_1", "Wall é__1", "../x", "")]
+    assert len(set(made)) == 5
+    assert all("__" not in name and "/" not in name and "." not in name for name in made)
+
+
+@pytest.mark.parametrize(
+    ("bone", "expected"),
+    [
+        ("upperleg01.L", ("upperleg01", "left")),
+        ("mixamorig:RightForeArm", ("forearm", "right")),
+        ("lowerarm_r", ("lowerarm", "right")),
+        ("DEF-thigh.L", ("thigh", "left")),
+        ("Bip01 L Calf", ("calf", "left")),
+        ("neck_01", ("neck01", "")),
+        ("root", ("root", "")),
+        ("lip", ("lip", "")),
+    ],
+)
+def test_bone_names_split_into_name_and_side(bone: str, expected: tuple[str, str]) -> None:
+    assert rig.split_name(bone) == expected
+
+
+def test_every_anny_joint_is_found() -> None:
+    bones = {"root": (0, 0.95), "spine05": (0, 1.0), "spine03": (0, 1.2), "neck01": (0, 1.45)}
+    bones |= {"head": (0, 1.55)}
+    for side, x in (("L", 1), ("R", -1)):
+        for name, z in (
+            ("upperleg01", 0.9), ("lowerleg01", 0.5), ("foot", 0.1), ("upperarm01", 1.4),
+            ("lowerarm01", 1.1), ("wrist", 0.9), ("finger1-1", 0.85), ("clavicle", 1.42),
+        ):  # fmt: skip
+            bones[f"{name}.{side}"] = (0.2 * x, z)
+    chain = {"spine03": "spine05", "neck01": "spine03", "head": "neck01", "spine05": "root"}
+    for side in "LR":
+        chain |= {f"finger1-1.{side}": f"wrist.{side}", f"clavicle.{side}": "neck01"}
+    data = bpy.data.armatures.new("anny")
+    item = bpy.data.objects.new("anny", data)
+    bpy.context.scene.collection.objects.link(item)
+    bpy.context.view_layer.objects.active = item
+    bpy.ops.object.mode_set(mode="EDIT")
+    for name, (x, z) in bones.items():
+        bone = data.edit_bones.new(name)
+        bone.head, bone.tail = (x, 0, z), (x, 0, z + 0.08)
+    for child, parent in chain.items():
+        data.edit_bones[child].parent = data.edit_bones[parent]
+    bpy.ops.object.mode_set(mode="OBJECT")
+    found = rig.read_rig(item)
+    assert found is not None
+    place = dict(zip(tables.JOINTS, found.joints(item), strict=True))
+    assert place["left_elbow"] == pytest.approx((0.2, 0, 1.1))
+    assert place["right_hip"] == pytest.approx((-0.2, 0, 0.9))
+    assert place["pelvis"] == pytest.approx((0, 0, 0.9)), "midpoint of the hips"
+    assert place["spine"] == pytest.approx((0, 0, 1.2))
+    assert found.segments["finger1-1.R"] == tables.JOINTS.index("right_wrist")
+    data.bones["wrist.L"].name = "paw.L"
+    assert rig.read_rig(item) is None
+
+
+@pytest.mark.parametrize("text", ["1", "5:1", "0:3", "1:999", "a:b", "1:5:0"])
+def test_bad_frames_are_refused(text: str) -> None:
+    with pytest.raises(AddonError, match="frames"):
+        chosen_frames(bpy.context.scene, text)
+
+
+def test_register_and_unregister_leave_nothing() -> None:
+    before = set(dir(bpy.types)), set(dir(bpy.types.Object)), set(dir(bpy.ops.rfgs))
+    for _ in range(2):
+        addon_rfgs.register()
+        assert bpy.types.RFGS_PT_object.bl_category == "RF-GS"
+        assert bpy.context.scene.rfgs.opacity_threshold > 0
+        addon_rfgs.unregister()
+    assert (set(dir(bpy.types)), set(dir(bpy.types.Object)), set(dir(bpy.ops.rfgs))) == before
+    assert not hasattr(bpy.types.Scene, "rfgs") and not hasattr(bpy.types.Material, "rfgs")
+
+
+def test_material_numbers_do_not_depend_on_the_table() -> None:
+    addon_rfgs.register()
+    try:
+        items = addon_rfgs.properties.RFGS_PG_material.bl_rna.properties[
+            "radio_material"
+        ].enum_items
+        numbers = {item.identifier: item.value for item in items}
+    finally:
+        addon_rfgs.unregister()
+    assert set(numbers) == {"AUTO", *tables.MATERIALS}
+    assert len(set(numbers.values())) == len(numbers)
+    assert numbers["concrete"] == 1400205171, "files saved earlier would change their meaning"

@@ -21,7 +21,7 @@ COARSE_RANGE_M = 0.15
 class PairMaps:
     """Matched-filter power per device pair on a thinned grid."""
 
-    power: Float[np.ndarray, "pair x y z"]
+    power: Float[np.ndarray, "pair i j k"]
     """Power at the thinned voxel centres."""
     pairs: list[tuple[int, int]]
     """Transmitting and receiving device of each map."""
@@ -35,7 +35,7 @@ class PairMaps:
         """Which pairs are of two different devices."""
         return np.array([a != b for a, b in self.pairs], dtype=bool)
 
-    def on_grid(self, thinned: Float[np.ndarray, "x y z"]) -> Float32[np.ndarray, "x y z"]:
+    def on_grid(self, thinned: Float[np.ndarray, "i j k"]) -> Float32[np.ndarray, "x y z"]:
         """Interpolates a combination of maps linearly to every voxel."""
         if self.stride == 1:
             return thinned.astype(np.float32)

@@ -92,16 +92,14 @@ class PointModel:
         )
         layout = self.layout
         delta = np.zeros(self.evidence.delta.shape, dtype=np.complex64)
-        for a in np.unique(layout.tx_device):
-            for b in np.unique(layout.rx_device):
-                here = (layout.tx_device[:, None] == a) & (layout.rx_device == b)
-                tx, rx = np.nonzero(here & layout.measured)
-                if len(tx) == 0:
-                    continue
-                if (int(a), int(b)) in self.pairs:
-                    gain = amplitude[self.pairs.index((int(a), int(b)))]
-                else:
-                    gain = reflectivity / self.spreading(points, a, b)
-                for point, value in zip(points, gain, strict=True):
-                    delta[tx, rx] += value * self._phasor(point, tx, rx)
+        _, measured_pairs = device_pairs(layout.tx_device, layout.rx_device, layout.measured)
+        for a, b in measured_pairs:
+            here = (layout.tx_device[:, None] == a) & (layout.rx_device == b)
+            tx, rx = np.nonzero(here & layout.measured)
+            if (a, b) in self.pairs:
+                gain = amplitude[self.pairs.index((a, b))]
+            else:
+                gain = reflectivity / self.spreading(points, a, b)
+            for point, value in zip(points, gain, strict=True):
+                delta[tx, rx] += value * self._phasor(point, tx, rx)
         return ControlResult(score=score, delta=delta)

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Training losses: eq. 4–7 of the paper, and the channel error of the propagation model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from jaxtyping import Complex, Float, Int64
+from scipy.spatial import cKDTree
+from torch import Tensor
+
+from rfgs_core.gaussians import Gaussians
+
+#: Weights λ1, λ2, λ3 of eq. 4 (paper section 3.4).
+POSITION_WEIGHT, FEATURE_WEIGHT, REGULARISATION_WEIGHT = 1.0, 0.1, 0.001
+
+
+@dataclass(frozen=True)
+class SamplePoints:
+    """Sample points of the radio measurement grid and what the encoder says there."""
+
+    xyz: Float[Tensor, "N 3"]
+    """Positions p_k [m]."""
+    features: Float[Tensor, "N 32"]
+    """φ(p_k); a constant, so that both sides of eq. 6 cannot shrink to zero together."""
+
+    def rows(self, chosen: Int64[Tensor, "batch"]) -> SamplePoints:
+        """Some of the points."""
+        return SamplePoints(self.xyz[chosen], self.features[chosen])
+
+
+def nearest_gaussian(
+    points: Float[Tensor, "N 3"], means: Float[Tensor, "M 3"]
+) -> tuple[Int64[Tensor, "N"], Float[Tensor, "N"]]:
+    """Index of and distance [m] to the Gaussian closest to each point."""
+    distance, index = cKDTree(means.detach().numpy()).query(points.numpy())
+    return torch.from_numpy(np.asarray(index)), torch.from_numpy(np.asarray(distance)).float()
+
+
+def position_loss(
+    gaussians: Gaussians, points: SamplePoints, nearest: Int64[Tensor, "N"]
+) -> Float[Tensor, ""]:
+    """Eq. 5: Σ_k ‖φ(p_k)‖ ‖μ_nn(k) − p_k‖²."""
+    weight = torch.linalg.norm(points.features, dim=1)
+    offset = gaussians.means[nearest] - points.xyz
+    return torch.sum(weight * torch.sum(offset**2, dim=1))
+
+
+def feature_loss(
+    gaussians: Gaussians, points: SamplePoints, nearest: Int64[Tensor, "N"]
+) -> Float[Tensor, ""]:
+    """Eq. 6: Σ_k ‖f_nn(k) − φ(p_k)‖²."""
+    return torch.sum((gaussians.features[nearest] - points.features) ** 2)
+
+
+def regularisation_loss(gaussians: Gaussians) -> Float[Tensor, ""]:
+    """Eq. 7: Σ_i ‖s_i‖² + |log α_i|."""
+    opacity = torch.nn.functional.logsigmoid(gaussians.logit_opacities)
+    return torch.sum(gaussians.scales**2) + torch.sum(opacity.abs())
+
+
+def paper_loss(gaussians: Gaussians, points: SamplePoints) -> Float[Tensor, ""]:
+    """Eq. 4: λ1 L_pos + λ2 L_feat + λ3 L_reg over one batch of sample points."""
+    nearest, _ = nearest_gaussian(points.xyz, gaussians.means)
+    return (
+        POSITION_WEIGHT * position_loss(gaussians, points, nearest)
+        + FEATURE_WEIGHT * feature_loss(gaussians, points, nearest)
+        + REGULARISATION_WEIGHT * regularisation_loss(gaussians)
+    )
+
+
+def channel_loss(
+    predicted: Complex[Tensor, "link subcarrier"],
+    target: Complex[Tensor, "link subcarrier"],
+    noise: Float[Tensor, "link"],
+) -> Float[Tensor, ""]:
+    """Mean squared channel error in units of each link's own noise variance."""
+    return torch.mean((predicted - target).abs() ** 2 / noise[:, None])

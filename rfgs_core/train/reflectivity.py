@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reflectivities of fixed Gaussians: the posterior mean of a linear Gaussian model.
+
+The channel is linear in the reflectivities γ. With γ_i ~ CN(0, p_i), where p_i is the
+reflected power of the phase-free fit, and noise of variance σ² per device pair, the posterior
+mean minimises Σ |y − Aγ|²/σ² + Σ |γ_i|²/p_i. Conjugate gradients solve for x = γ/√p.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import torch
+from jaxtyping import Complex, Complex64, Float
+from torch import Tensor
+
+from rfgs_core.gaussians import Gaussians
+from rfgs_core.train.channel import Channel
+from rfgs_core.train.head import RadioHead
+
+
+def posterior_mean(
+    channel: Channel,
+    head: RadioHead,
+    gaussians: Gaussians,
+    target: Complex64[Tensor, "link subcarrier"],
+    noise: Float[Tensor, "link"],
+    power: Float[Tensor, "M"],
+    iterations: int,
+) -> Complex[Tensor, "M"]:
+    """Posterior-mean reflectivities [m].
+
+    Args:
+        channel: Links and tones of `target`.
+        head: Decodes ρ; its reflectivities are ignored.
+        gaussians: Fixed positions, shapes and normals.
+        target: Channel change to explain.
+        noise: Variance of what cannot be explained, per link.
+        power: Prior variance p of each reflectivity [m²].
+        iterations: Conjugate-gradient steps.
+    """
+    root, weight = torch.sqrt(power), torch.rsqrt(noise)[:, None]
+    zero = torch.zeros(len(gaussians), dtype=torch.complex64, requires_grad=True)
+
+    def forward(x: Tensor) -> Tensor:
+        with torch.no_grad():
+            return channel.scattered(head, gaussians, root * x) * weight
+
+    # The model is linear in γ, so its gradient at zero is the adjoint everywhere.
+    linear = channel.scattered(head, gaussians, zero)
+
+    def adjoint(y: Tensor) -> Tensor:
+        (grad,) = torch.autograd.grad(linear, zero, y * weight, retain_graph=True)
+        return root * grad
+
+    return root * _conjugate_gradients(forward, adjoint, target * weight, iterations)
+
+
+def _conjugate_gradients(
+    forward: Callable[[Tensor], Tensor],
+    adjoint: Callable[[Tensor], Tensor],
+    y: Complex[Tensor, "link subcarrier"],
+    iterations: int,
+) -> Complex[Tensor, "M"]:
+    """Solves (I + BᴴB) x = Bᴴ y."""
+    residual = adjoint(y)
+    x = torch.zeros_like(residual)
+    step = residual.clone()
+    energy = torch.linalg.vdot(residual, residual).real
+    for _ in range(iterations):
+        if energy <= 0:
+            break
+        image = step + adjoint(forward(step))
+        along = energy / torch.linalg.vdot(step, image).real
+        x = x + along * step
+        residual = residual - along * image
+        after = torch.linalg.vdot(residual, residual).real
+        step = residual + after / energy * step
+        energy = after
+    return x

@@ -39,7 +39,7 @@ def sine_cosine_of_turns(turns: float) -> tuple[float, float]:
     return math.sin(2 * math.pi * turns), math.cos(2 * math.pi * turns)
 
 
-@overload(exponential, inline="always", jit_options=_OPTIONS)
+@overload(exponential, jit_options=_OPTIONS)
 def _exponential(x: Any) -> Any:
     """Chooses the implementation of `exponential` by type."""
 
@@ -64,7 +64,7 @@ def _exponential(x: Any) -> Any:
     return single if x == types.float32 else double
 
 
-@overload(sine_cosine_of_turns, inline="always", jit_options=_OPTIONS)
+@overload(sine_cosine_of_turns, jit_options=_OPTIONS)
 def _sine_cosine_of_turns(turns: Any) -> Any:
     """Chooses the implementation of `sine_cosine_of_turns` by type."""
 

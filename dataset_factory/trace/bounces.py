@@ -18,7 +18,7 @@ from sionna.rt.path_solvers.sb_candidate_generator import SBCandidateGenerator
 from sionna.rt.rcs import ConstantCPM, ConstantRCS, RCSSolver, ScatteringModel, SensingTarget
 
 from dataset_factory.trace.direct import PosedPoints
-from dataset_factory.trace.environment import device_groups, measured_paths
+from dataset_factory.trace.environment import measured_pairs
 from dataset_factory.trace.paths import SENSING, PathSet, empty, merged, path_set
 from dataset_factory.trace.scene import add_devices, centres
 from rfgs_core.radio import Layout
@@ -31,6 +31,8 @@ CHUNK = 4096
 NUM_SAMPLES = 1000
 #: Legs kept per point, by depth; with fewer, paths are lost without a word.
 BUFFER = {2: 128, 3: 512}
+#: Paths weaker than this share of the strongest are left out: facets damped to nothing.
+NEGLIGIBLE = 1e-4
 
 # The solver's default reserves 8 MB per scattering point; the result is the same.
 SBCandidateGenerator.MIN_SPEC_COUNT_SIZE = 4096
@@ -40,8 +42,14 @@ class JoiningSolver(RCSSolver):
     """`RCSSolver` that finds legs of the same point by sorting.
 
     The original compares every leg with every other, which grows with the square of the
-    number of points and forces chunks of 500; the pairs are the same.
+    number of points and forces chunks of 500; the pairs are the same, less those of devices
+    without a measured link.
     """
+
+    def __init__(self, measured: np.ndarray) -> None:
+        """Takes which pairs of devices are measured, bool, shape (tx, rx)."""
+        super().__init__(deterministic=True)
+        self._measured = measured
 
     def _pair_legs(
         self, from_tx_paths: Any, to_rx_paths: Any, max_depth: int
@@ -53,6 +61,8 @@ class JoiningSolver(RCSSolver):
         at_rx = np.array(to_rx_paths.source_indices).astype(np.int64)
         walls_tx = np.array(from_tx_paths.num_interactions()).astype(np.int64)
         walls_rx = np.array(to_rx_paths.num_interactions()).astype(np.int64)
+        device_tx = np.array(from_tx_paths.source_indices).astype(np.int64)
+        device_rx = np.array(to_rx_paths.target_indices).astype(np.int64)
         order = np.argsort(at_rx, kind="stable")
         first = np.searchsorted(at_rx[order], at_tx, side="left")
         count = np.searchsorted(at_rx[order], at_tx, side="right") - first
@@ -60,6 +70,7 @@ class JoiningSolver(RCSSolver):
         within = np.arange(len(tx)) - np.repeat(np.cumsum(count) - count, count)
         rx = order[np.repeat(first, count) + within]
         fits = walls_tx[tx] + walls_rx[rx] + 1 <= max_depth
+        fits &= self._measured[device_tx[tx], device_rx[rx]]
         return mi.UInt(tx[fits].astype(np.uint32)), mi.UInt(rx[fits].astype(np.uint32))
 
 
@@ -78,9 +89,9 @@ class Bounces:
             depth: Interactions per path, the scattering one included: 2 or 3.
             seed: Seed of the rays, the same for every frame.
         """
-        self._scene, self._layout, self._devices = scene, layout, devices
+        self._scene, self._layout = scene, layout
         self._depth, self._seed = depth, seed
-        self._solver = JoiningSolver(deterministic=True)
+        self._solver = JoiningSolver(measured_pairs(layout))
         self._rcs, self._cpm = ConstantRCS(1.0), ConstantCPM()
         mi_scene: Any = scene.mi_scene
         low = np.array(mi_scene.bbox().min, dtype=np.float64).ravel()
@@ -95,6 +106,7 @@ class Bounces:
             position=place,
         )
         scene.edit(add=self._carrier)
+        add_devices(scene, layout, devices)
 
     def paths(self, points: PosedPoints) -> PathSet:
         """Paths by way of each point and one or more walls, one amplitude each.
@@ -102,16 +114,10 @@ class Bounces:
         Amplitudes are those of points of unit cross-section; `primitives` of the sensing
         interaction is the index of the point.
         """
-        parts = []
-        for group in device_groups(self._layout):
-            for name in [*self._scene.transmitters, *self._scene.receivers]:
-                self._scene.remove(name)
-            add_devices(self._scene, self._layout, self._devices, group)
-            for first in range(0, len(points.areas), CHUNK):
-                parts.append(self._chunk(points.lifted[first : first + CHUNK], first, group))
-        return measured_paths(merged(parts), self._layout)
+        starts = range(0, len(points.areas), CHUNK)
+        return merged([self._chunk(points.lifted[i : i + CHUNK], i) for i in starts])
 
-    def _chunk(self, places: np.ndarray, first: int, group: list[int]) -> PathSet:
+    def _chunk(self, places: np.ndarray, first: int) -> PathSet:
         """Paths through a few points; point indices count from `first`."""
         self._hang(places)
         paths = self._solver(
@@ -123,7 +129,7 @@ class Bounces:
             seed=self._seed,
         )
         tx_centres, rx_centres = centres(self._layout)
-        found = path_set(paths, group, group, tx_centres, rx_centres)
+        found = path_set(paths, tx_centres, rx_centres)
         if not len(found):
             return empty(self._depth)
         found = found.select((found.kinds != 0).sum(axis=1) > 1)
@@ -180,9 +186,10 @@ def with_facets(
     for material, coefficient in gamma.items():
         table[material] = coefficient
     amplitude = paths.amplitude * (1j * size[:, None] * damping * table[points.material[point]])
+    strength = np.abs(amplitude).max(axis=1) * lit
     return PathSet(
         paths.tx, paths.rx, amplitude, paths.vertices, paths.kinds, paths.primitives
-    ).select(lit)
+    ).select(strength > NEGLIGIBLE * strength.max())
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:

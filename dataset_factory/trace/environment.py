@@ -56,20 +56,13 @@ def environment_paths(
     return _joined([_traced(bundle, radio, layout, devices, seed, float(f)) for f in nodes])
 
 
-def device_groups(layout: Layout) -> list[list[int]]:
-    """Devices that must be traced together: each alone if only own links are measured."""
-    devices = list(range(int(layout.tx_device.max()) + 1))
-    own = layout.tx_device[:, None] == layout.rx_device[None, :]
-    return [[i] for i in devices] if not (layout.measured & ~own).any() else [devices]
-
-
-def measured_paths(paths: PathSet, layout: Layout) -> PathSet:
-    """Only the paths of device pairs with a measured link."""
+def measured_pairs(layout: Layout) -> np.ndarray:
+    """Which pairs of a transmitting and a receiving device have a measured link, bool."""
     count = int(layout.tx_device.max()) + 1
     wanted = np.zeros((count, count), dtype=bool)
     links = np.argwhere(layout.measured)
     wanted[layout.tx_device[links[:, 0]], layout.rx_device[links[:, 1]]] = True
-    return paths.select(wanted[paths.tx, paths.rx])
+    return wanted
 
 
 def _traced(
@@ -85,23 +78,19 @@ def _traced(
     scene = static_scene(bundle, radio, freq_hz)
     tx_centres, rx_centres = centres(layout)
     solver = rt.PathSolver(deterministic=True)
-    parts = []
-    for group in device_groups(layout):
-        for name in [*scene.transmitters, *scene.receivers]:
-            scene.remove(name)
-        add_devices(scene, layout, devices, group)
-        paths = solver(
-            scene,
-            max_depth=MAX_DEPTH,
-            samples_per_src=NUM_SAMPLES,
-            max_num_paths_per_src=MAX_PATHS,
-            synthetic_array=True,
-            diffuse_reflection=scatters,
-            refraction=True,
-            seed=seed,
-        )
-        parts.append(path_set(paths, group, group, tx_centres, rx_centres))
-    return measured_paths(merged(parts), layout)
+    add_devices(scene, layout, devices)
+    paths = solver(
+        scene,
+        max_depth=MAX_DEPTH,
+        samples_per_src=NUM_SAMPLES,
+        max_num_paths_per_src=MAX_PATHS,
+        synthetic_array=True,
+        diffuse_reflection=scatters,
+        refraction=True,
+        seed=seed,
+    )
+    found = path_set(paths, tx_centres, rx_centres)
+    return found.select(measured_pairs(layout)[found.tx, found.rx])
 
 
 def _with_amplitude(paths: PathSet, amplitude: np.ndarray) -> PathSet:

@@ -71,19 +71,11 @@ class PathSet:
         return self.kinds == _SPECULAR
 
 
-def path_set(
-    paths: rt.Paths,
-    tx_index: list[int],
-    rx_index: list[int],
-    tx_centres: np.ndarray,
-    rx_centres: np.ndarray,
-) -> PathSet:
-    """Reads Sionna's paths between one-element devices.
+def path_set(paths: rt.Paths, tx_centres: np.ndarray, rx_centres: np.ndarray) -> PathSet:
+    """Reads Sionna's paths between one-element devices, all of them in the scene.
 
     Args:
         paths: Result of a solver, traced with `synthetic_array=True`.
-        tx_index: Device of each of Sionna's transmitters.
-        rx_index: Device of each of Sionna's receivers.
         tx_centres: Transmitter of every device [m], shape (device, 3).
         rx_centres: Receiver of every device [m], shape (device, 3).
 
@@ -98,7 +90,6 @@ def path_set(
     kinds = np.array(paths.interactions)[:, valid].T.astype(np.int64)
     primitives = np.array(paths.primitives)[:, valid].T.astype(np.int64)
     corners = np.moveaxis(np.array(paths.vertices)[:, valid], 0, 1).astype(np.float64)
-    tx, rx = np.asarray(tx_index)[tx], np.asarray(rx_index)[rx]
     corners = np.where((kinds == 0)[:, :, None], rx_centres[rx][:, None, :], corners)
     vertices = np.concatenate(
         [tx_centres[tx][:, None, :], corners, rx_centres[rx][:, None, :]], axis=1

@@ -169,13 +169,19 @@ def _lloyd(
     area = triangle_areas(vertices, faces)
     count = max(int(np.ceil(area.sum() * per_m2)), 1)
     samples = count * _SAMPLES_PER_POINT
-    # Stratified along the cumulated area: every triangle gets its share, without clumps.
-    level = (np.arange(samples) + rng.random(samples)) / samples * area.sum()
+    # Equal shares of area along the list of triangles, and within them the additive sequence of
+    # the plastic number: no clumps, so that cells of equal size hold equally many samples.
+    turn = np.arange(samples)
+    level = (turn + rng.random()) / samples * area.sum()
     index = np.minimum(np.searchsorted(np.cumsum(area), level), len(area) - 1)
-    u, v = np.sqrt(rng.random(samples)), rng.random(samples)
-    barycentric = np.stack([1.0 - u, u * (1.0 - v), u * v], axis=1)
+    u = (rng.random() + turn * 0.7548776662466927) % 1.0
+    v = (rng.random() + turn * 0.5698402909980532) % 1.0
+    u, v = np.where(u + v > 1.0, 1.0 - u, u), np.where(u + v > 1.0, 1.0 - v, v)
+    barycentric = np.stack([1.0 - u - v, u, v], axis=1)
     places = np.einsum("pc,pcx->px", barycentric, vertices[faces[index]])
-    chosen = rng.choice(samples, count, replace=False)
+    # Every n-th sample along a space-filling curve is an even start.
+    along = np.argsort(_morton(places), kind="stable")
+    chosen = along[_SAMPLES_PER_POINT // 2 :: _SAMPLES_PER_POINT]
     tree = KDTree(places)
     for _ in range(_LLOYD_STEPS):
         _, cell = KDTree(places[chosen]).query(places)
@@ -190,3 +196,14 @@ def _lloyd(
     _, cell = KDTree(places[chosen]).query(places)
     cell_area = np.bincount(cell, minlength=count) * (area.sum() / samples)
     return index[chosen], barycentric[chosen], cell_area
+
+
+def _morton(places: np.ndarray) -> np.ndarray:
+    """Position along a Z-shaped space-filling curve of 2 mm cells, uint64, shape (N,)."""
+    cells = ((places - places.min(axis=0)) / 2e-3).astype(np.uint64)
+    code = np.zeros(len(places), dtype=np.uint64)
+    for bit in range(20):
+        for axis in range(3):
+            picked = (cells[:, axis] >> np.uint64(bit)) & np.uint64(1)
+            code |= picked << np.uint64(3 * bit + axis)
+    return code

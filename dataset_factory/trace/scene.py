@@ -128,13 +128,11 @@ def set_frequency(scene: rt.Scene, freq_hz: float) -> None:
     scene.frequency = dr.opaque(mi.Float, freq_hz)
 
 
-def add_devices(
-    scene: rt.Scene, layout: Layout, devices: list[DevicePose], which: list[int]
-) -> None:
-    """Adds the devices of the given indices as one-element transmitters and receivers."""
+def add_devices(scene: rt.Scene, layout: Layout, devices: list[DevicePose]) -> None:
+    """Adds every device as a one-element transmitter and a one-element receiver, in order."""
     tx_centres, rx_centres = centres(layout)
-    for index in which:
-        orientation = mi.Point3f(*euler_angles(devices[index].quat_wxyz))
+    for index, device in enumerate(devices):
+        orientation = mi.Point3f(*euler_angles(device.quat_wxyz))
         tx, rx = tx_centres[index].tolist(), rx_centres[index].tolist()
         scene.add(rt.Transmitter(f"tx-{index}", position=tx, orientation=orientation))
         scene.add(rt.Receiver(f"rx-{index}", position=rx, orientation=orientation))

@@ -123,7 +123,8 @@ def room(scale: float = 1.0) -> None:
     floor.data.from_pydata([(-2, -2, 0), (2, -2, 0), (2, 2, 0), (-2, 2, 0)], [], [(0, 1, 2, 3)])
     crate = box("crate", (0, 0, 0), (0.5, 0.5, 0.5), "painted")
     crate.location = (1.2, 0.9, 0)
-    crate.modifiers.new("mirror", "MIRROR").use_axis[0] = True
+    # Without merging, both halves stay closed boxes.
+    crate.modifiers.new("mirror", "MIRROR").use_mirror_merge = False
     person()
     for index, (x, y) in enumerate(((3.0, -1.5), (-2.5, -2.5))):
         camera = bpy.data.objects.new(f"eye{index}", bpy.data.cameras.new(f"eye{index}"))

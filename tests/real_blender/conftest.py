@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A real Blender, with the extension installed for itself alone."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@dataclass(frozen=True)
+class RealBlender:
+    """A program and the folder that holds its settings and extensions."""
+
+    program: Path
+    version: str
+    resources: Path
+
+    def run(self, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [str(self.program), *map(str, arguments)],
+            env={**os.environ, "BLENDER_USER_RESOURCES": str(self.resources)},
+            cwd=self.resources,
+            capture_output=True,
+            text=True,
+            timeout=280,
+            check=False,
+        )
+
+    def bare(self, resources: Path) -> RealBlender:
+        """The same program with other settings, and so without the extension."""
+        return replace(self, resources=resources)
+
+    def rfgs(self, blend: Path, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
+        """Runs `--command rfgs` on a file."""
+        return self.run("-b", blend, "--disable-autoexec", "--command", "rfgs", *arguments)
+
+
+@pytest.fixture(scope="session")
+def extension_tool() -> list[str]:
+    """Blender's own builder and validator of extensions, from pip's bpy."""
+    spec = importlib.util.find_spec("bpy")
+    assert spec is not None and spec.origin is not None
+    found = Path(spec.origin).parent.glob("*/scripts/addons_core/bl_pkg/cli/blender_ext.py")
+    return [sys.executable, str(next(found))]
+
+
+@pytest.fixture(scope="session")
+def extension_zip(extension_tool: list[str], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The add-on, built by Blender's own tool."""
+    path = tmp_path_factory.mktemp("extension") / "addon_rfgs.zip"
+    arguments = ["build", "--source-dir", str(ROOT / "addon_rfgs"), "--output-filepath", str(path)]
+    done = subprocess.run(
+        [*extension_tool, *arguments], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return path
+
+
+def find_program() -> Path | None:
+    """$BLENDER, else the one that `.ci/install_blender.sh` installed."""
+    named = os.environ.get("BLENDER")
+    if named:
+        return Path(named)
+    installed = ROOT / ".blender" / "blender"
+    return installed if installed.exists() else None
+
+
+@pytest.fixture(scope="session")
+def blender(
+    extension_zip: Path,
+    tmp_path_factory: pytest.TempPathFactory,
+    pytestconfig: pytest.Config,
+) -> RealBlender:
+    """A real Blender in which the extension is enabled; its version goes to the terminal."""
+    program = find_program()
+    if program is None:
+        pytest.skip("no Blender: set BLENDER=/path/to/blender or run .ci/install_blender.sh")
+    bare = RealBlender(program, "", tmp_path_factory.mktemp("blender"))
+    match = re.search(r"Blender (\d+\.\d+\S*)", bare.run("--version").stdout)
+    assert match, f"{program} does not answer to --version"
+    reporter = pytestconfig.pluginmanager.get_plugin("terminalreporter")
+    if reporter is not None:
+        reporter.write_line(f"\nBlender {match[1]} at {program}")
+    install = ("-b", "--command", "extension", "install-file", "-r", "user_default", "-e")
+    done = bare.run(*install, extension_zip)
+    assert 'Installed "addon_rfgs"' in done.stdout, done.stdout + done.stderr
+    return RealBlender(program, match[1], bare.resources)

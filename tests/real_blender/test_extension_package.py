@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Blender's own tool accepts the add-on as an extension; needs no Blender program."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_manifest_is_valid(extension_tool: list[str]) -> None:
+    done = subprocess.run(
+        [*extension_tool, "validate", str(ROOT / "addon_rfgs")],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_package_holds_the_sources_and_nothing_else(extension_zip: Path) -> None:
+    with zipfile.ZipFile(extension_zip) as package:
+        names = set(package.namelist())
+    sources = {path.name for path in (ROOT / "addon_rfgs").glob("*.py")}
+    assert names == sources | {"blender_manifest.toml", "tables.json"}
+
+
+def test_add_on_imports_only_itself_numpy_and_the_standard_library() -> None:
+    allowed = {"bpy", "mathutils", "numpy", "_cycles", *sys.stdlib_module_names}
+    for path in (ROOT / "addon_rfgs").glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.Import):
+                assert {alias.name.split(".")[0] for alias in node.names} <= allowed, path
+            elif isinstance(node, ast.ImportFrom) and node.level == 0:
+                assert str(node.module).split(".")[0] in allowed, path

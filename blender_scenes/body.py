@@ -13,7 +13,7 @@ PHENOTYPE = {
     "age": 0.62,
     "muscle": 0.56,
     "weight": 0.46,
-    "height": 0.36,
+    "height": 0.38,
     "proportions": 0.7,
 }
 

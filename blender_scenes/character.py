@@ -75,9 +75,9 @@ def _tail(body: Body, index: int) -> np.ndarray:
     if len(children) == 1 and np.linalg.norm(body.heads[children[0]] - head) > 1e-3:
         return body.heads[children[0]]
     if name in ("root", "head"):
-        return head + [0.0, 0.0, 0.15]
+        return head + np.array([0.0, 0.0, 0.15])
     if name.startswith("toe"):
-        return head + [0.0, -0.06, 0.0]
+        return head + np.array([0.0, -0.06, 0.0])
     direction = head - body.heads[body.parents[index]]
     length = max(float(np.linalg.norm(direction)), 1e-3)
     return head + direction / length * min(max(length, 0.02), 0.08)

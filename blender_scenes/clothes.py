@@ -7,6 +7,7 @@ sheets; so a shirt is the torso's surface, smoothed and pushed outwards.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -56,19 +57,27 @@ def cuts(body: Body) -> dict[str, Cut]:
     up = np.array([0.0, 0.0, 1.0])
     head, neck = body.head("head"), body.head("neck01")
     made = {
-        "hairline": Cut(("head",), 0, head + [0.0, -0.098, 0.112], np.array([0.0, 0.60, 0.80])),
-        "collar": Cut(
-            ("torso", "head"), 0, neck + [0.0, -0.01, 0.002], np.array([0.0, -0.42, 0.91])
+        "hairline": Cut(
+            ("head",), 0, head + np.array([0.0, -0.10, 0.104]), np.array([0.0, 0.355, 0.935])
         ),
-        "waist": Cut(("torso", "leg"), 0, body.head("spine04") + [0.0, 0.0, -0.015], -up),
-        "sole": Cut(("foot",), 0, np.array([0.0, 0.0, 0.017]), -up),
+        "behind_ears": Cut(
+            ("head",), 0, head + np.array([0.0, 0.024, 0.0]), np.array([0.0, 1.0, 0.0])
+        ),
+        "nape": Cut(
+            ("head",), 0, head + np.array([0.0, 0.05, -0.005]), np.array([0.0, -0.2, 0.98])
+        ),
+        "collar": Cut(
+            ("torso", "head"), 0, neck + np.array([0.0, -0.01, 0.002]), np.array([0.0, -0.42, 0.91])
+        ),
+        "waist": Cut(("torso", "leg"), 0, body.head("spine04") + np.array([0.0, 0.0, -0.015]), -up),
+        "sole": Cut(("foot",), 0, np.array([0.0, 0.0, 0.024]), -up),
     }
     for name, side in (("L", 1), ("R", -1)):
         shoulder, elbow = body.head(f"upperarm01.{name}"), body.head(f"lowerarm01.{name}")
         axis = (elbow - shoulder) / np.linalg.norm(elbow - shoulder)
         made[f"sleeve.{name}"] = Cut(("arm",), side, shoulder + 0.72 * (elbow - shoulder), axis)
         ankle = body.head(f"foot.{name}")
-        made[f"shoe.{name}"] = Cut(("leg", "foot"), side, ankle + [0.0, 0.0, 0.018], -up)
+        made[f"shoe.{name}"] = Cut(("leg", "foot"), side, ankle + np.array([0.0, 0.0, 0.018]), -up)
     return made
 
 
@@ -85,9 +94,10 @@ def surface_of(points: np.ndarray, limbs: np.ndarray, borders: dict[str, Cut]) -
     shoe = foot | leg
     shoe &= beyond["shoe.L"] | beyond["shoe.R"]
     bare = arm & (beyond["sleeve.L"] | beyond["sleeve.R"])
+    hair = beyond["hairline"] | (beyond["behind_ears"] & beyond["nape"])
     names = np.full(len(points), "skin", dtype=object)
-    names[beyond["hairline"]] = "hair"
-    names[(torso | (limbs == 0)) & ~beyond["collar"] & ~beyond["hairline"]] = "shirt"
+    names[(torso | (limbs == 0)) & ~beyond["collar"]] = "shirt"
+    names[hair] = "hair"
     names[arm & ~bare] = "shirt"
     names[((torso & beyond["waist"]) | leg | foot) & ~shoe] = "trousers"
     names[shoe] = "shoes"
@@ -101,11 +111,11 @@ def dress(body: Body) -> Body:
     surface = surface_of(body.vertices, limbs.argmax(axis=1), cuts(body))
     neighbours = _neighbours(body.faces, len(body.vertices))
     vertices = body.vertices
-    for name, rounds, push in (
-        ("shirt", 22, 0.014),
-        ("trousers", 14, 0.010),
-        ("shoes", 8, 0.006),
-        ("hair", 12, 0.016),
+    for name, rounds, push, hem in (
+        ("shirt", 22, 0.014, 0.35),
+        ("trousers", 26, 0.014, 0.7),
+        ("shoes", 8, 0.008, 0.6),
+        ("hair", 12, 0.019, 0.3),
     ):
         inside = (surface == name) | ((name == "shoes") & (surface == "soles"))
         # Fade over a few rings of vertices, so that hems have no spikes.
@@ -114,13 +124,21 @@ def dress(body: Body) -> Body:
             mask = np.minimum(mask, neighbours(mask))
         for _ in range(rounds):
             vertices = vertices + 0.6 * mask[:, None] * (neighbours(vertices) - vertices)
-        normals = _normals(vertices, body.faces)
-        vertices = vertices + push * np.where(inside, 0.35 + 0.65 * mask, 0.0)[:, None] * normals
+        thickness = push * np.where(inside, hem + (1 - hem) * mask, 0.0)
+        if name == "trousers":
+            thickness = thickness * _flare(body)
+        vertices = vertices + thickness[:, None] * _normals(vertices, body.faces)
     vertices[:, 2] = np.maximum(vertices[:, 2], 0.0)
     return replace(body, vertices=vertices)
 
 
-def _neighbours(faces: np.ndarray, count: int):  # noqa: ANN202
+def _flare(body: Body) -> np.ndarray:
+    """How much wider trousers hang towards the ankle, where legs are thinnest, shape (V,)."""
+    knee = body.head("lowerleg01.L")[2]
+    return 1.0 + 1.1 * np.clip(1 - body.vertices[:, 2] / (1.15 * knee), 0.0, 1.0)
+
+
+def _neighbours(faces: np.ndarray, count: int) -> Callable[[np.ndarray], np.ndarray]:
     """A function that averages a vertex quantity over each vertex's neighbours."""
     pairs = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     degree = np.bincount(pairs[:, 0], minlength=count).astype(np.float64)

@@ -9,6 +9,9 @@ import bpy
 
 from blender_scenes.shapes import Builder, Point
 
+#: Outline of a leaf: distance from the foot and width as shares of its length, rise [m].
+_LEAF = ((0.12, 0.01, 0.03), (0.4, 0.34, 0.14), (0.7, 0.30, 0.15), (1.0, 0.01, 0.02))
+
 
 def build_decoration(collection: bpy.types.Collection) -> list[bpy.types.Object]:
     """Builds and places everything that makes the room look lived in."""
@@ -16,6 +19,7 @@ def build_decoration(collection: bpy.types.Collection) -> list[bpy.types.Object]
         curtain("curtain_left").build(collection, location=(2.90, 0.80, 0.0)),
         curtain("curtain_right").build(collection, location=(2.90, -1.50, 0.0)),
         curtain_rod().build(collection),
+        door_handle().build(collection, location=(-3.0, -1.0, 1.03)),
         floor_lamp().build(collection, location=(-1.42, -2.10, 0.0)),
         ceiling_light().build(collection, location=(0.0, 0.1, 0.0)),
         plant().build(collection, location=(-1.18, 2.17, 0.0)),
@@ -54,6 +58,14 @@ def curtain_rod() -> Builder:
             [(0.008, -0.025), (0.025, 0.0), (0.008, 0.025)], (2.90, y, 2.43), "brass", sides=10
         )
     return rod
+
+
+def door_handle() -> Builder:
+    """A lever of brass, clear of the door by more than a centimetre."""
+    handle = Builder("door_handle")
+    handle.rod((-0.022, 0, 0), (0.03, 0, 0), 0.012, "brass")
+    handle.rod((0.03, 0.012, 0), (0.03, -0.11, 0), 0.009, "brass")
+    return handle
 
 
 def floor_lamp() -> Builder:
@@ -113,9 +125,7 @@ def _leaf(tree: Builder, foot: Point, angle: float, reach: float) -> None:
     """A leaf of length `reach` [m] that rises from `foot` and bends over."""
     cos, sin = math.cos(angle), math.sin(angle)
     rows = []
-    for share, width, rise in ((0.12, 0.01, 0.03), (0.4, 0.34, 0.14), (0.7, 0.30, 0.15)) + (
-        (1.0, 0.01, 0.02),
-    ):
+    for share, width, rise in _LEAF:
         along, half = share * reach, 0.5 * width * reach
         row: list[Point] = []
         for side, fold in ((-1, 0.12), (0, 0.0), (1, 0.12)):

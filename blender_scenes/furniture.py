@@ -70,7 +70,7 @@ def tv_unit() -> Builder:
         unit.box((0.10, 0.015, 0.012), (x, -0.228, 0.475), "brass", bevel=0.003)
     for x in (-0.70, 0.70):
         for y in (-0.14, 0.14):
-            unit.rod((x, y, 0.165), (x * 1.04, y * 1.1, GAP_M), 0.022, "brass", taper=0.7)
+            unit.rod((x, y, 0.165), (x * 1.04, y * 1.1, GAP_M + 0.006), 0.022, "brass", taper=0.7)
     return unit
 
 
@@ -135,7 +135,7 @@ def dining_table() -> Builder:
     table.box((1.07, 0.60, 0.06), (0, 0, 0.685), "oak", bevel=0.004)
     for x in (-0.53, 0.53):
         for y in (-0.30, 0.30):
-            table.rod((x, y, 0.71), (x * 1.05, y * 1.08, GAP_M), 0.034, "oak", taper=0.6)
+            table.rod((x, y, 0.71), (x * 1.05, y * 1.08, GAP_M + 0.006), 0.034, "oak", taper=0.6)
     bowl = [(0.06, 0.0), (0.12, 0.04), (0.15, 0.09), (0.138, 0.09), (0.08, 0.03)]
     table.lathe(bowl, (0, 0, 0.755), "paper_white", sides=20)
     for angle in (0.3, 2.4, 4.5):

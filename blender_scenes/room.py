@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import bpy
 
@@ -34,18 +35,33 @@ WINDOW = Opening(
     u=(-1.25, 0.55),
     v=(0.85, 2.20),
     recess=0.08,
-    columns=((0.03, "white_wood"), (0.455, ""), (0.03, "white_wood"), (0.455, ""))
-    + ((0.03, "white_wood"),),
+    columns=(
+        (0.03, "white_wood"),
+        (0.455, ""),
+        (0.03, "white_wood"),
+        (0.455, ""),
+        (0.03, "white_wood"),
+    ),
     rows=((0.04, "white_wood"), (0.92, "window_pane"), (0.04, "white_wood")),
 )
 DOOR = Opening(
     u=(-1.75, -0.85),
     v=(0.0, 2.05),
     recess=0.04,
-    columns=((0.06, "white_wood"), (0.14, "door_wood"), (0.60, ""), (0.14, "door_wood"))
-    + ((0.06, "white_wood"),),
-    rows=((0.10, "door_wood"), (0.32, "walnut"), (0.08, "door_wood"), (0.38, "walnut"))
-    + ((0.09, "door_wood"), (0.03, "white_wood")),
+    columns=(
+        (0.06, "white_wood"),
+        (0.14, "door_wood"),
+        (0.60, ""),
+        (0.14, "door_wood"),
+        (0.06, "white_wood"),
+    ),
+    rows=(
+        (0.10, "door_wood"),
+        (0.32, "door_panel"),
+        (0.08, "door_wood"),
+        (0.38, "door_panel"),
+        (0.12, "door_wood"),
+    ),
 )
 
 
@@ -108,8 +124,8 @@ def _wall(
 
     us = [-half, half] if hole is None else [-half, *hole.u, half]
     vs = sorted({0.0, SKIRTING_M, SIZE_M[2], *(hole.v if hole else ())})
-    for u in zip(us, us[1:], strict=False):
-        for v in zip(vs, vs[1:], strict=False):
+    for u in pairwise(us):
+        for v in pairwise(vs):
             if hole and u == hole.u and hole.v[0] <= v[0] and v[1] <= hole.v[1]:
                 continue
             rectangle(u, v, "white_wood" if v[1] <= SKIRTING_M else surface, 0.0)

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 from blender_scenes.shapes import Builder
 
 
@@ -21,7 +23,7 @@ def sofa() -> Builder:
         )
     for x in (-0.93, 0.93):
         for y in (-0.33, 0.33):
-            seat.rod((x, y, 0.15), (x * 1.01, y * 1.03, 0.012), 0.028, "walnut", taper=0.65)
+            seat.rod((x, y, 0.15), (x * 1.01, y * 1.03, 0.018), 0.028, "walnut", taper=0.65)
     return seat
 
 
@@ -35,7 +37,7 @@ def armchair() -> Builder:
     for x in (-0.35, 0.35):
         seat.box((0.11, 0.64, 0.38), (x, 0.01, 0.40), cloth, bevel=0.045, segments=3)
         for y in (-0.25, 0.27):
-            seat.rod((x * 0.9, y, 0.20), (x, y * 1.1, 0.012), 0.02, "walnut", taper=0.6)
+            seat.rod((x * 0.9, y, 0.20), (x, y * 1.1, 0.018), 0.02, "walnut", taper=0.6)
     return seat
 
 
@@ -44,11 +46,11 @@ def chair(name: str) -> Builder:
     seat = Builder(name)
     seat.box((0.43, 0.42, 0.03), (0, 0, 0.455), "oak", bevel=0.012, segments=2)
     for x in (-0.18, 0.18):
-        seat.rod((x, 0.17, 0.44), (x * 1.1, 0.195, 0.012), 0.014, "black_metal")
-        seat.rod((x, -0.17, 0.44), (x * 1.1, -0.205, 0.012), 0.014, "black_metal")
+        seat.rod((x, 0.17, 0.44), (x * 1.1, 0.195, 0.018), 0.014, "black_metal")
+        seat.rod((x, -0.17, 0.44), (x * 1.1, -0.205, 0.018), 0.014, "black_metal")
         seat.rod((x, -0.19, 0.44), (x * 0.98, -0.245, 0.82), 0.013, "black_metal")
     backs = [(x / 10, -0.235 - 0.03 * (1 - (x / 2) ** 2)) for x in (-2, -1, 0, 1, 2)]
-    for (x0, y0), (x1, y1) in zip(backs, backs[1:], strict=False):
+    for (x0, y0), (x1, y1) in pairwise(backs):
         centre = ((x0 + x1) / 2, (y0 + y1) / 2, 0.755)
         turn = (y1 - y0) / (x1 - x0)
         seat.box((0.106, 0.018, 0.17), centre, "oak", bevel=0.004, tilt=(0.14, 0, turn))

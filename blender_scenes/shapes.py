@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import bmesh
 import bpy
@@ -97,7 +98,7 @@ class Builder:
                 ]
             )
         faces = []
-        for low, high in zip(rings, rings[1:], strict=False):
+        for low, high in pairwise(rings):
             for index in range(sides):
                 after = (index + 1) % sides
                 faces.append(self._bm.faces.new((low[index], low[after], high[after], high[index])))
@@ -127,7 +128,7 @@ class Builder:
         """Adds a single-sided grid of quads through `rows` of points."""
         verts = [[self._bm.verts.new(point) for point in row] for row in rows]
         faces = []
-        for low, high in zip(verts, verts[1:], strict=False):
+        for low, high in pairwise(verts):
             for index in range(len(low) - 1):
                 faces.append(
                     self._bm.faces.new((low[index], low[index + 1], high[index + 1], high[index]))

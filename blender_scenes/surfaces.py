@@ -45,7 +45,8 @@ SURFACES: dict[str, Surface] = {
     "window_pane": Surface((0.80, 0.90, 1.0), "glass", 0.006, "pane", roughness=0.1),
     "oak": Surface((0.46, 0.29, 0.15), "wood", 0.03, "grain", (0.34, 0.20, 0.095), 0.4),
     "walnut": Surface((0.17, 0.085, 0.045), "wood", 0.03, "grain", (0.10, 0.048, 0.026), 0.4),
-    "door_wood": Surface((0.34, 0.19, 0.095), "wood", 0.04, "grain", (0.25, 0.135, 0.065), 0.4),
+    "door_wood": Surface((0.36, 0.20, 0.10), "wood", 0.04, roughness=0.45),
+    "door_panel": Surface((0.30, 0.16, 0.078), "wood", 0.04, roughness=0.45),
     "sofa_cloth": Surface(
         (0.12, 0.20, 0.29), "chipboard", 0.03, "weave", (0.09, 0.155, 0.23), 0.95
     ),

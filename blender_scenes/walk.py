@@ -85,8 +85,8 @@ def _arm(turns: dict[str, np.ndarray], gait: Gait, body: Body, side: str, time_s
     chest = turns["spine01"]
     clavicle = chest @ about_z(0.03 * swing * -sign) @ about_y(0.05 * sign)
     forward, bend = 0.07 + 0.33 * swing, 0.36 + 0.17 * swing
-    upper = _hanging(forward, 0.15 * sign)
-    fore = _hanging(forward + bend, -0.06 * sign)
+    upper = _hanging(forward, 0.19 * sign)
+    fore = _hanging(forward + bend, -0.02 * sign)
     joints = [body.head(f"{name}.{side}") for name in ("upperarm01", "lowerarm01", "wrist")]
     rest_upper, rest_fore = joints[1] - joints[0], joints[2] - joints[1]
     rest_hinge, hinge = np.cross(rest_upper, rest_fore), np.cross(upper, fore)

@@ -13,7 +13,7 @@ from torch import Tensor
 from torch.autograd.function import once_differentiable
 
 from rfgs_core.propagation import kernels_scatter, kernels_scatter_gradient, kernels_shadow
-from rfgs_core.propagation.covariance import covariances, packed
+from rfgs_core.propagation.covariance import packed_covariances
 from rfgs_core.propagation.fresnel import leg_frames
 from rfgs_core.propagation.geometry import EnvironmentPaths, Links, Tones
 from rfgs_core.propagation.kernels_scatter import UNROLL, Cloud, Plan
@@ -162,7 +162,7 @@ def scatter(
     plan = Plan(*(_rows(ends, torch.float64), _rows(group, torch.int64), chunks.chunk, chunks.tone))
     total = _Scatter.apply(
         means.T,
-        packed(covariances(quats, scales_rf)),
+        packed_covariances(quats, scales_rf),
         torch.stack([gain.real, gain.imag], dim=2).to(real),
         visibility.T,
         normals.T,
@@ -220,6 +220,6 @@ def shadow(
     paths: EnvironmentPaths,
 ) -> Complex[Tensor, "path"]:
     """Twin of `rfgs_core.propagation.shadow` on the CPU's vector units."""
-    shape = packed(covariances(quats.to(torch.float64), scales.to(torch.float64)))
+    shape = packed_covariances(quats.to(torch.float64), scales.to(torch.float64))
     legs = leg_frames(paths).table().numpy()
     return _Shadow.apply(means.T, shape, alpha.to(scales.dtype), legs, paths.wavelength_m)

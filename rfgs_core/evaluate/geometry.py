@@ -123,7 +123,7 @@ def _first_rank(rank, origin, voxel, points, radius):
     return out
 
 
-def _f_score(precision: np.ndarray, recall: np.ndarray) -> np.ndarray:
+def _f_score(precision: np.ndarray | np.floating, recall: np.ndarray | np.floating) -> Any:
     """F = 2PR/(P+R), zero where both are."""
     return 2.0 * precision * recall / np.maximum(precision + recall, 1e-30)
 
@@ -179,23 +179,31 @@ def geometry_metrics(
     """
     if score.shape != grid.shape:
         raise ValueError(f"expected a score of shape {grid.shape}, got {score.shape}")
-    reference = np.ascontiguousarray(reference, dtype=np.float64)
     ranked = best_voxels(score, BEST_K_FACTOR * k)
     if len(ranked) == 0:
         nothing: dict[str, float | None] = dict.fromkeys(GEOMETRY_KEYS)
         return nothing | {"f05": 0.0, "f10": 0.0, "f20": 0.0, "f10_best": 0.0, "tracked": 0.0}
-    centres = grid.centres(ranked)
-    predicted = centres[: min(k, len(ranked))]
-    distance_m = KDTree(reference).query(centres)[0]
+    reference = np.ascontiguousarray(reference, dtype=np.float64)
+    distance_m = KDTree(reference).query(grid.centres(ranked))[0]
+    curve = f_score_curve(ranked, distance_m, grid, reference, THRESHOLDS_M["f10"])
+    predicted = grid.centres(ranked[:k])
+    result = _compare(predicted, distance_m[:k], reference)
+    return result | {"f10_best": float(curve.max())}
+
+
+def _compare(
+    predicted: Float[np.ndarray, "k 3"],
+    distance_m: Float[np.ndarray, "k"],
+    reference: Float[np.ndarray, "n 3"],
+) -> dict[str, float | None]:
+    """Metrics of predicted centres, whose distances to the reference are known [m]."""
     back_m = KDTree(predicted).query(reference)[0]
     result: dict[str, float | None] = {}
     for name, threshold_m in THRESHOLDS_M.items():
-        precision = np.mean(distance_m[: len(predicted)] <= threshold_m)
-        result[name] = float(_f_score(precision, np.mean(back_m <= threshold_m)))
-    curve = f_score_curve(ranked, distance_m, grid, reference, THRESHOLDS_M["f10"])
-    result["f10_best"] = float(curve.max())
-    result["chamfer_m"] = float(0.5 * (distance_m[: len(predicted)].mean() + back_m.mean()))
+        precision, recall = np.mean(distance_m <= threshold_m), np.mean(back_m <= threshold_m)
+        result[name] = float(_f_score(precision, recall))
     centroid_m = float(np.linalg.norm(predicted.mean(axis=0) - reference.mean(axis=0)))
+    result["chamfer_m"] = float(0.5 * (distance_m.mean() + back_m.mean()))
     result["centroid_m"] = centroid_m
     result["height_m"] = abs(_height_m(predicted) - _height_m(reference))
     result["tracked"] = float(centroid_m <= TRACKED_M)

@@ -116,13 +116,6 @@ def splat_gaussians(
 
     Returns:
         Score in the unit of `power`.
-
-    Example:
-        >>> grid = Grid.over(np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]]))
-        >>> covariance = 0.05**2 * np.eye(3)[None]
-        >>> score = splat_gaussians(grid, np.full((1, 3), 0.5), covariance, np.ones(1))
-        >>> round(float(score.sum()), 4)
-        1.0
     """
     used = np.asarray(power) > 0.0
     smoothed = np.asarray(covariances, dtype=np.float64)[used]

@@ -56,10 +56,21 @@ def evaluate_run(run: EvaluatedRun, *, oracle: bool = True) -> dict[str, Any]:
     _add_oracle(scene, table, oracle)
     groups = table.groups(image)
     metrics: dict[str, Any] = groups.pop(METHOD)
-    metrics |= {
+    metrics["controls"] = groups
+    metrics["reasons"] = table.reasons(image, image_reasons, bool(pictures))
+    metrics["frames"] = table.frames()
+    metrics |= _circumstances(scene)
+    metrics["verdicts"] = verdicts(metrics)
+    metrics["eval_s"] = round(time.perf_counter() - start_s, 2)
+    write_json(run.path / "metrics.json", metrics)
+    return metrics
+
+
+def _circumstances(scene: Scene) -> dict[str, Any]:
+    """What stands beside the numbers."""
+    run = scene.run
+    return {
         "schema": SCHEMA,
-        "controls": groups,
-        "reasons": table.reasons(image, image_reasons, bool(pictures)),
         "limits": limits(scene),
         "trace_depth": run.sequence.trace_depth,
         "n_gaussians": len(run.gaussians(run.frames[0])),
@@ -68,12 +79,7 @@ def evaluate_run(run: EvaluatedRun, *, oracle: bool = True) -> dict[str, Any]:
         "hardware": hardware(),
         "versions": versions(),
         "date": now(),
-        "frames": table.frames(),
     }
-    metrics["verdicts"] = verdicts(metrics)
-    metrics["eval_s"] = round(time.perf_counter() - start_s, 2)
-    write_json(run.path / "metrics.json", metrics)
-    return metrics
 
 
 class _Table:

@@ -113,6 +113,22 @@ def frame_rf(
         error = np.abs(true[where] - predicted[where]).astype(np.float64)
         power = np.abs(true[where]).astype(np.float64)
         result[name] = (float(np.sum(error**2)), float(np.sum(power**2)))
+    result["gain_db"] = _gain_errors_db(true, predicted, held_out, tx_device, rx_device)
+    links = held_out.pair_links | held_out.element_links
+    result["delay_profile_corr"] = _correlation(
+        delay_profiles(true[links]), delay_profiles(predicted[links])
+    )
+    return result
+
+
+def _gain_errors_db(
+    true: Complex[np.ndarray, "tx rx subcarrier"],
+    predicted: Complex[np.ndarray, "tx rx subcarrier"],
+    held_out: HeldOut,
+    tx_device: Int[np.ndarray, "tx"],
+    rx_device: Int[np.ndarray, "rx"],
+) -> list[float | None]:
+    """Absolute difference of mean power per ordered held-out device pair [dB]."""
     gains: list[float | None] = []
     for a in np.unique(tx_device):
         for b in np.unique(rx_device):
@@ -123,12 +139,7 @@ def frame_rf(
             got = float(np.mean(np.abs(predicted[links]).astype(np.float64) ** 2))
             if want > 0.0:
                 gains.append(abs(10.0 * float(np.log10(got / want))) if got > 0.0 else None)
-    result["gain_db"] = gains
-    links = held_out.pair_links | held_out.element_links
-    result["delay_profile_corr"] = _correlation(
-        delay_profiles(true[links]), delay_profiles(predicted[links])
-    )
-    return result
+    return gains
 
 
 def rf_values(frame: Mapping[str, Any]) -> dict[str, float | None]:

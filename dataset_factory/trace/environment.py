@@ -9,6 +9,7 @@ import sionna.rt as rt
 from dataset_factory.bundle import Bundle
 from dataset_factory.trace.paths import PathSet, empty, merged, path_set
 from dataset_factory.trace.scene import add_devices, centres, static_scene
+from dataset_factory.trace.steering import steer
 from rfgs_core.radio import Layout, Radio
 from rfgs_core.radio.layout import DevicePose
 
@@ -46,14 +47,30 @@ def environment_paths(
         seed: Seed of the rays, the same for a whole sequence.
 
     Returns:
-        Paths with one amplitude per node frequency.
+        Paths with one amplitude per node frequency, times frequency over the band's centre: an
+        antenna's aperture goes with the wavelength, so what is left is smooth in frequency.
     """
     nodes = node_frequencies(radio)
     if len(nodes) == NARROW_BAND_NODES:
         traced = _traced(bundle, radio, layout, devices, seed, radio.centre_hz)
-        # Walls hardly change over a narrow band, but an antenna's aperture goes with λ.
-        return _with_amplitude(traced, traced.amplitude * (radio.centre_hz / nodes))
+        # Walls hardly change over a narrow band.
+        return _with_amplitude(traced, np.repeat(traced.amplitude, len(nodes), axis=1))
     return _joined([_traced(bundle, radio, layout, devices, seed, float(f)) for f in nodes])
+
+
+def environment_channel(
+    paths: PathSet, radio: Radio, layout: Layout, transmission: np.ndarray | None = None
+) -> np.ndarray:
+    """Channel of the environment, complex128, shape (tx, rx, subcarrier).
+
+    Args:
+        paths: Paths of `environment_paths`.
+        radio: The radio they were traced for.
+        layout: Antenna elements.
+        transmission: Shadow factors as `steer` takes them; None for none.
+    """
+    channel = steer(paths, layout, radio.freq_hz, node_frequencies(radio), transmission)
+    return channel * (radio.centre_hz / radio.freq_hz)
 
 
 def measured_pairs(layout: Layout) -> np.ndarray:
@@ -90,6 +107,7 @@ def _traced(
         seed=seed,
     )
     found = path_set(paths, tx_centres, rx_centres)
+    found = _with_amplitude(found, found.amplitude * (freq_hz / radio.centre_hz))
     return found.select(measured_pairs(layout)[found.tx, found.rx])
 
 

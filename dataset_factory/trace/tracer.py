@@ -15,7 +15,11 @@ import sionna.rt as rt
 from dataset_factory.bundle import Bundle, BundleFrame
 from dataset_factory.trace.bounces import BUFFER, Bounces, with_facets
 from dataset_factory.trace.direct import PosedPoints, direct_channel
-from dataset_factory.trace.environment import environment_paths, node_frequencies
+from dataset_factory.trace.environment import (
+    environment_channel,
+    environment_paths,
+    node_frequencies,
+)
 from dataset_factory.trace.points import SurfacePoints, surface_points
 from dataset_factory.trace.scene import (
     BODY,
@@ -98,9 +102,8 @@ class Tracer:
 
     def static(self) -> np.ndarray:
         """Channel without anything that moves, complex64, shape (tx, rx, subcarrier)."""
-        return steer(self._environment, self._layout, self._radio.freq_hz, self._nodes).astype(
-            np.complex64
-        )
+        channel = environment_channel(self._environment, self._radio, self._layout)
+        return channel.astype(np.complex64)
 
     def frame(self, frame: BundleFrame) -> np.ndarray:
         """Channel at one frame; the result does not depend on frames traced before.
@@ -118,9 +121,7 @@ class Tracer:
             passed = transmission(
                 self._environment, self._layout, bodies, self._nodes, self._shadow
             )
-            channel = steer(
-                self._environment, self._layout, self._radio.freq_hz, self._nodes, passed
-            )
+            channel = environment_channel(self._environment, self._radio, self._layout, passed)
         self._move(frame)
         points = self._posed(frame)
         with self._timed("people_direct"):

@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from dataset_factory.bundle import Bundle, read_bundle
+from dataset_factory.trace.setup import prepare
+from rfgs_core.files import write_json
+from rfgs_core.radio import DevicePose, Radio, preset
+
+prepare()
+
+ROOM_M = (4.0, 4.0, 2.6)
+Mesh = tuple[np.ndarray, np.ndarray]
+MakeBundle = Callable[..., Bundle]
+
+
+def sheet(corner: tuple[float, ...], side_u: tuple[float, ...], side_v: tuple[float, ...]) -> Mesh:
+    p, u, v = (np.asarray(x, dtype=np.float32) for x in (corner, side_u, side_v))
+    return np.stack([p, p + u, p + u + v, p + v]), np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+
+
+def room() -> list[Mesh]:
+    x, y, z = ROOM_M
+    return [
+        sheet((0, 0, 0), (x, 0, 0), (0, y, 0)),
+        sheet((0, 0, z), (x, 0, 0), (0, y, 0)),
+        sheet((0, 0, 0), (x, 0, 0), (0, 0, z)),
+        sheet((0, y, 0), (x, 0, 0), (0, 0, z)),
+        sheet((0, 0, 0), (0, y, 0), (0, 0, z)),
+        sheet((x, 0, 0), (0, y, 0), (0, 0, z)),
+    ]
+
+
+def capsule(subdivisions: int = 4) -> Mesh:
+    """A person-sized ellipsoid that stands on the floor at the origin."""
+    ball = trimesh.creation.icosphere(subdivisions=subdivisions, radius=1.0)
+    vertices = ball.vertices * [0.25, 0.18, 0.8] + [0.0, 0.0, 0.85]
+    return vertices.astype(np.float32), ball.faces.astype(np.int32)
+
+
+def write_bundle(
+    folder: Path,
+    static: list[Mesh],
+    mover: Mesh | None,
+    *,
+    material: str = "plasterboard",
+    scattering: float = 0.0,
+    mover_class: str = "person",
+) -> Bundle:
+    (folder / "static").mkdir(parents=True)
+    (folder / "frames").mkdir()
+    files = []
+    for index, (vertices, faces) in enumerate(static):
+        files.append(f"static/wall{index}__wall.ply")
+        data = trimesh.Trimesh(vertices, faces, process=False).export(file_type="ply")
+        (folder / files[-1]).write_bytes(data)
+    vertices, faces = mover or (np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32))
+    np.savez(
+        folder / "topology.npz",
+        faces=faces,
+        material=np.full(len(faces), 1, np.int32),
+        instance=np.full(len(faces), 1, np.int32),
+        segment=np.full(len(faces), -1, np.int32),
+        rest_vertices=vertices,
+    )
+    for frame, place in enumerate([(1.7, 2.1, 0.0), (2.2, 1.8, 0.0)], start=1):
+        np.savez(
+            folder / "frames" / f"{frame:06d}.npz",
+            vertices=vertices + np.float32(place),
+            joints=np.zeros((1, 17, 3), np.float32),
+            person_instance=np.array([1], np.int32),
+            action=np.array(["walk"]),
+        )
+    row = {"id": 1, "name": "room", "class": "static", "instance": 0, "moving": False}
+    moving = {"id": 2, "name": "mover", "class": mover_class, "instance": 1, "moving": True}
+    wall = {"name": "wall", "radio_material": material, "thickness_m": 0.0125}
+    skin = {"name": "skin", "radio_material": "skin", "thickness_m": 0.3}
+    common = {"color": [0.5, 0.5, 0.5], "guessed": False}
+    info = {
+        "schema": "rfgs-bundle/1",
+        "blend_name": "test",
+        "blend_sha256": "0" * 64,
+        "blender_version": "4.5.0",
+        "addon_version": "0.1.0",
+        "fps": 10,
+        "frame_start": 1,
+        "frame_end": 2,
+        "frames": [1, 2],
+        "bounds_m": [[0.0, 0.0, 0.0], list(ROOM_M)],
+        "devices": [],
+        "cameras": [],
+        "materials": [
+            {**wall, **common, "scattering_coefficient": scattering},
+            {**skin, **common, "scattering_coefficient": 0.0},
+        ],
+        "objects": [{**row, "files": files}, {**moving, "files": []}],
+        "instances": [{"id": 1, "name": "mover", "class": mover_class, "person": True}],
+    }
+    write_json(folder / "bundle.json", info)
+    return read_bundle(folder)
+
+
+@pytest.fixture(scope="session")
+def make_bundle(tmp_path_factory: pytest.TempPathFactory) -> MakeBundle:
+    """Writes a bundle of a room and one mover to disk and reads it back."""
+
+    def make(static: list[Mesh] | None = None, mover: Mesh | None = None, **options) -> Bundle:
+        folder = tmp_path_factory.mktemp("bundle") / "bundle"
+        return write_bundle(folder, room() if static is None else static, mover, **options)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def person_bundle(make_bundle: MakeBundle) -> Bundle:
+    return make_bundle(mover=capsule())
+
+
+@pytest.fixture
+def small_radio() -> Radio:
+    """Two devices of one transmitter and 2 by 2 receivers; long waves keep points few."""
+    return replace(
+        preset("wifi"),
+        freq_min_hz=2.40e9,
+        freq_max_hz=2.48e9,
+        num_subcarriers=16,
+        rx_rows=2,
+        rx_cols=2,
+        num_devices=2,
+    )
+
+
+@pytest.fixture
+def two_devices() -> list[DevicePose]:
+    """Two upright devices that face each other across the room, at different heights."""
+    return [
+        DevicePose("a", (0.4, 0.5, 1.2), (0.9238795, 0.0, 0.0, 0.3826834)),
+        DevicePose("b", (3.5, 3.6, 2.1), (0.3826834, 0.0, 0.0, -0.9238795)),
+    ]

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numba
+import numpy as np
+import pytest
+
+from dataset_factory.bundle import Bundle
+from rfgs_core.radio import DevicePose, Radio, layout
+
+MakeBundle = Callable[..., Bundle]
+UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+TILTED = (0.8660254, 0.35, -0.25, 0.2549510)
+
+
+def error_db(found: np.ndarray, exact: np.ndarray) -> float:
+    error = np.sum(np.abs(found - exact) ** 2) / np.sum(np.abs(exact) ** 2)
+    return float(10 * np.log10(max(error, 1e-30)))
+
+
+def posed_body(bundle: Bundle, radio: Radio, devices: list[DevicePose]) -> tuple:
+    """Scene with the body at frame 1 and its points, through the tracer's own steps."""
+    from dataset_factory.trace import Tracer
+
+    tracer = Tracer(bundle, radio, devices, depth=2)
+    frame = bundle.frame(1)
+    tracer._move(frame)
+    return tracer, tracer._posed(frame)
+
+
+@pytest.mark.parametrize("quat", [UPRIGHT, TILTED], ids=["upright", "tilted"])
+def test_direct_term_matches_the_solver(
+    make_bundle: MakeBundle,
+    small_radio: Radio,
+    two_devices: list[DevicePose],
+    quat: tuple[float, float, float, float],
+) -> None:
+    from conftest import capsule
+
+    from dataset_factory.trace.bounces import with_facets
+    from dataset_factory.trace.direct import direct_channel
+    from dataset_factory.trace.paths import path_set
+    from dataset_factory.trace.scene import centres
+    from dataset_factory.trace.steering import steer
+
+    radio = replace(small_radio, rx_rows=1, rx_cols=1, num_subcarriers=4)
+    devices = [replace(device, quat_wxyz=quat) for device in two_devices]
+    tracer, points = posed_body(make_bundle(static=[], mover=capsule(3)), radio, devices)
+    elements = layout(radio, devices)
+    bounces = tracer._bounces
+    bounces._hang(points.lifted)
+    traced = bounces._solver(
+        tracer._scene, max_depth=1, samples_per_sp=1, buffer_size_per_sp=16, seed=0
+    )
+    nodes = radio.freq_hz
+    paths = path_set(traced, *centres(elements))
+    paths = with_facets(paths, points, tracer._gamma(nodes), nodes, radio.centre_hz)
+    solver = steer(paths, elements, radio.freq_hz, nodes)
+    ours = direct_channel(
+        tracer._scene.mi_scene, points, elements, devices, tracer._gamma(nodes), nodes
+    )
+    assert error_db(ours, solver) < -80.0
+
+
+def test_chunked_bounces_match_one_call(
+    person_bundle: Bundle,
+    small_radio: Radio,
+    two_devices: list[DevicePose],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from dataset_factory.trace import bounces
+
+    # Enough rays that every wall is hit from every point, whatever its place in a chunk.
+    monkeypatch.setattr(bounces, "NUM_SAMPLES", 4000)
+    tracer, points = posed_body(person_bundle, small_radio, two_devices)
+    whole = tracer._bounced(points, tracer._bounces)
+    monkeypatch.setattr(bounces, "CHUNK", 400)
+    assert error_db(tracer._bounced(points, tracer._bounces), whole) < -60.0
+
+
+def test_joined_legs_match_the_original_solver(
+    person_bundle: Bundle, small_radio: Radio, two_devices: list[DevicePose]
+) -> None:
+    from sionna.rt.rcs import RCSSolver
+
+    tracer, points = posed_body(person_bundle, small_radio, two_devices)
+    ours = tracer._bounced(points, tracer._bounces)
+    tracer._bounces._solver = RCSSolver(deterministic=True)
+    assert error_db(tracer._bounced(points, tracer._bounces), ours) < -100.0
+
+
+def test_bounced_elements_match_tracing_each_of_them(
+    make_bundle: MakeBundle, small_radio: Radio, two_devices: list[DevicePose]
+) -> None:
+    from conftest import capsule, room
+
+    radio = replace(small_radio, rx_rows=2, rx_cols=2, own_device_links="excluded")
+    single = replace(radio, rx_rows=1, rx_cols=1)
+    bundle = make_bundle(static=room()[:3], mover=capsule(3))
+    tracer, points = posed_body(bundle, radio, two_devices)
+    ours = tracer._bounced(points, tracer._bounces)[0, 4::3]
+    elements = layout(radio, two_devices).rx_xyz[4::3]
+    alone = []
+    for place in elements:
+        devices = [two_devices[0], replace(two_devices[1], position_m=tuple(place.tolist()))]
+        lone, _ = posed_body(bundle, single, devices)
+        alone.append(lone._bounced(points, lone._bounces)[0, 1])
+    assert error_db(ours, np.stack(alone)) < -25.0
+
+
+def test_frames_are_reciprocal(
+    person_bundle: Bundle, small_radio: Radio, two_devices: list[DevicePose]
+) -> None:
+    from dataset_factory.trace import Tracer
+
+    radio = replace(
+        small_radio, rx_rows=1, rx_cols=1, tx_offset_m=(0.0, 0.0, 0.0), own_device_links="excluded"
+    )
+    csi = Tracer(person_bundle, radio, two_devices, depth=2).frame(person_bundle.frame(1))
+    assert error_db(csi[0, 1], csi[1, 0]) < -60.0
+
+
+def test_same_seed_gives_the_same_bytes_for_any_threads_and_order(
+    person_bundle: Bundle, small_radio: Radio, two_devices: list[DevicePose]
+) -> None:
+    import drjit as dr
+
+    from dataset_factory.trace import Tracer
+
+    frames = [person_bundle.frame(1), person_bundle.frame(2)]
+    before = dr.thread_count(), numba.get_num_threads()
+    try:
+        dr.set_thread_count(2)
+        tracer = Tracer(person_bundle, small_radio, two_devices, depth=2, seed=0)
+        first = [tracer.static(), *(tracer.frame(frame) for frame in frames)]
+        dr.set_thread_count(1)
+        numba.set_num_threads(1)
+        tracer = Tracer(person_bundle, small_radio, two_devices, depth=2, seed=0)
+        second = [tracer.frame(frames[1]), tracer.frame(frames[0]), tracer.static()][::-1]
+    finally:
+        dr.set_thread_count(before[0])
+        numba.set_num_threads(before[1])
+    assert [a.tobytes() for a in first] == [b.tobytes() for b in second]
+    assert not np.array_equal(first[1], first[2])
+
+
+def test_person_changes_the_channel_by_shadow_and_scatter(
+    person_bundle: Bundle, small_radio: Radio, two_devices: list[DevicePose]
+) -> None:
+    from dataset_factory.trace import Tracer
+
+    soft = Tracer(person_bundle, small_radio, two_devices, depth=1)
+    hard = Tracer(person_bundle, small_radio, two_devices, depth=1, shadow="hard")
+    frame = person_bundle.frame(1)
+    static, with_person = soft.static(), soft.frame(frame)
+    assert -60 < error_db(with_person, static) < 0
+    assert not np.array_equal(hard.frame(frame), with_person)
+    assert soft.timings["environment"] > 0 and soft.timings["people_direct"] > 0
+    assert soft.timings["people_bounces"] == 0

@@ -48,7 +48,8 @@ def parser(program: str) -> argparse.ArgumentParser:
     load.add_argument("--out", type=Path, help=".blend to save")
     load.add_argument("--picture", type=Path, help="PNG to render")
     load.add_argument("--camera", help="camera object for the picture (default: a chosen view)")
-    load.add_argument("--resolution", type=int, default=960, help="longer side of the picture")
+    load.add_argument("--resolution", type=int, default=480, help="longer side of each half (480)")
+    load.add_argument("--samples", type=int, default=16, help="samples per pixel (16)")
     load.add_argument("--mode", choices=("points", "ellipsoids"), default="points")
     load.add_argument("--opacity-threshold", type=float, default=0.1)
     return main
@@ -130,7 +131,9 @@ def _import(options: argparse.Namespace, out: TextIO) -> str:
         options.path,
         imports.Display(options.mode, options.opacity_threshold),
         blend=options.out,
-        picture=imports.Picture(options.picture, options.camera, options.resolution)
+        picture=imports.Picture(
+            options.picture, options.camera, options.resolution, options.samples
+        )
         if options.picture
         else None,
     )

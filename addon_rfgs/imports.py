@@ -38,8 +38,10 @@ class Picture:
     """PNG to write."""
     camera: str | None = None
     """Name of a camera object; None chooses one."""
-    resolution: int = 960
+    resolution: int = 480
     """Longer side of each half [px]."""
+    samples: int = 16
+    """Samples per pixel."""
 
 
 def import_command(
@@ -92,7 +94,7 @@ def render_picture(
         scene.frame_set(frame)
         camera = _choose_camera(scene, imported, display, picture.camera)
         scene.camera = camera
-        _configure(keeper, scene, width, height)
+        _configure(keeper, scene, (width, height), picture.samples)
         halves = []
         with lights_ready(scene), replacing(picture.path) as temporary:
             for hidden in (imported.objects, moving):
@@ -190,11 +192,11 @@ def _score(scene: bpy.types.Scene, camera: bpy.types.Object, points: np.ndarray)
     return seen / len(points) * np.sqrt(min(area, 0.5))
 
 
-def _configure(keeper: Keeper, scene: bpy.types.Scene, width: int, height: int) -> None:
+def _configure(keeper: Keeper, scene: bpy.types.Scene, size: tuple[int, int], samples: int) -> None:
     for name, value in {
         "engine": "CYCLES",
-        "resolution_x": width,
-        "resolution_y": height,
+        "resolution_x": size[0],
+        "resolution_y": size[1],
         "resolution_percentage": 100,
         "use_compositing": False,
         "use_sequencer": False,
@@ -203,7 +205,7 @@ def _configure(keeper: Keeper, scene: bpy.types.Scene, width: int, height: int) 
     }.items():
         keeper.set(scene.render, name, value)
     keeper.set(scene.cycles, "device", "CPU")
-    keeper.set(scene.cycles, "samples", 48)
+    keeper.set(scene.cycles, "samples", samples)
     keeper.set(scene.cycles, "use_adaptive_sampling", False)
     keeper.set(scene.cycles, "use_denoising", can_denoise())
 

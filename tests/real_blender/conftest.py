@@ -14,6 +14,15 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
+#: Which Blender ran, for the last lines of the report.
+_RAN = pytest.StashKey[str]()
+
+
+def pytest_terminal_summary(
+    terminalreporter: pytest.TerminalReporter, config: pytest.Config
+) -> None:
+    """Says which Blender ran."""
+    terminalreporter.write_line(f"real Blender: {config.stash.get(_RAN, 'none ran')}")
 
 
 @dataclass(frozen=True)
@@ -87,9 +96,7 @@ def blender(
     bare = RealBlender(program, "", tmp_path_factory.mktemp("blender"))
     match = re.search(r"Blender (\d+\.\d+\S*)", bare.run("--version").stdout)
     assert match, f"{program} does not answer to --version"
-    reporter = pytestconfig.pluginmanager.get_plugin("terminalreporter")
-    if reporter is not None:
-        reporter.write_line(f"\nBlender {match[1]} at {program}")
+    pytestconfig.stash[_RAN] = f"Blender {match[1]} at {program}"
     install = ("-b", "--command", "extension", "install-file", "-r", "user_default", "-e")
     done = bare.run(*install, extension_zip)
     assert 'Installed "addon_rfgs"' in done.stdout, done.stdout + done.stderr

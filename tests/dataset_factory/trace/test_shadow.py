@@ -69,9 +69,8 @@ def test_hard_shadow_is_all_or_nothing() -> None:
 def test_elements_see_the_shadow_from_where_they_are() -> None:
     tx, rx = np.zeros(3), np.array([D_1 + D_2, 0.3, 0.1])
     offsets = np.array([[0.0, -0.1, -0.1], [0.0, 0.1, 0.1], [0.0, 0.0, 0.12]])
-    vertices, faces = screen(-60.0, 0.02)
-    # Narrow enough to stay between the ends, which lie askew.
-    body = (vertices * [1.0, 0.1, 0.1] + [0.0, 0.0, 0.018], faces)
+    vertices, faces = screen(-1.7, 0.02)
+    body = (vertices * [1.0, 0.005, 1.0], faces)
     paths, layout = line_of_sight(tx, rx, offsets)
     together = transmission(paths, layout, [body], FREQ_HZ, "kirchhoff")[0, 0, :, 0]
     for offset, value in zip(offsets, together, strict=True):

@@ -12,12 +12,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from dataset_factory.children import child_environment, end_with_parent
 from rfgs_core.errors import MissingToolError, RfgsError
 
 Progress = Callable[[int, int], None]
 
 _PROGRESS = re.compile(r"progress (\d+) (\d+)")
-_SOURCE = Path(__file__).resolve().parents[1]
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,6 @@ class Blender:
                 raise _failure(name, code, [*said, *log.read().splitlines()[-40:]])
 
     def _start(self, command: list[str], log: object) -> subprocess.Popen[str]:
-        path = os.pathsep.join(filter(None, [str(_SOURCE), os.environ.get("PYTHONPATH")]))
         try:
             return subprocess.Popen(
                 command,
@@ -81,8 +80,9 @@ class Blender:
                 stderr=log,  # type: ignore[arg-type]
                 text=True,
                 errors="replace",
-                env={**os.environ, "PYTHONPATH": path},
+                env=child_environment(),
                 start_new_session=True,
+                preexec_fn=end_with_parent,
             )
         except (FileNotFoundError, PermissionError) as error:
             raise MissingToolError(

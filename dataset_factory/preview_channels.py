@@ -16,6 +16,8 @@ from rfgs_core.radio.layout import rotation
 OVERSAMPLING = 8
 #: Dynamic range of images [dB].
 RANGE_DB = 40.0
+#: Dynamic range of delay profiles [dB].
+PROFILE_RANGE_DB = 110.0
 
 _KINDS = ("with people", "static", "difference")
 _COLOURS = ("#0b6bcb", "#8a94a3", "#d9480f")
@@ -38,11 +40,13 @@ def profile_figure(sequence: Sequence, radio: str, frame: int) -> Figure:
     )
     axis.set(xlabel="frequency [GHz]", ylabel="receiving element")
     figure.colorbar(shown, ax=axis, label="amplitude [dB]", pad=0.01)
-    first = None
+    first, top = None, -np.inf
     for index, (a, b) in enumerate(pairs):
         axis = figure.add_subplot(grid[1 + index // 4, index % 4], sharex=first, sharey=first)
         first = first or axis
         _profiles(axis, sequence, radio, (a, b), (csi, static, csi - static))
+        top = max(top, *(np.max(np.asarray(line.get_ydata())) for line in axis.lines[:3]))
+        axis.set_ylim(top - PROFILE_RANGE_DB, top + 5.0)
         if index == 0:
             axis.legend(fontsize=7, loc="upper right")
     return figure
@@ -59,7 +63,8 @@ def delay_angle_figure(sequence: Sequence, radio: str, frame: int) -> Figure:
         for axis, value, title in zip(row, (csi, static, csi - static), _KINDS, strict=True):
             power, angle_deg, length_m = delay_angle(sequence, radio, value, (a, b))
             level = _db(power)
-            top = level.max()
+            # A device's own transmitter is so near that it would hide the room.
+            top = level[:, length_m > (1.0 if a == b else 0.0)].max()
             shown = axis.imshow(
                 level.T,
                 origin="lower",

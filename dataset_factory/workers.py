@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import os
 import queue
 import subprocess
 import sys
@@ -14,9 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
+from dataset_factory.children import child_environment, end_with_parent
 from rfgs_core.errors import RfgsError
-
-_SOURCE = Path(__file__).resolve().parents[1]
 
 #: One library's worker pool inside each process would make processes fight for cores.
 _SINGLE_THREADED = {
@@ -95,16 +93,16 @@ def run_tasks(
 
 
 def _start(log: IO[str]) -> subprocess.Popen[str]:
-    path = os.pathsep.join(filter(None, [str(_SOURCE), os.environ.get("PYTHONPATH")]))
     return subprocess.Popen(
         [sys.executable, "-m", "dataset_factory.worker"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=log,
         text=True,
-        env={**os.environ, **_SINGLE_THREADED, "PYTHONPATH": path},
+        env=child_environment(**_SINGLE_THREADED),
         # Ctrl-C reaches the parent alone, which then ends its workers.
         start_new_session=True,
+        preexec_fn=end_with_parent,
     )
 
 

@@ -183,7 +183,7 @@ class Nodes:
     def glow(self, surface: Surface) -> None:
         """A lamp that is switched on."""
         self.shader.inputs["Emission Color"].default_value = (*surface.colour, 1.0)
-        self.shader.inputs["Emission Strength"].default_value = 1.6
+        self.shader.inputs["Emission Strength"].default_value = 0.85
 
     def pane(self, surface: Surface) -> None:
         """Bright sky to the eye, clear glass to the sun's light."""

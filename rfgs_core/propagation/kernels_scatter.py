@@ -74,27 +74,29 @@ class Plan(NamedTuple):
     """First frequency, spacing, centre frequency [Hz] and centre offset, float64 [chunk, 4]."""
 
 
-@njit(inline="always", **OPTIONS)
-def _leg(x: float, y: float, z: float) -> Any:
-    """Length of a vector, its inverse and the unit vector."""
-    length = math.sqrt(x * x + y * y + z * z)
-    inverse = 1.0 / length
-    return length, inverse, x * inverse, y * inverse, z * inverse
-
-
 @njit(**OPTIONS)
 def illuminate(
     cloud: Cloud, end: np.ndarray, first: int, n: int, distance: np.ndarray, w: np.ndarray
 ) -> None:
     """Path lengths, unit vectors, spread Q and 1 / (d_t d_r) of one block and link."""
+    means, real = cloud.means, w.dtype.type
+    one = real(1.0)
     for b in range(n):
         i = first + b
-        x, y, z = cloud.means[0, i], cloud.means[1, i], cloud.means[2, i]
-        dt, it, tx, ty, tz = _leg(end[0] - x, end[1] - y, end[2] - z)
-        dr, ir, rx, ry, rz = _leg(end[3] - x, end[4] - y, end[5] - z)
-        distance[b] = dt + dr
-        w[UTX, b], w[UTY, b], w[UTZ, b], w[INV_T, b] = tx, ty, tz, it
-        w[URX, b], w[URY, b], w[URZ, b], w[INV_R, b] = rx, ry, rz, ir
+        # Lengths in double for the phase; float32 is enough for directions.
+        x, y, z = end[0] - means[0, i], end[1] - means[1, i], end[2] - means[2, i]
+        length = math.sqrt(x * x + y * y + z * z)
+        inverse = one / real(length)
+        w[UTX, b], w[UTY, b], w[UTZ, b] = real(x) * inverse, real(y) * inverse, real(z) * inverse
+        w[INV_T, b], distance[b] = inverse, length
+    for b in range(n):
+        i = first + b
+        x, y, z = end[3] - means[0, i], end[4] - means[1, i], end[5] - means[2, i]
+        length = math.sqrt(x * x + y * y + z * z)
+        inverse = one / real(length)
+        w[URX, b], w[URY, b], w[URZ, b] = real(x) * inverse, real(y) * inverse, real(z) * inverse
+        w[INV_R, b] = inverse
+        distance[b] += length
     shape = cloud.shape
     for b in range(n):
         i = first + b

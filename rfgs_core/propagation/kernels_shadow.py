@@ -45,10 +45,11 @@ class Screens(NamedTuple):
 
 
 @njit(inline="always", **_OPTIONS)
-def _fade(x: float) -> Any:
-    """Smooth step 3x^2 - 2x^3 from 0 to 1 and its slope."""
-    x = min(max(x, 0.0), 1.0)
-    return x * x * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x)
+def _fade(x: Any) -> Any:
+    """Smooth step 3x^2 - 2x^3 from 0 to 1 and its slope, in the precision of x."""
+    one = type(x)(1.0)
+    x = min(max(x, type(x)(0.0)), one)
+    return x * x * (one + (one - x) + (one - x)), type(x)(6.0) * x * (one - x)
 
 
 @njit(inline="always", **_OPTIONS)
@@ -72,21 +73,22 @@ def _project(
 ) -> None:
     """Offsets, kappa, fade and projected covariances of one block and leg."""
     ax, ay, az, ux, uy, uz, fx, fy, fz, sx, sy, sz, length, before, behind = leg
-    total = before + length + behind
-    scale = wavelength_m / (2 * np.pi * max(total, 1e-300))
-    means, per_edge = screens.means, 1.0 / EDGE_M
+    means, real = screens.means, w.dtype.type
+    zero, end, per_edge = real(0.0), real(length), real(1.0 / EDGE_M)
+    scale = real(wavelength_m / (2 * np.pi * max(before + length + behind, 1e-300)))
+    before, behind = real(before), real(behind)
     for b in range(n):
         i = first + b
         x, y, z = means[0, i] - ax, means[1, i] - ay, means[2, i] - az
-        t = x * ux + y * uy + z * uz
         w[_X, b] = x * fx + y * fy + z * fz
         w[_Y, b] = x * sx + y * sy + z * sz
-        inside = min(max(t, 0.0), length)
-        d1, d2 = before + inside, behind + length - inside
+        t = real(x * ux + y * uy + z * uz)
+        inside = min(max(t, zero), end)
+        d1, d2 = before + inside, behind + end - inside
         w[_KAPPA, b] = scale * d1 * d2
         w[_SLOPE, b] = scale * (d2 - d1)
         rise, rise_slope = _fade(t * per_edge)
-        fall, fall_slope = _fade((length - t) * per_edge)
+        fall, fall_slope = _fade((end - t) * per_edge)
         w[_EDGE, b] = rise * fall
         w[_EDGE_SLOPE, b] = per_edge * (rise_slope * fall - rise * fall_slope)
         w[_ALPHA, b] = screens.alpha[i]
@@ -163,14 +165,14 @@ def _blob(w: np.ndarray, b: int) -> Any:
 @njit(**_OPTIONS)
 def _multiply(n: int, w: np.ndarray, tr: np.ndarray, ti: np.ndarray) -> None:
     """Multiplies the running products by 1 - alpha e g; -300 dB and less become zero."""
-    one, zero, least = w.dtype.type(1.0), w.dtype.type(0.0), w.dtype.type(_LEAST**2)
+    one, least = w.dtype.type(1.0), w.dtype.type(_LEAST**2)
     for b in range(n):
         gr, gi, _, _, _, _, _, _ = _blob(w, b)
         weight = w[_ALPHA, b] * w[_EDGE, b]
         x, y = _product(tr[b], ti[b], one - weight * gr, -weight * gi)
-        alive = x * x + y * y > least
-        tr[b] = x if alive else zero
-        ti[b] = y if alive else zero
+        # A factor, not a branch: branches would keep this loop scalar.
+        alive = w.dtype.type(x * x + y * y > least)
+        tr[b], ti[b] = x * alive, y * alive
 
 
 @njit(parallel=True, **_OPTIONS)
@@ -204,20 +206,21 @@ def _differentiate(n: int, w: np.ndarray, seed: np.ndarray) -> None:
     `seed` is the real and imaginary part of conj(dL/dT) T.
     """
     real = w.dtype.type
-    half, one = real(0.5), real(1.0)
+    half, one, tiny = real(0.5), real(1.0), real(_TINY)
+    seed_r, seed_i = seed[0], seed[1]
     for b in range(n):
         gr, gi, mr, mi, vxr, vxi, vyr, vyi = _blob(w, b)
         kappa, xx, yy, xy = w[_KAPPA, b], w[_XX, b], w[_YY, b], w[_XY, b]
         alpha, edge = w[_ALPHA, b], w[_EDGE, b]
         cr, ci = one - alpha * edge * gr, -alpha * edge * gi
-        norm = -one / (cr * cr + ci * ci + real(_TINY))
-        hr, hi = _product(seed[0], seed[1], cr * norm, -ci * norm)
+        norm = -one / (cr * cr + ci * ci + tiny)
+        hr, hi = _product(seed_r, seed_i, cr * norm, -ci * norm)
         hr, hi = _product(hr, hi, gr, gi)
         w[_ALPHA, b], w[_EDGE, b] = hr * edge, hr * alpha
         hr, hi = hr * alpha * edge, hi * alpha * edge
         w[_X, b], w[_Y, b] = hi * vxi - hr * vxr, hi * vyi - hr * vyr
 
-        inverse = one / (w[_DET, b] + real(_TINY))
+        inverse = one / (w[_DET, b] + tiny)
         sqr, sqi = _product(vxr, vxi, vxr, vxi)
         tqr, tqi = _product(vyr, vyi, vyr, vyi)
         mixr, mixi = _product(vxr, vxi, vyr, vyi)

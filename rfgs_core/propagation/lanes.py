@@ -3,7 +3,12 @@
 
 numba calls the C library for `exp`, `sin` and `cos`, one value at a time. The float32 versions
 here are short polynomials without branches, so that loops over Gaussians become SIMD code. The
-float64 versions are the library's: they serve gradient checks, not speed.
+float64 versions are the library's: they serve gradient checks, not speed. They are inlined
+before compilation (`inline="always"`), as LLVM leaves a loop scalar when it still finds a call;
+numba's `max` of two numbers is such a call.
+
+numba's cache looks at the file of a kernel only: after editing this module, remove the cached
+kernels of its neighbours (`__pycache__/*.nbi`).
 """
 
 from __future__ import annotations
@@ -39,7 +44,7 @@ def sine_cosine_of_turns(turns: float) -> tuple[float, float]:
     return math.sin(2 * math.pi * turns), math.cos(2 * math.pi * turns)
 
 
-@overload(exponential, jit_options=_OPTIONS)
+@overload(exponential, inline="always", jit_options=_OPTIONS)
 def _exponential(x: Any) -> Any:
     """Chooses the implementation of `exponential` by type."""
 
@@ -64,7 +69,7 @@ def _exponential(x: Any) -> Any:
     return single if x == types.float32 else double
 
 
-@overload(sine_cosine_of_turns, jit_options=_OPTIONS)
+@overload(sine_cosine_of_turns, inline="always", jit_options=_OPTIONS)
 def _sine_cosine_of_turns(turns: Any) -> Any:
     """Chooses the implementation of `sine_cosine_of_turns` by type."""
 

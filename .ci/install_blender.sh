@@ -38,15 +38,21 @@ mirror=$(apt-get indextargets --format '$(ORIGIN) $(COMPONENT) $(REPO_URI)' 'Cre
 mkdir -p "$dir"
 dir=$(cd "$dir" && pwd)
 
+# Removes an unfinished folder; debootstrap may have left /proc and /sys mounted inside it.
+discard() {
+  for mount in proc sys; do umount "$1/$mount" 2>/dev/null || true; done
+  rm -rf --one-file-system "$1"
+}
+
 # $1: suite. Leaves $dir/root complete, or absent.
 install_suite() {
   staging=$dir/.staging-$1
-  rm -rf "$staging"
+  discard "$staging"
   echo "installing Blender from Debian $1 into $dir (about two minutes, 2 GB)"
   log=$dir/install-$1.log
   # No deb-src and no device nodes: only the files are used, from outside of the folder.
   debootstrap --variant=minbase "$1" "$staging" "$mirror" >"$log" 2>&1 || return 1
-  # Downloads go through this machine's own apt settings (proxies, credentials helpers).
+  # Downloads go through this machine's own apt settings (proxies).
   for setting in Acquire::http::Proxy Acquire::https::Proxy; do
     value=$(apt-config shell v "$setting" | sed "s/^v='\(.*\)'$/\1/")
     [ -z "$value" ] || echo "$setting \"$value\";" >>"$staging/etc/apt/apt.conf.d/90proxy"
@@ -65,10 +71,10 @@ if [ -x "$dir/root/usr/bin/blender" ]; then
   suite="as installed before"
 elif ! install_suite sid; then
   echo "Debian unstable cannot be installed here (see $dir/install-sid.log); trying Debian 13's Blender 4.3" >&2
-  rm -rf "$dir/.staging-sid"
+  discard "$dir/.staging-sid"
   suite=trixie
   if ! install_suite trixie; then
-    rm -rf "$dir/.staging-trixie"
+    discard "$dir/.staging-trixie"
     fail "Debian 13 failed too, see $dir/install-trixie.log; set BLENDER=/path/to/blender instead"
   fi
 fi

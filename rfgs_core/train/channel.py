@@ -91,5 +91,5 @@ class Channel:
         return lost.to(torch.complex64)
 
     def change(self, head: RadioHead, gaussians: Gaussians) -> Complex[Tensor, "link subcarrier"]:
-        """csi − csi_static: scattering plus shadow."""
+        """Csi − csi_static: scattering plus shadow."""
         return self.scattered(head, gaussians) + self.shadowed(head, gaussians)

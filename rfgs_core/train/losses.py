@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from jaxtyping import Complex, Float, Int64
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 from torch import Tensor
 
 from rfgs_core.gaussians import Gaussians
@@ -35,7 +35,7 @@ def nearest_gaussian(
     points: Float[Tensor, "N 3"], means: Float[Tensor, "M 3"]
 ) -> tuple[Int64[Tensor, "N"], Float[Tensor, "N"]]:
     """Index of and distance [m] to the Gaussian closest to each point."""
-    distance, index = cKDTree(means.detach().numpy()).query(points.numpy())
+    distance, index = KDTree(means.detach().numpy()).query(points.numpy())
     return torch.from_numpy(np.asarray(index)), torch.from_numpy(np.asarray(distance)).float()
 
 

@@ -66,15 +66,15 @@ def _conjugate_gradients(
     residual = adjoint(y)
     x = torch.zeros_like(residual)
     step = residual.clone()
-    energy = torch.linalg.vdot(residual, residual).real
+    energy = torch.vdot(residual, residual).real
     for _ in range(iterations):
         if energy <= 0:
             break
         image = step + adjoint(forward(step))
-        along = energy / torch.linalg.vdot(step, image).real
+        along = energy / torch.vdot(step, image).real
         x = x + along * step
         residual = residual - along * image
-        after = torch.linalg.vdot(residual, residual).real
+        after = torch.vdot(residual, residual).real
         step = residual + after / energy * step
         energy = after
     return x

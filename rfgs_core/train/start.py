@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import torch
 from jaxtyping import Float, Float64
@@ -15,12 +17,15 @@ from rfgs_core.train.localise import PairMaps
 PRIOR_RADIUS_M = 0.20
 #: Height above which the prior falls off, and how fast [m].
 PRIOR_HEIGHT_M, PRIOR_HEIGHT_FALL_M = 1.6, 0.08
-#: Exponent of the matched filter against the prior; 0.5 was best on both radios.
-EVIDENCE_EXPONENT = 0.5
+#: Exponent of the matched filter against the prior, chosen on a room that is not in the demo.
+EVIDENCE_EXPONENT = 0.25
 #: Standard deviation of a new Gaussian along the surface and across it [m].
 START_SCALES_M = (0.04, 0.04, 0.025)
-#: Opacity of a new Gaussian: some 6000 of them make a body nearly opaque.
-START_OPACITY = 0.3
+#: Layers that the new Gaussians put on a body's silhouette. The shadow model multiplies
+#: transmissions of complex blobs, which is only sound while few layers overlap.
+START_COVERAGE = 1.5
+#: Silhouette of a standing body [m²].
+SILHOUETTE_M2 = 0.75
 
 
 def log_density(
@@ -76,7 +81,9 @@ def quats_from_normals(normals: Float[np.ndarray, "N 3"]) -> Float[Tensor, "N 4"
 def gaussians_at(points: Float[np.ndarray, "N 3"], normals: Float[np.ndarray, "N 3"]) -> Gaussians:
     """Flat Gaussians at `points` facing along `normals`, features zero."""
     count = len(points)
-    opacity = torch.full((count,), START_OPACITY)
+    blob_m2 = 2 * math.pi * START_SCALES_M[0] * START_SCALES_M[1]
+    layers = START_COVERAGE * SILHOUETTE_M2 / (max(count, 1) * blob_m2)
+    opacity = torch.full((count,), min(layers, 0.5))
     return Gaussians(
         means=torch.from_numpy(np.ascontiguousarray(points)).float(),
         quats=quats_from_normals(normals),

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`rfgs train`: fits Gaussians to the channel of a sequence."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from rfgs_core.train.config import Objective, Recipe, TrainConfig
+
+
+@dataclass(frozen=True)
+class TrainArgs:
+    """Fits Gaussians to the channel of a sequence, frame by frame, and keeps them in a run.
+
+    Pictures are only used afterwards, to colour frozen Gaussians for display. Running the same
+    command again continues where it stopped.
+    """
+
+    dataset: tyro.conf.Positional[Path]
+    """Dataset folder, as `rfgs-factory generate` makes it."""
+    radio: str
+    """Which of the dataset's radios, for example wifi."""
+    out: Path
+    """Folder of the run."""
+    sequence: str | None = None
+    """Which sequence; may be left out when there is only one."""
+    frames: str | None = None
+    """Frames A:B[:STEP] (inclusive), or one number; all when left out."""
+    objective: Objective = "csi"
+    """csi: the propagation model; paper: eq. 4-7 of the paper; both: their sum."""
+    recipe: Recipe = "rfgs"
+    """rfgs: our start, rates and steps; paper: the paper's numbers."""
+    seed: int = 0
+    """Root seed; 0 is a seed like any other."""
+    iterations: int | None = None
+    """Adam steps per frame; the recipe's own number when left out."""
+    gaussians: int | None = None
+    """Moving Gaussians at the start; the recipe's own number when left out."""
+    shader: Annotated[bool, tyro.conf.arg(name="shader")] = True
+    """Colour the frozen Gaussians from training pictures afterwards, for display only."""
+
+
+def chosen_frames(text: str | None, available: list[int]) -> list[int]:
+    """Frames of a dataset that A:B[:STEP] asks for.
+
+    Raises:
+        RfgsError: The text is not of that form, or names no frame the dataset has.
+    """
+    from rfgs_core.errors import RfgsError
+
+    if text is None:
+        return list(available)
+    try:
+        parts = [int(part) for part in text.split(":")]
+    except ValueError as error:
+        raise RfgsError(f"--frames {text}: expected A:B, A:B:STEP or one number") from error
+    if len(parts) > 3 or (len(parts) == 3 and parts[2] < 1):
+        raise RfgsError(f"--frames {text}: expected A:B, A:B:STEP or one number")
+    first, last = parts[0], parts[min(1, len(parts) - 1)]
+    step = parts[2] if len(parts) == 3 else 1
+    wanted = range(first, last + 1, step)
+    frames = [frame for frame in available if frame in wanted]
+    if not frames:
+        raise RfgsError(
+            f"--frames {text}: none of these is in the dataset, which holds {available}"
+        )
+    return frames
+
+
+def run(args: TrainArgs) -> int:
+    """Trains, then colours the result where the dataset has pictures."""
+    from rfgs_core.dataset import open_dataset
+    from rfgs_core.errors import RfgsError
+    from rfgs_core.render.shader import ShaderConfig
+    from rfgs_core.render.view import fit_run_shader
+    from rfgs_core.seeds import sub_seed
+    from rfgs_core.train.sequence import train_sequence
+
+    config = TrainConfig.of_recipe(args.recipe, args.objective, args.seed)
+    if args.iterations is not None:
+        config = replace(config, iterations=args.iterations)
+    if args.gaussians is not None:
+        config = replace(config, num_gaussians=args.gaussians)
+    dataset = open_dataset(args.dataset)
+    sequence = dataset.sequence(args.sequence)
+    if args.radio not in sequence.radios:
+        raise RfgsError(
+            f"{args.dataset} ({sequence.name}) has no radio {args.radio!r}; "
+            f"it has {', '.join(sequence.radios)}"
+        )
+    frames = chosen_frames(args.frames, sequence.frames)
+    trained = train_sequence(dataset, sequence, args.radio, frames, config, args.out)
+    pictures = {"images", "mask"} <= set(dataset.has)
+    if args.shader and pictures and not (args.out / "shader.npz").exists():
+        seed = sub_seed(args.seed, "shader")
+        fit_run_shader(trained, ShaderConfig.for_recipe(args.recipe, seed))
+    sys.stdout.write(
+        f"{args.out}: {len(frames)} frames, {len(trained.moving(frames[0]))} Gaussians, "
+        f"{trained.config['train_s']:.0f} s; next: rfgs eval {args.out}\n"
+    )
+    return 0

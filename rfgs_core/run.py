@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A trained run on disk: configuration, Gaussians per frame and what they predict."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from jaxtyping import Complex64
+
+from rfgs_core.dataset import Sequence, open_dataset
+from rfgs_core.errors import RfgsError, RfgsFormatError
+from rfgs_core.files import read_json
+from rfgs_core.gaussians import Gaussians
+from rfgs_core.gaussians.ply import read_ply
+from rfgs_core.train.channel import Channel
+from rfgs_core.train.head import RadioHead
+from rfgs_core.train.observations import observe
+
+#: Schema of `config.json`.
+SCHEMA = "rfgs-run/1"
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run folder; nothing is read before it is asked for."""
+
+    path: Path
+    """The folder."""
+    config: dict[str, Any]
+    """What was asked for, and what training added (`train_s`)."""
+
+    @property
+    def frames(self) -> list[int]:
+        """Frames the run was trained on."""
+        return list(self.config["frames"])
+
+    @cached_property
+    def sequence(self) -> Sequence:
+        """The data the run was trained on.
+
+        Raises:
+            RfgsError: The dataset is gone or is not the one of training.
+        """
+        place = (self.path / self.config["dataset"]).resolve()
+        dataset = open_dataset(place)
+        if dataset.fingerprint != self.config["dataset_fingerprint"]:
+            raise RfgsError(
+                f"{self.path} was trained on another dataset than {place} holds now "
+                f"(expected fingerprint {self.config['dataset_fingerprint'][:12]}, found "
+                f"{dataset.fingerprint[:12]}); train again or restore that dataset"
+            )
+        return dataset.sequence(self.config["sequence"])
+
+    def ply_path(self, frame: int) -> Path:
+        """Moving Gaussians of a frame."""
+        return self.path / "gaussians" / f"{frame:06d}.ply"
+
+    def attributes(self, frame: int) -> dict[str, np.ndarray]:
+        """Per-Gaussian arrays of the moving Gaussians, rows as in the PLY.
+
+        Raises:
+            RfgsError: The run has no such frame.
+            RfgsFormatError: The file is damaged.
+        """
+        path = self.path / "gaussians" / f"{frame:06d}.features.npz"
+        if not path.exists():
+            raise RfgsError(f"{self.path} holds no frame {frame}; it has {self.frames}")
+        try:
+            with np.load(path, allow_pickle=False) as stored:
+                return {name: stored[name] for name in stored.files}
+        except (OSError, ValueError, EOFError) as error:
+            raise RfgsFormatError(f"{path}: damaged ({error}); train this run again") from error
+
+    def gaussians(self, frame: int) -> Gaussians:
+        """Static Gaussians, then the moving ones of a frame."""
+        static = self.path / "gaussians" / "static.ply"
+        moving = self.moving(frame)
+        if not static.exists():
+            return moving
+        cloud = read_ply(static)
+        empty = np.zeros((len(cloud.means), moving.features.shape[1]), dtype=np.float32)
+        return Gaussians.join(cloud.to_gaussians(empty), moving)
+
+    def moving(self, frame: int) -> Gaussians:
+        """Moving Gaussians of a frame with their features."""
+        features = self.attributes(frame)["features"]
+        return read_ply(self.ply_path(frame)).to_gaussians(features)
+
+    @cached_property
+    def head(self) -> RadioHead:
+        """Decodes reflectivities from features."""
+        with np.load(self.path / "radio_head.npz", allow_pickle=False) as stored:
+            return RadioHead(
+                torch.from_numpy(stored["directions"]),
+                float(stored["gamma_scale_m"]),
+                float(stored["rho_logit"]),
+            )
+
+    def predict(self, frame: int) -> Complex64[np.ndarray, "tx rx subcarrier"]:
+        """Predicted csi − csi_static on every measured link, held-out ones included."""
+        observations = observe(self.sequence, self.config["radio"], frame)
+        everything = np.ones(len(observations.freq_hz), dtype=bool)
+        channel = Channel.of(observations, observations.measured, everything)
+        with torch.no_grad():
+            change = channel.change(self.head, self.moving(frame)).numpy()
+        csi = np.zeros_like(observations.delta)
+        csi[channel.tx, channel.rx] = change
+        return csi
+
+
+def relative_dataset(run: Path, dataset: Path) -> str:
+    """Path of the dataset as stored in a run: relative, so that both can move together."""
+    return Path(os.path.relpath(dataset.resolve(), run.resolve())).as_posix()
+
+
+def open_run(path: Path) -> Run:
+    """Opens a run folder.
+
+    Raises:
+        RfgsError: There is no run.
+        RfgsFormatError: It is of a newer version, or damaged.
+    """
+    if not (path / "config.json").exists():
+        raise RfgsError(f"{path} is not a run: it has no config.json; `rfgs train` makes one")
+    config = read_json(path / "config.json")
+    if not isinstance(config, dict) or config.get("schema") != SCHEMA:
+        found = config.get("schema") if isinstance(config, dict) else type(config).__name__
+        raise RfgsFormatError(
+            f"{path / 'config.json'}: expected schema {SCHEMA}, found {found}; "
+            "use the version of rfgs that made it, or train again"
+        )
+    return Run(path, config)

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a training run is asked to do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Objective = Literal["paper", "csi", "both"]
+Recipe = Literal["rfgs", "paper"]
+
+
+@dataclass(frozen=True)
+class TrainConfig:
+    """Settings of the fit of one frame; saved as JSON beside every result."""
+
+    objective: Objective = "csi"
+    """paper: eq. 4–7; csi: the propagation model; both: their sum."""
+    recipe: Recipe = "rfgs"
+    """rfgs: our start, rates and steps; paper: the paper's numbers (sections 3.2–3.6)."""
+    num_gaussians: int = 6000
+    """Moving Gaussians at the start of the first frame."""
+    bodies: int = 1
+    """Moving bodies in the scene; taken from the dataset's instances."""
+    power_steps: int = 20
+    """Multiplicative steps of the phase-free fit of reflected powers."""
+    power_trust: float = 0.5
+    """Exponent of the phase-free fit against its start, 0 to 1."""
+    solver_steps: int = 8
+    """Conjugate-gradient steps for the reflectivities."""
+    iterations: int = 40
+    """Adam steps per frame (the paper: 10,000)."""
+    batch_links: int = 128
+    """Links per Adam step of the channel loss."""
+    batch_points: int = 1024
+    """Sample points per Adam step of the paper's loss (section 3.6)."""
+    grid_side: int = 64
+    """Voxels per side of the paper's sample grid (section 3.2)."""
+    unexplained: float = 0.5
+    """Share of each device pair's power that the model is not asked to explain."""
+    seed: int = 0
+    """Root seed."""
+
+    @staticmethod
+    def of_recipe(recipe: Recipe, objective: Objective, seed: int) -> TrainConfig:
+        """Settings of a recipe."""
+        if recipe == "paper":
+            return TrainConfig(
+                objective=objective, recipe=recipe, seed=seed, iterations=10_000, power_steps=0
+            )
+        return TrainConfig(objective=objective, recipe=recipe, seed=seed)

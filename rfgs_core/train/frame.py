@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The fit of one frame, in named stages: locate, draw, power, reflectivity, refine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from jaxtyping import Complex, Float, Float64, Int64
+from torch import Tensor
+
+from rfgs_core.gaussians import Gaussians
+from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.seeds import sub_seed
+from rfgs_core.train.channel import Channel
+from rfgs_core.train.config import TrainConfig
+from rfgs_core.train.delay_power import DelayPowerModel
+from rfgs_core.train.head import SHARPNESS, RadioHead
+from rfgs_core.train.localise import locate_bodies, pair_maps
+from rfgs_core.train.observations import Observations
+from rfgs_core.train.reflectivity import posterior_mean
+from rfgs_core.train.sampling import encode
+from rfgs_core.train.start import START_SCALES_M, draw_points, gaussians_at, outward_normals
+
+#: Called with the stage or step finished, for a progress bar.
+Report = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class FrameState:
+    """The moving Gaussians of one frame and what the next one starts from."""
+
+    gaussians: Gaussians
+    """Moving Gaussians."""
+    power: Float[Tensor, "M"]
+    """Reflected power of each, the prior variance of its reflectivity [m²]."""
+    head: RadioHead
+    """Decodes reflectivity and ρ from the features."""
+    axes_xy: Float64[np.ndarray, "body 2"]
+    """Ground positions of the bodies [m]."""
+    track_id: Int64[np.ndarray, "M"]
+    """Number that a Gaussian keeps from frame to frame."""
+
+    @property
+    def gamma(self) -> Complex[Tensor, "M"]:
+        """Complex reflectivity of each Gaussian [m]."""
+        return self.head.gamma(self.gaussians.features)
+
+
+def visibility(
+    points: Float[np.ndarray, "M 3"], normals: Float[np.ndarray, "M 3"], model: DelayPowerModel
+) -> Float[np.ndarray, "map M"]:
+    """How much of a Gaussian each map's antennas see, by the propagation model's own rule."""
+    rows = []
+    for entry in model.maps:
+        seen = np.ones(len(points))
+        for antenna in (entry.tx_xyz.mean(axis=0), entry.rx_xyz.mean(axis=0)):
+            towards = antenna - points
+            towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+            seen /= 1 + np.exp(-SHARPNESS * np.sum(normals * towards, axis=1))
+        # Squared: visibility scales the amplitude.
+        rows.append(seen**2)
+    return np.array(rows, dtype=np.float32)
+
+
+def fit_power(
+    observations: Observations, gaussians: Gaussians, config: TrainConfig
+) -> Float[Tensor, "M"]:
+    """Reflected powers from delay–angle maps, pulled towards equal powers.
+
+    The gain of each map against the model is fitted first: wall bounces and the neighbours of
+    an antenna lift or lower whole device pairs.
+    """
+    points = gaussians.means.numpy().astype(np.float64)
+    model = DelayPowerModel(observations, points)
+    seen = visibility(points, gaussians.rotations[:, :, 2].numpy(), model)
+    start = model.scaled(np.ones(len(points), dtype=np.float32), seen)
+    gain = [
+        data.sum() / max(float(model.expected(k, start * seen[k]).sum()), 1e-30)
+        for k, (_, _, data) in enumerate(model.parts)
+    ]
+    seen = seen * np.array(gain, dtype=np.float32)[:, None]
+    power = start
+    for _ in range(config.power_steps):
+        power = model.update(power, seen)
+    ratio = np.maximum(power / start, 1e-6) ** config.power_trust
+    # The level that suits the typical pair: the median keeps shadowed pairs out of it.
+    return torch.from_numpy((start * ratio * np.median(gain)).astype(np.float32))
+
+
+def noise_per_link(
+    observations: Observations, target: Complex[Tensor, "link subcarrier"], share: float
+) -> Float[Tensor, "link"]:
+    """Variance per link: a share of the mean power of its device pair."""
+    pair, names = observations.pairs
+    index = pair[observations.links]
+    power = (target.abs() ** 2).mean(dim=1).numpy()
+    mean = np.bincount(index, power, len(names)) / np.bincount(index, minlength=len(names))
+    floor = 1e-3 * mean.max() if len(mean) else 0.0
+    return torch.from_numpy((share * np.maximum(mean, floor * 1e-3))[index].astype(np.float32))
+
+
+def target_of(observations: Observations) -> Complex[Tensor, "link subcarrier"]:
+    """The visible channel change, links in row-major order, visible tones only."""
+    return torch.from_numpy(observations.delta[observations.links][:, observations.tones].copy())
+
+
+def new_head(
+    observations: Observations, config: TrainConfig, power: Float[Tensor, "M"]
+) -> RadioHead:
+    """A head scaled so that typical reflectivities are features of about one."""
+    wavelength_m = SPEED_OF_LIGHT / observations.centre_hz
+    return RadioHead.create(
+        sub_seed(config.seed, "head"),
+        wavelength_m,
+        START_SCALES_M[0],
+        float(power.mean().sqrt().clamp(min=1e-9)),
+    )
+
+
+def start_frame(
+    observations: Observations, config: TrainConfig, seed: int, before: FrameState | None
+) -> FrameState:
+    """Locates the bodies and draws Gaussians; a later frame keeps the earlier one's.
+
+    From frame to frame all Gaussians move along with their body; the third that the new
+    channel supports least is drawn anew and gets new track numbers.
+    """
+    rng = np.random.default_rng(seed)
+    maps = pair_maps(observations)
+    near = None if before is None else before.axes_xy
+    axes_xy = locate_bodies(maps, observations.bounds_m, config.bodies, near)
+    points = draw_points(maps, axes_xy, observations.bounds_m, config.num_gaussians, rng)
+    track_id = np.arange(len(points), dtype=np.int64)
+    if before is not None:
+        points, track_id = _carry_over(before, maps, axes_xy, points)
+    gaussians = gaussians_at(points, outward_normals(points, axes_xy))
+    power = fit_power(observations, gaussians, config)
+    head = before.head if before is not None else new_head(observations, config, power)
+    features = head.without_readings(encode(observations, points).features)
+    gaussians = replace(gaussians, features=features)
+    return FrameState(gaussians, power, head, axes_xy, track_id)
+
+
+def _carry_over(
+    before: FrameState,
+    maps: object,
+    axes_xy: Float64[np.ndarray, "body 2"],
+    fresh: Float64[np.ndarray, "M 3"],
+) -> tuple[Float64[np.ndarray, "M 3"], Int64[np.ndarray, "M"]]:
+    """Moves the earlier Gaussians with their bodies; the least supported third is fresh."""
+    from rfgs_core.train.start import log_density
+
+    points = before.gaussians.means.numpy().astype(np.float64)
+    nearest = np.linalg.norm(points[:, None, :2] - before.axes_xy[None], axis=2).argmin(axis=1)
+    points[:, :2] += (axes_xy - before.axes_xy)[nearest]
+    support = log_density(maps, axes_xy, points)  # type: ignore[arg-type]
+    count = min(len(points) // 3, len(fresh))
+    weakest = np.argsort(support)[:count]
+    track_id = before.track_id.copy()
+    points[weakest] = fresh[:count]
+    track_id[weakest] = track_id.max() + 1 + np.arange(count)
+    return points, track_id
+
+
+def solve_reflectivity(
+    observations: Observations, state: FrameState, config: TrainConfig
+) -> FrameState:
+    """Writes posterior-mean reflectivities into the features."""
+    channel = Channel.of(observations, observations.links, observations.tones)
+    with torch.no_grad():
+        target = target_of(observations) - channel.shadowed(state.head, state.gaussians)
+    noise = noise_per_link(observations, target_of(observations), config.unexplained)
+    gamma = posterior_mean(
+        *(channel, state.head, state.gaussians, target, noise, state.power),
+        iterations=config.solver_steps,
+    )
+    features = state.head.with_gamma(state.gaussians.features, gamma)
+    return replace(state, gaussians=replace(state.gaussians, features=features))

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The ceiling control: the same fit, started on the true surface instead of the estimate."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import numpy as np
+import torch
+from jaxtyping import Float32, Float64
+
+from rfgs_core.evaluate.grid import splat_gaussians
+from rfgs_core.evaluate.scene import EvaluatedRun, Scene
+from rfgs_core.seeds import sub_seed
+from rfgs_core.train.config import TrainConfig
+from rfgs_core.train.frame import FrameState, fit_power, new_head, solve_reflectivity
+from rfgs_core.train.observations import Observations, observe
+from rfgs_core.train.refine import refine
+from rfgs_core.train.sampling import encode
+from rfgs_core.train.start import gaussians_at
+
+
+def surface_samples(
+    vertices: Float32[np.ndarray, "V 3"],
+    faces: np.ndarray,
+    count: int,
+    rng: np.random.Generator,
+) -> tuple[Float64[np.ndarray, "count 3"], Float64[np.ndarray, "count 3"]]:
+    """Area-weighted points on a mesh and the normals of their faces."""
+    corners = vertices[faces].astype(np.float64)
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(cross, axis=1)
+    chosen = rng.choice(len(faces), size=count, p=area / area.sum())
+    a, b = rng.random((2, count))
+    outside = a + b > 1
+    a[outside], b[outside] = 1 - a[outside], 1 - b[outside]
+    first, second, third = corners[chosen].transpose(1, 0, 2)
+    points = first + a[:, None] * (second - first) + b[:, None] * (third - first)
+    return points, cross[chosen] / np.maximum(area[chosen], 1e-30)[:, None]
+
+
+def start_on_surface(
+    run: EvaluatedRun, observations: Observations, config: TrainConfig, frame: int
+) -> FrameState:
+    """The state that training starts from, had it been told the answer."""
+    vertices, faces, _ = run.sequence.moving_mesh(frame)
+    rng = np.random.default_rng(sub_seed(config.seed, "oracle", frame))
+    points, normals = surface_samples(vertices, faces, config.num_gaussians, rng)
+    gaussians = gaussians_at(points, normals)
+    power = fit_power(observations, gaussians, config)
+    head = new_head(observations, config, power)
+    features = head.without_readings(encode(observations, points).features)
+    return FrameState(
+        gaussians=replace(gaussians, features=features),
+        power=power,
+        head=head,
+        axes_xy=points[:, :2].mean(axis=0, keepdims=True),
+        track_id=np.arange(len(points), dtype=np.int64),
+    )
+
+
+def oracle_scores(run: EvaluatedRun) -> dict[int, Float32[np.ndarray, "x y z"]]:
+    """Score volume of each frame after the run's own fit from the true surface."""
+    names = {field.name for field in fields(TrainConfig)}
+    config = TrainConfig(**{name: run.config[name] for name in names})
+    grid = Scene.of(run).grid
+    scores = {}
+    for frame in run.frames:
+        observations = observe(run.sequence, run.config["radio"], frame)
+        state = start_on_surface(run, observations, config, frame)
+        if config.objective != "paper":
+            state = solve_reflectivity(observations, state, config)
+        seed = sub_seed(config.seed, "oracle", frame)
+        state = refine(observations, state, config, seed)
+        with torch.no_grad():
+            g = state.gaussians
+            scores[frame] = splat_gaussians(
+                grid,
+                g.means.numpy().astype(np.float64),
+                g.covariances.numpy().astype(np.float64),
+                state.power.numpy().astype(np.float64),
+            )
+    return scores

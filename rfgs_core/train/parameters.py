@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Trainable Gaussians and their Adam state, which change rows only together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from jaxtyping import Bool
+from torch import Tensor
+
+from rfgs_core.errors import RfgsFormatError
+from rfgs_core.gaussians import Gaussians
+
+_STATE = ("exp_avg", "exp_avg_sq")
+
+
+@dataclass(frozen=True)
+class LearningRates:
+    """Adam learning rates; the defaults are the paper's (section 3.6)."""
+
+    means: float = 0.005
+    """Positions [m per step]."""
+    log_scales: float = 0.005
+    """Logarithm of the scales."""
+    quats: float = 0.0005
+    """Rotations."""
+    features: float = 0.0005
+    """Radio features."""
+    logit_opacities: float = 0.005
+    """Opacities; the paper names no rate, this is that of the scales."""
+
+
+class TrainableGaussians:
+    """Gaussians as leaf tensors with one Adam optimiser over all of them."""
+
+    def __init__(self, gaussians: Gaussians, rates: LearningRates) -> None:
+        self.rates = rates
+        self._adopt({name: value.detach().clone() for name, value in gaussians.items()})
+
+    def _adopt(self, values: dict[str, Tensor]) -> None:
+        self.leaves = {name: value.requires_grad_(True) for name, value in values.items()}
+        self.optimiser = torch.optim.Adam(
+            [
+                {"params": [leaf], "lr": getattr(self.rates, name), "name": name}
+                for name, leaf in self.leaves.items()
+            ]
+        )
+
+    @property
+    def gaussians(self) -> Gaussians:
+        """The Gaussians; gradients flow into the leaves."""
+        return Gaussians(**self.leaves)
+
+    def edit_rows(self, keep: Bool[Tensor, "M"], new: Gaussians | None = None) -> None:
+        """Drops rows and appends new ones, in the parameters and in Adam's moments alike.
+
+        New rows start with zero moments.
+        """
+        old = {name: self.optimiser.state.get(leaf, {}) for name, leaf in self.leaves.items()}
+        added = dict((new or Gaussians.none()).items())
+        self._adopt(
+            {
+                name: torch.cat([leaf.detach()[keep], added[name].detach()])
+                for name, leaf in self.leaves.items()
+            }
+        )
+        for name, leaf in self.leaves.items():
+            if old[name]:
+                self.optimiser.state[leaf] = {
+                    "step": old[name]["step"],
+                    **{
+                        key: torch.cat([old[name][key][keep], torch.zeros_like(added[name])])
+                        for key in _STATE
+                    },
+                }
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Parameters and moments as arrays, for a checkpoint without pickle."""
+        arrays = {}
+        for name, leaf in self.leaves.items():
+            arrays[name] = leaf.detach().numpy()
+            state = self.optimiser.state.get(leaf, {})
+            for key in (*_STATE, "step") if state else ():
+                arrays[f"{name}.{key}"] = state[key].numpy()
+        return arrays
+
+    @staticmethod
+    def restore(arrays: dict[str, np.ndarray], rates: LearningRates) -> TrainableGaussians:
+        """Rebuilds what `state` returned, bit for bit.
+
+        Raises:
+            RfgsFormatError: An array is missing.
+        """
+        try:
+            fields = {
+                name: torch.from_numpy(arrays[name].copy()) for name, _ in Gaussians.none().items()
+            }
+        except KeyError as error:
+            raise RfgsFormatError(f"checkpoint without {error}; delete it to start over") from error
+        result = TrainableGaussians(Gaussians(**fields), rates)
+        for name, leaf in result.leaves.items():
+            if f"{name}.step" in arrays:
+                result.optimiser.state[leaf] = {
+                    key: torch.from_numpy(arrays[f"{name}.{key}"].copy())
+                    for key in (*_STATE, "step")
+                }
+        return result

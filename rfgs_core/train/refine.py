@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Gradient descent on the Gaussians of one frame: the paper's losses, the channel's, or both."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import torch
+from jaxtyping import Complex, Float
+from torch import Tensor
+
+from rfgs_core.errors import RfgsError
+from rfgs_core.files import replacing
+from rfgs_core.gaussians import Gaussians
+from rfgs_core.seeds import sub_seed
+from rfgs_core.train.channel import Channel
+from rfgs_core.train.config import TrainConfig
+from rfgs_core.train.density import DensityRule, PaperDensity
+from rfgs_core.train.frame import FrameState, noise_per_link, target_of
+from rfgs_core.train.losses import SamplePoints, channel_loss, paper_loss
+from rfgs_core.train.observations import Observations
+from rfgs_core.train.parameters import LearningRates, TrainableGaussians
+from rfgs_core.train.sampling import sample_points
+
+#: Our rates for the channel loss: positions move by fractions of a wavelength.
+CHANNEL_RATES = LearningRates(
+    means=5e-4, log_scales=2e-3, quats=1e-3, features=1e-2, logit_opacities=2e-2
+)
+#: Adam steps between checkpoints within a frame.
+CHECKPOINT_EVERY = 1000
+
+
+@dataclass(frozen=True)
+class Task:
+    """What one frame's descent compares with."""
+
+    channel: Channel
+    """Visible links and tones."""
+    target: Complex[Tensor, "link subcarrier"]
+    """Channel change to explain."""
+    noise: Float[Tensor, "link"]
+    """Variance per link that need not be explained."""
+    points: SamplePoints | None
+    """Sample points of the paper's losses; None without them."""
+
+    @staticmethod
+    def of(observations: Observations, config: TrainConfig, seed: int) -> Task:
+        """Gathers what the objective needs."""
+        points = None
+        if config.objective != "csi":
+            rng = np.random.default_rng(seed)
+            points = sample_points(observations, config.grid_side, rng)
+        target = target_of(observations)
+        return Task(
+            Channel.of(observations, observations.links, observations.tones),
+            target,
+            noise_per_link(observations, target, config.unexplained),
+            points,
+        )
+
+
+def _batch(task: Task, config: TrainConfig, seed: int, step: int) -> tuple[np.ndarray, Tensor]:
+    """Links and sample points of a step; a function of the step, so that resuming is exact."""
+    rng = np.random.default_rng(sub_seed(seed, "batch", step))
+    count = len(task.channel.links)
+    links = np.sort(rng.choice(count, min(config.batch_links, count), replace=False))
+    size = 0 if task.points is None else len(task.points.xyz)
+    points = rng.choice(size, min(config.batch_points, size), replace=False) if size else []
+    return links, torch.as_tensor(np.asarray(points, dtype=np.int64))
+
+
+def _loss(
+    task: Task,
+    state: FrameState,
+    gaussians: Gaussians,
+    links: np.ndarray,
+    points: SamplePoints | None,
+) -> Float[Tensor, ""]:
+    loss = torch.zeros(())
+    if points is not None:
+        loss = loss + paper_loss(gaussians, points)
+    if len(links):
+        part = task.channel.rows(links)
+        predicted = part.change(state.head, gaussians)
+        loss = loss + channel_loss(predicted, task.target[links], task.noise[links])
+    return loss
+
+
+def refine(
+    observations: Observations,
+    state: FrameState,
+    config: TrainConfig,
+    seed: int,
+    checkpoint: Path | None = None,
+    on_step: Callable[[float, int], None] | None = None,
+) -> FrameState:
+    """Descends the objective of `config` for `config.iterations` steps.
+
+    Args:
+        observations: Visible channel of the frame.
+        state: Where to start.
+        config: Objective, steps and batch sizes.
+        seed: Seed of batches and line points.
+        checkpoint: File to resume from and to save to; None keeps nothing.
+        on_step: Called with loss and number of Gaussians after each step.
+
+    Raises:
+        RfgsError: The loss is not a number.
+    """
+    task = Task.of(observations, config, seed)
+    rates = LearningRates() if config.recipe == "paper" else CHANNEL_RATES
+    trained, first = _resume(checkpoint, state.gaussians, rates)
+    density = PaperDensity(DensityRule())
+    for step in range(first + 1, config.iterations + 1):
+        links, chosen = _batch(task, config, seed, step)
+        links = links if config.objective != "paper" else links[:0]
+        points = None if task.points is None else task.points.rows(chosen)
+        loss = _loss(task, state, trained.gaussians, links, points)
+        if not torch.isfinite(loss):
+            raise RfgsError(
+                f"the loss became {float(loss)} at step {step}; the channel of this frame may be "
+                "damaged (`rfgs-factory validate`), or lower the learning rates"
+            )
+        trained.optimiser.zero_grad()
+        loss.backward()
+        trained.optimiser.step()
+        if points is not None:
+            density.after_step(step, trained, points)
+        if checkpoint is not None and step % CHECKPOINT_EVERY == 0:
+            save_arrays(checkpoint, {**trained.state(), "finished_steps": np.array(step)})
+        if on_step is not None:
+            on_step(float(loss.detach()), len(trained.gaussians))
+    return _with_gaussians(state, trained.gaussians.detach())
+
+
+def save_arrays(path: Path, arrays: dict[str, np.ndarray]) -> None:
+    """Writes arrays as .npz in one step, without pickle."""
+    with replacing(path) as temporary, temporary.open("wb") as stream:
+        np.savez(stream, **arrays)  # type: ignore[arg-type]
+
+
+def _resume(
+    checkpoint: Path | None, start: Gaussians, rates: LearningRates
+) -> tuple[TrainableGaussians, int]:
+    if checkpoint is None or not checkpoint.exists():
+        return TrainableGaussians(start, rates), 0
+    with np.load(checkpoint, allow_pickle=False) as stored:
+        arrays = {name: stored[name] for name in stored.files}
+    return TrainableGaussians.restore(arrays, rates), int(arrays["finished_steps"])
+
+
+def _with_gaussians(state: FrameState, gaussians: Gaussians) -> FrameState:
+    """The state with other Gaussians; where their number changed, powers and tracks are new."""
+    if len(gaussians) == len(state.gaussians):
+        return replace(state, gaussians=gaussians)
+    strength = torch.linalg.norm(gaussians.features, dim=1) ** 2 * gaussians.opacities
+    return replace(
+        state,
+        gaussians=gaussians,
+        power=strength,
+        track_id=np.arange(len(gaussians), dtype=np.int64),
+    )

@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Training over the frames of a sequence: warm start, files, resume."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from tqdm import tqdm
+
+from rfgs_core.dataset import Dataset, Sequence
+from rfgs_core.errors import RfgsError
+from rfgs_core.files import read_json, write_json
+from rfgs_core.gaussians import Gaussians
+from rfgs_core.gaussians.ply import cloud_of, read_ply, write_ply
+from rfgs_core.run import SCHEMA, Run, relative_dataset
+from rfgs_core.seeds import sub_seed
+from rfgs_core.train.config import TrainConfig
+from rfgs_core.train.frame import FrameState, solve_reflectivity, start_frame
+from rfgs_core.train.head import RadioHead
+from rfgs_core.train.observations import observe
+from rfgs_core.train.refine import refine, save_arrays
+
+
+def train_sequence(
+    dataset: Dataset,
+    sequence: Sequence,
+    radio: str,
+    frames: list[int],
+    config: TrainConfig,
+    out: Path,
+) -> Run:
+    """Fits every frame, each starting from the one before; finished frames are kept.
+
+    Raises:
+        RfgsError: `out` holds a run with other settings.
+    """
+    bodies = sum(1 for row in sequence.instances if row["class"] == "person")
+    config = replace(config, bodies=max(bodies, 1))
+    settings: dict[str, Any] = {
+        "schema": SCHEMA,
+        "dataset": relative_dataset(out, dataset.path),
+        "dataset_fingerprint": dataset.fingerprint,
+        "sequence": sequence.name,
+        "radio": radio,
+        "frames": frames,
+        **asdict(config),
+    }
+    run = _open_or_create(out, settings)
+    spent = float(run.config.get("train_s", 0.0))
+    before: FrameState | None = None
+    with tqdm(total=len(frames) * (config.iterations + 2), desc=f"train {radio}") as bar:
+        for frame in frames:
+            begin = time.perf_counter()
+            state = _finished(run, frame)
+            if state is None:
+                state = fit_frame(run, frame, config, before, bar)
+                _store(run, frame, state)
+                spent += time.perf_counter() - begin
+                write_json(out / "config.json", {**settings, "train_s": round(spent, 2)})
+            else:
+                bar.update(config.iterations + 2)
+            before = state
+    _write_point_cloud(run)
+    return Run(out, read_json(out / "config.json"))
+
+
+def fit_frame(
+    run: Run, frame: int, config: TrainConfig, before: FrameState | None, bar: Any
+) -> FrameState:
+    """Runs all stages on one frame."""
+    observations = observe(run.sequence, run.config["radio"], frame)
+    seed = sub_seed(config.seed, run.config["sequence"], run.config["radio"], frame, "fit")
+    state = start_frame(observations, config, seed, before)
+    bar.update(1)
+    if config.objective != "paper":
+        state = solve_reflectivity(observations, state, config)
+    bar.update(1)
+
+    def on_step(loss: float, count: int) -> None:
+        bar.update(1)
+        bar.set_postfix_str(f"frame {frame}, loss {loss:.3g}, {count} Gaussians")
+
+    checkpoint = run.path / "checkpoints" / f"{frame:06d}.partial.npz"
+    state = refine(observations, state, config, seed, checkpoint, on_step)
+    if config.objective == "paper":
+        state = solve_reflectivity(observations, state, config)
+    return state
+
+
+def _open_or_create(out: Path, settings: dict[str, Any]) -> Run:
+    path = out / "config.json"
+    if not path.exists():
+        if out.exists() and any(out.iterdir()):
+            raise RfgsError(f"{out} is not empty and not a run; choose another --out")
+        write_json(path, settings)
+        return Run(out, settings)
+    have = read_json(path)
+    differing = [key for key, value in settings.items() if have.get(key) != value]
+    if differing:
+        raise RfgsError(
+            f"{out} holds a run with another {', '.join(differing)}; choose another --out or "
+            "delete that folder"
+        )
+    return Run(out, have)
+
+
+def _state_path(run: Run, frame: int) -> Path:
+    return run.path / "checkpoints" / f"{frame:06d}.npz"
+
+
+def _store(run: Run, frame: int, state: FrameState) -> None:
+    """Writes a finished frame; its checkpoint comes last and marks it as done."""
+    power_db = 10 * np.log10(np.maximum(state.power.numpy(), 1e-30)).astype(np.float32)
+    write_ply(run.ply_path(frame), cloud_of(state.gaussians, rf_power_db=power_db))
+    gamma = state.gamma.detach().numpy().astype(np.complex64)
+    save_arrays(
+        run.ply_path(frame).with_suffix(".features.npz"),
+        {
+            "features": state.gaussians.features.numpy(),
+            "gamma": gamma[:, None],
+            "rf_power_db": power_db,
+            "track_id": state.track_id,
+        },
+    )
+    static = run.path / "gaussians" / "static.ply"
+    if not static.exists():
+        write_ply(static, cloud_of(Gaussians.none()))
+    head = {
+        "directions": state.head.directions.numpy(),
+        "gamma_scale_m": np.array(state.head.gamma_scale_m),
+        "rho_logit": np.array(state.head.rho_logit),
+    }
+    save_arrays(run.path / "radio_head.npz", head)
+    arrays = {name: value.numpy() for name, value in state.gaussians.items()}
+    arrays |= {"power": state.power.numpy(), "axes_xy": state.axes_xy, "track_id": state.track_id}
+    save_arrays(_state_path(run, frame), {**arrays, **{f"head.{k}": v for k, v in head.items()}})
+    (run.path / "checkpoints" / f"{frame:06d}.partial.npz").unlink(missing_ok=True)
+
+
+def _finished(run: Run, frame: int) -> FrameState | None:
+    """The state of a frame that is already fitted, for the next one to start from."""
+    path = _state_path(run, frame)
+    if not path.exists():
+        return None
+    with np.load(path, allow_pickle=False) as stored:
+        arrays = {name: stored[name] for name in stored.files}
+    fields = {name: torch.from_numpy(arrays[name]) for name, _ in Gaussians.none().items()}
+    head = RadioHead(
+        torch.from_numpy(arrays["head.directions"]),
+        float(arrays["head.gamma_scale_m"]),
+        float(arrays["head.rho_logit"]),
+    )
+    return FrameState(
+        gaussians=Gaussians(**fields),
+        power=torch.from_numpy(arrays["power"]),
+        head=head,
+        axes_xy=arrays["axes_xy"],
+        track_id=arrays["track_id"],
+    )
+
+
+def _write_point_cloud(run: Run) -> None:
+    """Static Gaussians and those of the first frame in one file, for any splat viewer."""
+    moving = read_ply(run.ply_path(run.frames[0]))
+    write_ply(run.path / "point_cloud.ply", moving)

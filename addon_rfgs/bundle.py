@@ -94,6 +94,7 @@ def export_bundle(
         AddonError: The scene cannot be exported; the message says why.
     """
     numbers, sha256 = chosen_frames(scene, frames), file_sha256()
+    # Everything is written beside the old bundle first, so a failed export leaves that as it was.
     with kept(scene) as keeper:
         show_what_renders(keeper, scene)
         content = read_content(scene)

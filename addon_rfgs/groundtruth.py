@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import bpy
@@ -77,19 +78,34 @@ def render_groundtruth(
                     keeper.set(surface.source, "hide_render", True)
                 numbers = [scene.frame_start]
             names = ["empty"] if empty else [f"{number:06d}" for number in numbers]
-            total = len(numbers) * len(views)
-            stands = [place_camera(scene, view) for view in views]
-            try:
-                for index, (number, name) in enumerate(zip(numbers, names, strict=True)):
-                    scene.frame_set(number)
-                    for order, (view, stand) in enumerate(zip(views, stands, strict=True)):
-                        scene.camera = stand
-                        _render(scene, folder / view.name / name, samples, passes and not empty)
-                        if progress:
-                            progress(index * len(views) + order + 1, total)
-            finally:
-                for stand in stands:
-                    bpy.data.cameras.remove(stand.data)
+            stems = dict(zip(numbers, names, strict=True))
+            draw = partial(_render, scene, samples=samples, passes=passes and not empty)
+            return _render_all(scene, views, stems, folder, draw, progress)
+
+
+def _render_all(
+    scene: bpy.types.Scene,
+    views: list[View],
+    stems: dict[int, str],
+    folder: Path,
+    draw: Callable[[Path], None],
+    progress: Callable[[int, int], None] | None,
+) -> int:
+    """Calls `draw` for each frame of `stems` and each view; returns the number of pictures."""
+    total, done = len(stems) * len(views), 0
+    stands = [place_camera(scene, view) for view in views]
+    try:
+        for number, name in stems.items():
+            scene.frame_set(number)
+            for view, stand in zip(views, stands, strict=True):
+                scene.camera = stand
+                draw(folder / view.name / name)
+                done += 1
+                if progress:
+                    progress(done, total)
+    finally:
+        for stand in stands:
+            bpy.data.cameras.remove(stand.data)
     return total
 
 

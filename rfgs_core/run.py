@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from functools import cached_property
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +40,7 @@ class Run:
         """Frames the run was trained on."""
         return list(self.config["frames"])
 
-    @cached_property
+    @property
     def sequence(self) -> Sequence:
         """The data the run was trained on.
 
@@ -48,14 +48,9 @@ class Run:
             RfgsError: The dataset is gone or is not the one of training.
         """
         place = (self.path / self.config["dataset"]).resolve()
-        dataset = open_dataset(place)
-        if dataset.fingerprint != self.config["dataset_fingerprint"]:
-            raise RfgsError(
-                f"{self.path} was trained on another dataset than {place} holds now "
-                f"(expected fingerprint {self.config['dataset_fingerprint'][:12]}, found "
-                f"{dataset.fingerprint[:12]}); train again or restore that dataset"
-            )
-        return dataset.sequence(self.config["sequence"])
+        return _sequence(
+            self.path, place, self.config["sequence"], self.config["dataset_fingerprint"]
+        )
 
     def ply_path(self, frame: int) -> Path:
         """Moving Gaussians of a frame."""
@@ -92,7 +87,7 @@ class Run:
         features = self.attributes(frame)["features"]
         return read_ply(self.ply_path(frame)).to_gaussians(features)
 
-    @cached_property
+    @property
     def head(self) -> RadioHead:
         """Decodes reflectivities from features."""
         with np.load(self.path / "radio_head.npz", allow_pickle=False) as stored:
@@ -112,6 +107,18 @@ class Run:
         csi = np.zeros_like(observations.delta)
         csi[channel.tx, channel.rx] = change
         return csi
+
+
+@lru_cache(maxsize=8)
+def _sequence(run: Path, place: Path, name: str, fingerprint: str) -> Sequence:
+    dataset = open_dataset(place)
+    if dataset.fingerprint != fingerprint:
+        raise RfgsError(
+            f"{run} was trained on another dataset than {place} holds now (expected fingerprint "
+            f"{fingerprint[:12]}, found {dataset.fingerprint[:12]}); train again or restore that "
+            "dataset"
+        )
+    return dataset.sequence(name)
 
 
 def relative_dataset(run: Path, dataset: Path) -> str:

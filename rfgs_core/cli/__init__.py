@@ -68,7 +68,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
         return 2
     return run_cli(lambda: _command(given[0], given[1:]))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

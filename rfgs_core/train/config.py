@@ -24,11 +24,12 @@ class TrainConfig:
     """Moving bodies in the scene; taken from the dataset's instances."""
     power_steps: int = 20
     """Multiplicative steps of the phase-free fit of reflected powers."""
-    power_trust: float = 0.5
-    """Exponent of the phase-free fit against its start, 0 to 1."""
+    power_trust: float = 0.25
+    """Exponent of the phase-free fit against its start where the band resolves a limb (10 cm);
+    coarser bands trust it in proportion to their resolution."""
     solver_steps: int = 8
     """Conjugate-gradient steps for the reflectivities."""
-    iterations: int = 40
+    iterations: int = 80
     """Adam steps per frame (the paper: 10,000)."""
     batch_links: int = 128
     """Links per Adam step of the channel loss."""

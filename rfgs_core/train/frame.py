@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,14 +17,20 @@ from rfgs_core.train.channel import Channel
 from rfgs_core.train.config import TrainConfig
 from rfgs_core.train.delay_power import DelayPowerModel
 from rfgs_core.train.head import SHARPNESS, RadioHead
-from rfgs_core.train.localise import locate_bodies, pair_maps
+from rfgs_core.train.localise import PairMaps, locate_bodies, pair_maps
 from rfgs_core.train.observations import Observations
 from rfgs_core.train.reflectivity import posterior_mean
 from rfgs_core.train.sampling import encode
-from rfgs_core.train.start import START_SCALES_M, draw_points, gaussians_at, outward_normals
+from rfgs_core.train.start import (
+    START_SCALES_M,
+    draw_points,
+    gaussians_at,
+    log_density,
+    outward_normals,
+)
 
-#: Called with the stage or step finished, for a progress bar.
-Report = Callable[[str], None]
+#: Range resolution that tells limbs from a trunk [m].
+LIMB_M = 0.1
 
 
 @dataclass(frozen=True)
@@ -85,7 +90,10 @@ def fit_power(
     power = start
     for _ in range(config.power_steps):
         power = model.update(power, seen)
-    ratio = np.maximum(power / start, 1e-6) ** config.power_trust
+    bandwidth_hz = float(observations.freq_hz[-1] - observations.freq_hz[0])
+    resolution_m = SPEED_OF_LIGHT / (2 * bandwidth_hz)
+    trust = config.power_trust * min(1.0, LIMB_M / resolution_m)
+    ratio = np.maximum(power / start, 1e-6) ** trust
     # The level that suits the typical pair: the median keeps shadowed pairs out of it.
     return torch.from_numpy((start * ratio * np.median(gain)).astype(np.float32))
 
@@ -146,17 +154,15 @@ def start_frame(
 
 def _carry_over(
     before: FrameState,
-    maps: object,
+    maps: PairMaps,
     axes_xy: Float64[np.ndarray, "body 2"],
     fresh: Float64[np.ndarray, "M 3"],
 ) -> tuple[Float64[np.ndarray, "M 3"], Int64[np.ndarray, "M"]]:
     """Moves the earlier Gaussians with their bodies; the least supported third is fresh."""
-    from rfgs_core.train.start import log_density
-
     points = before.gaussians.means.numpy().astype(np.float64)
     nearest = np.linalg.norm(points[:, None, :2] - before.axes_xy[None], axis=2).argmin(axis=1)
     points[:, :2] += (axes_xy - before.axes_xy)[nearest]
-    support = log_density(maps, axes_xy, points)  # type: ignore[arg-type]
+    support = log_density(maps, axes_xy, points)
     count = min(len(points) // 3, len(fresh))
     weakest = np.argsort(support)[:count]
     track_id = before.track_id.copy()

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`rfgs bench`: speed as a ratio to the plain twin of the same run."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import tyro
+
+
+@dataclass(frozen=True)
+class BenchArgs:
+    """Times a part beside its plain twin, in the same run.
+
+    propagation: 20,000 Gaussians x 64 links x 64 subcarriers, scattering and shadows, forward
+    and with gradients. raster: 20,000 Gaussians at 256 x 256 pixels.
+    """
+
+    part: tyro.conf.Positional[Literal["propagation", "raster"]]
+    """What to time."""
+    json: Path | None = None
+    """Also write the numbers to this file, as one flat dictionary."""
+
+
+def _bench(part: str) -> Callable[[], dict[str, Any]]:
+    if part == "raster":
+        from rfgs_core.render.bench import bench_raster
+
+        return bench_raster
+    from rfgs_core.bench import bench_propagation
+
+    return bench_propagation
+
+
+def run(args: BenchArgs) -> int:
+    """Prints one number per line."""
+    from rfgs_core.files import write_json
+
+    sys.stderr.write(f"timing {args.part}; the plain twin takes most of it, about a minute\n")
+    result = _bench(args.part)()
+    for name, value in result.items():
+        shown = f"{value:.4g}" if isinstance(value, float) else value
+        sys.stdout.write(f"{name:<28} {shown}\n")
+    if args.json is not None:
+        write_json(args.json, result)
+    return 0

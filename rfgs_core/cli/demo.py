@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`rfgs demo`: the whole loop, from the Blender scene to Gaussians back in Blender."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+RADIOS = ("wifi", "mmwave")
+
+
+@dataclass(frozen=True)
+class DemoArgs:
+    """Runs the whole loop on the living room and writes DEMO/report.html.
+
+    Stages: generate a dataset from the Blender scene, validate it, train on Wi-Fi and on
+    mmWave, evaluate beside the controls, bring the Gaussians back into Blender. Finished
+    stages are kept: a second run only writes the report.
+    """
+
+    out: Path = Path("demo")
+    """Folder of the demo."""
+    scene: str = "living_room_walk"
+    """Scene name (see `rfgs-factory scenes`) or a .blend file."""
+    frames: str = "10:45:5"
+    """Frames A:B:STEP of the scene."""
+    cameras: int = 8
+    """Cameras to render ground truth from."""
+    resolution: int = 192
+    """Pixels per picture side."""
+    depth: int = 2
+    """Bounces of the radio paths that meet the person: 1 is direct only."""
+    seed: int = 0
+    """Root seed."""
+
+
+class Stages:
+    """Runs stages once, remembers how long each took, and says which are already done."""
+
+    def __init__(self, out: Path) -> None:
+        from rfgs_core.files import read_json
+
+        self._path = out / "timings.json"
+        self.seconds: dict[str, float] = read_json(self._path) if self._path.exists() else {}
+
+    def run(self, name: str, done: Path, work: Callable[[], None]) -> None:
+        """Runs `work` unless `done` exists and the stage was timed, that is, finished."""
+        from rfgs_core.files import write_json
+
+        if done.exists() and name in self.seconds:
+            sys.stderr.write(f"[{name}] done before ({self.seconds[name]:.0f} s)\n")
+            return
+        sys.stderr.write(f"[{name}]\n")
+        begin = time.perf_counter()
+        work()
+        self.seconds[name] = round(time.perf_counter() - begin, 1)
+        write_json(self._path, self.seconds)
+
+
+def _call(*command: str | Path) -> None:
+    """Runs one of our own commands with this Python; its error line has been printed."""
+    from rfgs_core.errors import RfgsError
+
+    arguments = [sys.executable, "-m", *map(str, command)]
+    code = subprocess.run(arguments, check=False).returncode
+    if code == 130:
+        raise KeyboardInterrupt
+    if code:
+        raise RfgsError(f"`python -m {' '.join(map(str, command))}` failed (exit code {code})")
+
+
+def _scene_file(scene: str) -> Path:
+    """The .blend of a scene of ours or of the user's own."""
+    own = Path(__file__).resolve().parents[2] / "blender_scenes" / f"{scene}.blend"
+    return own if own.exists() else Path(scene)
+
+
+def _generate(args: DemoArgs, dataset: Path) -> None:
+    radios = [word for radio in RADIOS for word in ("--radio", radio)]
+    _call(
+        "dataset_factory", "generate", args.scene, *radios,
+        *("--frames", args.frames, "--out", dataset, "--seed", str(args.seed)),
+        *("--cameras", str(args.cameras), "--resolution", str(args.resolution)),
+        *("--depth", str(args.depth), "--workers", str(max(os.cpu_count() or 1, 1))),
+    )  # fmt: skip
+
+
+def _inspect(args: DemoArgs, run: Path) -> None:
+    target = args.out / "inspect.blend"
+    _call(
+        "addon_rfgs", "--blend", _scene_file(args.scene), "import", run,
+        "--out", target, "--picture", args.out / "inspect.png",
+    )  # fmt: skip
+
+
+def run(args: DemoArgs) -> int:
+    """Runs all stages; exit code 0 when the report is there."""
+    from rfgs_core.report import write_demo_report
+    from rfgs_core.run import open_run
+
+    stages = Stages(args.out)
+    dataset = args.out / "dataset"
+    runs = {radio: args.out / f"run-{radio}" for radio in RADIOS}
+    stages.run("generate", dataset / "dataset.json", lambda: _generate(args, dataset))
+    stages.run(
+        "validate",
+        dataset / "dataset.json",
+        lambda: _call("dataset_factory", "validate", dataset),
+    )
+    stages.run("preview", dataset / "log", lambda: _call("dataset_factory", "preview", dataset))
+    for radio, folder in runs.items():
+        train = ("rfgs_core.cli", "train", dataset, "--radio", radio, "--out", folder)
+        seed = ("--seed", str(args.seed))
+        stages.run(f"train {radio}", folder / "shader.npz", lambda c=(*train, *seed): _call(*c))
+        evaluate = ("rfgs_core.cli", "eval", folder)
+        stages.run(f"evaluate {radio}", folder / "metrics.json", lambda c=evaluate: _call(*c))
+        stages.run(
+            f"report {radio}",
+            folder / "report.html",
+            lambda f=folder: _call("rfgs_core.cli", "report", f),
+        )
+    picture = args.out / "inspect.png"
+    stages.run("back to Blender", picture, lambda: _inspect(args, runs[RADIOS[-1]]))
+    page = write_demo_report(
+        args.out, [open_run(folder) for folder in runs.values()], stages.seconds
+    )
+    total = sum(stages.seconds.values()) / 60
+    sys.stdout.write(f"{page} written; all stages together took {total:.1f} minutes\n")
+    return 0

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Antenna elements stand where the layout's conventions say."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rfgs_core.radio import PRESETS, DevicePose, Radio, layout, place_devices, preset
+from rfgs_core.radio.layout import element_offsets, rotation
+
+BOUNDS_M = np.array([[-1.0, 0.5, 0.25], [5.0, 4.5, 2.95]])
+UPRIGHT = DevicePose("ap", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+
+
+def test_elements_go_down_each_column_from_minus_y_plus_z() -> None:
+    offsets, column = element_offsets(2, 3, 0.1)
+    expected = [
+        [0, -0.1, 0.05],
+        [0, -0.1, -0.05],
+        [0, 0.0, 0.05],
+        [0, 0.0, -0.05],
+        [0, 0.1, 0.05],
+        [0, 0.1, -0.05],
+    ]
+    np.testing.assert_allclose(offsets, expected, atol=1e-15)
+    assert column.tolist() == [0, 0, 1, 1, 2, 2]
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_neighbours_are_half_a_wavelength_apart(name: str) -> None:
+    radio = preset(name)
+    half = 299_792_458.0 / (0.5 * (radio.freq_min_hz + radio.freq_max_hz)) / 2
+    elements = layout(radio, [UPRIGHT])
+    for xyz in (elements.tx_xyz, elements.rx_xyz):
+        if len(xyz) == 1:
+            continue
+        apart = np.linalg.norm(xyz[:, None] - xyz, axis=-1)
+        apart[np.diag_indices(len(xyz))] = np.inf
+        np.testing.assert_allclose(apart.min(axis=1), half, rtol=1e-9)
+    np.testing.assert_allclose(elements.rx_xyz.mean(axis=0), 0, atol=1e-12)
+    np.testing.assert_allclose(elements.tx_xyz.mean(axis=0), radio.tx_offset_m, atol=1e-12)
+
+
+def test_arrays_lie_across_the_boresight_and_turn_with_it() -> None:
+    radio = preset("wifi")
+    quarter = math.sqrt(0.5)
+    # A quarter turn to the left: boresight +X becomes +Y, the array's +Y becomes -X.
+    device = DevicePose("ap", (1.0, 2.0, 1.5), (quarter, 0.0, 0.0, quarter))
+    turned, flat = layout(radio, [device]), layout(radio, [UPRIGHT])
+    assert np.ptp(flat.rx_xyz[:, 0]) == 0.0
+    np.testing.assert_allclose(
+        turned.rx_xyz - device.position_m, flat.rx_xyz[:, [1, 0, 2]] * [-1, 1, 1], atol=1e-12
+    )
+    np.testing.assert_allclose(turned.tx_xyz, [[1.0, 2.0, 1.2]], atol=1e-12)
+
+
+def test_rotations_are_proper_and_need_no_unit_quaternion() -> None:
+    quat = (0.3, -1.2, 0.7, 2.0)
+    matrix = rotation(quat)
+    np.testing.assert_allclose(matrix @ matrix.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(matrix) == pytest.approx(1.0)
+    np.testing.assert_allclose(rotation((0.6, -2.4, 1.4, 4.0)), matrix, atol=1e-12)
+    # The axis of a quaternion stays where it is.
+    axis = np.array(quat[1:])
+    np.testing.assert_allclose(matrix @ axis, axis, atol=1e-12)
+
+
+def test_devices_follow_each_other() -> None:
+    radio = preset("mmwave")
+    devices = place_devices(radio, BOUNDS_M)
+    elements = layout(radio, devices)
+    assert elements.tx_device.tolist() == [d for d in range(4) for _ in range(8)]
+    assert elements.rx_device.tolist() == [d for d in range(4) for _ in range(8)]
+    assert elements.rx_column.tolist() == list(range(8)) * 4
+    one = layout(radio, devices[2:3])
+    np.testing.assert_array_equal(elements.rx_xyz[16:24], one.rx_xyz)
+    np.testing.assert_array_equal(elements.tx_xyz[16:24], one.tx_xyz)
+
+
+@pytest.mark.parametrize(
+    ("own", "expected"),
+    [("included", [[1, 1], [1, 1]]), ("only", [[1, 0], [0, 1]]), ("excluded", [[0, 1], [1, 0]])],
+)
+def test_measured_links(own: str, expected: list[list[int]]) -> None:
+    values = {"tx_rows": 1, "tx_cols": 2, "rx_rows": 3, "rx_cols": 1, "num_devices": 2}
+    radio = replace(preset("wifi"), own_device_links=own, **values)
+    elements = layout(radio, place_devices(radio, BOUNDS_M))
+    by_device = np.kron(np.array(expected), np.ones((2, 3))) > 0
+    np.testing.assert_array_equal(elements.measured, by_device)
+
+
+@pytest.mark.parametrize("count", [1, 4, 6])
+def test_placed_devices_stand_inside_and_face_the_centre(count: int) -> None:
+    radio = replace(preset("wifi"), num_devices=count)
+    devices = place_devices(radio, BOUNDS_M)
+    assert len({device.name for device in devices}) == len(devices) == count
+    centre = BOUNDS_M.mean(axis=0)
+    for index, device in enumerate(devices):
+        position = np.array(device.position_m)
+        assert (position >= BOUNDS_M[0] + [0.2, 0.2, 0]).all()
+        assert (position <= BOUNDS_M[1] - [0.2, 0.2, 0]).all()
+        # Above the floor, which is not at z = 0 here.
+        assert position[2] == pytest.approx(0.25 + (1.2, 2.2)[index % 2])
+        boresight, up = rotation(device.quat_wxyz)[:, [0, 2]].T
+        towards = (centre - position)[:2]
+        np.testing.assert_allclose(boresight[:2], towards / np.linalg.norm(towards), atol=1e-12)
+        np.testing.assert_allclose(up, [0, 0, 1], atol=1e-12)
+
+
+def test_four_devices_go_round_counter_clockwise() -> None:
+    devices = place_devices(preset("wifi"), BOUNDS_M)
+    corners = [tuple(round(x, 6) for x in device.position_m[:2]) for device in devices]
+    assert corners == [(-0.8, 0.7), (4.8, 0.7), (4.8, 4.3), (-0.8, 4.3)]
+
+
+def test_elements_of_a_radio_without_devices_in_the_scene_are_its_own() -> None:
+    radio = Radio("x", 1e9, 2e9, 10, 2, 1, 1, 2, (0.0, 0.0, 0.0), num_devices=1)
+    assert layout(radio, place_devices(radio, BOUNDS_M)).measured.shape == (2, 2)

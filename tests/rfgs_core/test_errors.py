@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: Apache-2.0
+"""User mistakes become one line and an exit code; mistakes of ours keep their traceback."""
+
+from __future__ import annotations
+
+import errno
+import signal
+from pathlib import Path
+
+import pytest
+
+from rfgs_core.errors import MissingToolError, RfgsError, RfgsFormatError, run_cli
+
+
+def raising(error: BaseException):
+    def command() -> int | None:
+        raise error
+
+    return command
+
+
+@pytest.mark.parametrize(("answer", "code"), [(None, 0), (0, 0), (1, 1), (3, 3)])
+def test_the_commands_own_code_is_passed_on(answer: int | None, code: int, capsys) -> None:
+    assert run_cli(lambda: answer) == code
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("kind", [RfgsError, RfgsFormatError, MissingToolError])
+def test_a_user_mistake_is_one_line_and_code_2(kind: type[RfgsError], capsys) -> None:
+    assert run_cli(raising(kind("a.json: expected 1, got 2"))) == 2
+    assert capsys.readouterr() == ("", "error: a.json: expected 1, got 2\n")
+
+
+def test_format_errors_are_value_errors_too() -> None:
+    assert issubclass(RfgsFormatError, ValueError)
+    assert issubclass(RfgsFormatError, RfgsError)
+
+
+def test_ctrl_c_says_how_to_continue(capsys) -> None:
+    def command() -> None:
+        signal.raise_signal(signal.SIGINT)
+
+    assert run_cli(command) == 130
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "run the same command to continue" in err
+    assert "Traceback" not in err
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full on this system")
+def test_a_full_disk_is_one_line(capsys) -> None:
+    def command() -> None:
+        with open("/dev/full", "wb", buffering=0) as stream:
+            stream.write(b"x")
+
+    assert run_cli(command) == 2
+    err = capsys.readouterr().err
+    assert err.startswith("error: the disk is full;")
+    assert err.count("\n") == 1
+
+
+def test_a_full_disk_names_the_file_where_the_system_does(capsys) -> None:
+    assert run_cli(raising(OSError(errno.ENOSPC, "No space left", "/x/csi.bin"))) == 2
+    assert "while writing /x/csi.bin;" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("error", [PermissionError(errno.EACCES, "no"), KeyError("x")])
+def test_other_errors_are_not_hidden(error: Exception) -> None:
+    with pytest.raises(type(error)):
+        run_cli(raising(error))

@@ -83,8 +83,12 @@ def run(args: TrainArgs) -> int:
 
     config = TrainConfig.of_recipe(args.recipe, args.objective, args.seed)
     if args.iterations is not None:
+        if args.iterations < 0:
+            raise RfgsError(f"--iterations {args.iterations}: expected at least 0")
         config = replace(config, iterations=args.iterations)
     if args.gaussians is not None:
+        if args.gaussians < 1:
+            raise RfgsError(f"--gaussians {args.gaussians}: expected at least 1")
         config = replace(config, num_gaussians=args.gaussians)
     dataset = open_dataset(args.dataset)
     sequence = dataset.sequence(args.sequence)

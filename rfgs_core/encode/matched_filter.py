@@ -130,7 +130,7 @@ def matched_filter(
         pair: Which sum a link belongs to, 0..P-1; negative links are left out.
         freq_hz: Tone frequencies [Hz], equally spaced.
         points: Where to evaluate [m].
-        num_bands: Sub-bands of equal width, each filtered on its own.
+        num_bands: Sub-bands of equal width, each filtered on its own; at most one per tone.
 
     Returns:
         Mean over the links and tones of a pair, shape (pair, band, N).
@@ -210,7 +210,9 @@ def matched_filter_features(
     The entries are ordered by frequency, which gives the paper's gradient across frequency
     bins (section 3.5) a meaning. Scaled so that the RMS of ‖φ‖ over `points` is one.
     """
-    power = np.abs(matched_filter(csi, tx_xyz, rx_xyz, pair, freq_hz, points, num_features)) ** 2
-    features = np.sqrt(power.mean(axis=0)).T
+    bands = min(num_features, len(freq_hz))
+    power = np.abs(matched_filter(csi, tx_xyz, rx_xyz, pair, freq_hz, points, bands)) ** 2
+    # A radio with fewer tones than features has its sub-bands repeated, still in order.
+    features = np.sqrt(power.mean(axis=0)).T[:, np.arange(num_features) * bands // num_features]
     rms = np.sqrt(np.mean(np.sum(features**2, axis=1)))
     return (features / max(float(rms), 1e-30)).astype(np.float32)

@@ -17,7 +17,7 @@ from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json, write_json
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.gaussians.ply import cloud_of, read_ply, write_ply
-from rfgs_core.run import SCHEMA, Run, relative_dataset
+from rfgs_core.run import SCHEMA, Run, open_run, relative_dataset
 from rfgs_core.seeds import sub_seed
 from rfgs_core.train.config import TrainConfig
 from rfgs_core.train.frame import FrameState, solve_reflectivity, start_frame
@@ -95,18 +95,20 @@ def fit_frame(
 def _open_or_create(out: Path, settings: dict[str, Any]) -> Run:
     path = out / "config.json"
     if not path.exists():
+        if out.exists() and not out.is_dir():
+            raise RfgsError(f"{out} is a file; expected a folder, choose another --out")
         if out.exists() and any(out.iterdir()):
             raise RfgsError(f"{out} is not empty and not a run; choose another --out")
         write_json(path, settings)
         return Run(out, settings)
-    have = read_json(path)
-    differing = [key for key, value in settings.items() if have.get(key) != value]
+    run = open_run(out)
+    differing = [key for key, value in settings.items() if run.config.get(key) != value]
     if differing:
         raise RfgsError(
             f"{out} holds a run with another {', '.join(differing)}; choose another --out or "
             "delete that folder"
         )
-    return Run(out, have)
+    return run
 
 
 def _state_path(run: Run, frame: int) -> Path:

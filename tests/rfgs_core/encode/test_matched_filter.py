@@ -165,6 +165,19 @@ def test_features_add_pairs_without_phase(small: tuple) -> None:
     np.testing.assert_allclose(before, expected, rtol=1e-5)
 
 
+def test_fewer_tones_than_features_repeat_sub_bands(small: tuple) -> None:
+    csi, tx_xyz, rx_xyz, _, freq_hz = small
+    points = np.random.default_rng(7).uniform(0, 4, (20, 3))
+    pair = np.zeros((2, 5), np.int64)
+    rest = (tx_xyz, rx_xyz, pair, freq_hz[:16], points)
+    features = matched_filter_features(csi[..., :16], *rest)
+    assert features.shape == (20, 32)
+    np.testing.assert_array_equal(features[:, ::2], features[:, 1::2])
+    tones = np.abs(matched_filter(csi[..., :16], *rest, 16)[0]).T
+    ratio = features[:, ::2] / tones
+    np.testing.assert_allclose(ratio, ratio[0, 0], rtol=1e-4)
+
+
 def test_silence_gives_zero_features(small: tuple) -> None:
     csi, *rest = small
     assert (matched_filter_features(0 * csi, *rest, np.ones((3, 3))) == 0).all()

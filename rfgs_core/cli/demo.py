@@ -29,7 +29,7 @@ class DemoArgs:
     """Scene name (see `rfgs-factory scenes`) or a .blend file."""
     frames: str = "10:45:5"
     """Frames A:B:STEP of the scene."""
-    cameras: int = 8
+    cameras: int = 6
     """Cameras to render ground truth from."""
     resolution: int = 192
     """Pixels per picture side."""

@@ -51,7 +51,7 @@ def parser(program: str) -> argparse.ArgumentParser:
     load.add_argument("--resolution", type=int, default=480, help="longer side of each half (480)")
     load.add_argument("--samples", type=int, default=16, help="samples per pixel (16)")
     load.add_argument("--mode", choices=("points", "ellipsoids"), default="points")
-    load.add_argument("--opacity-threshold", type=float, default=0.1)
+    load.add_argument("--opacity-threshold", type=float, default=0.005)
     return main
 
 

@@ -15,7 +15,7 @@ POINT_RADIUS_M = 0.012
 #: Input sockets: name, type, default, minimum, maximum, what it does.
 _INPUTS = (
     ("Ellipsoids", "NodeSocketBool", False, None, None, "Ellipsoids instead of equal points"),
-    ("Opacity Threshold", "NodeSocketFloat", 0.1, 0.0, 1.0, "Hide Gaussians below this opacity"),
+    ("Opacity Threshold", "NodeSocketFloat", 0.005, 0.0, 1.0, "Hide Gaussians below this opacity"),
     ("Size", "NodeSocketFloat", 1.0, 0.0, 10.0, "Size of points, or standard deviations shown"),
 )
 

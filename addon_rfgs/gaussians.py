@@ -35,7 +35,7 @@ class Display:
     """How imported Gaussians are shown."""
 
     mode: str = "points"
-    opacity_threshold: float = 0.1
+    opacity_threshold: float = 0.005
 
 
 @dataclass(frozen=True)

@@ -148,7 +148,7 @@ class RFGS_PG_scene(bpy.types.PropertyGroup):
     opacity_threshold: bpy.props.FloatProperty(  # type: ignore[valid-type]
         name="Opacity threshold",
         description="Gaussians below this opacity are hidden",
-        default=0.1,
+        default=0.005,
         min=0.0,
         max=1.0,
         subtype="FACTOR",

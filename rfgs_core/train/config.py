@@ -31,8 +31,8 @@ class TrainConfig:
     """Conjugate-gradient steps for the reflectivities."""
     iterations: int = 80
     """Adam steps per frame (the paper: 10,000)."""
-    batch_links: int = 128
-    """Links per Adam step of the channel loss."""
+    batch_entries: int = 8192
+    """Channel entries (links times tones) per Adam step of the channel loss."""
     batch_points: int = 1024
     """Sample points per Adam step of the paper's loss (section 3.6)."""
     grid_side: int = 64

@@ -8,6 +8,7 @@ from dataclasses import fields, replace
 import numpy as np
 import torch
 from jaxtyping import Float32, Float64
+from tqdm import tqdm
 
 from rfgs_core.evaluate.grid import splat_gaussians
 from rfgs_core.evaluate.scene import EvaluatedRun, Scene
@@ -65,7 +66,7 @@ def oracle_scores(run: EvaluatedRun) -> dict[int, Float32[np.ndarray, "x y z"]]:
     config = TrainConfig(**{name: run.config[name] for name in names})
     grid = Scene.of(run).grid
     scores = {}
-    for frame in run.frames:
+    for frame in tqdm(run.frames, desc="oracle_init", unit="frame"):
         observations = observe(run.sequence, run.config["radio"], frame)
         state = start_on_surface(run, observations, config, frame)
         if config.objective != "paper":

@@ -66,7 +66,8 @@ def _batch(task: Task, config: TrainConfig, seed: int, step: int) -> tuple[np.nd
     """Links and sample points of a step; a function of the step, so that resuming is exact."""
     rng = np.random.default_rng(sub_seed(seed, "batch", step))
     count = len(task.channel.links)
-    links = np.sort(rng.choice(count, min(config.batch_links, count), replace=False))
+    wanted = max(1, config.batch_entries // task.channel.tones.num_selected)
+    links = np.sort(rng.choice(count, min(wanted, count), replace=False))
     size = 0 if task.points is None else len(task.points.xyz)
     points = rng.choice(size, min(config.batch_points, size), replace=False) if size else []
     return links, torch.as_tensor(np.asarray(points, dtype=np.int64))

@@ -66,7 +66,9 @@ def draw_points(
     density = log_density(maps, axes_xy, grid)
     share = np.exp(density - density.max())
     chosen = rng.choice(len(grid), size=count, p=share / share.sum())
-    return grid[chosen] + rng.uniform(-step / 2, step / 2, (count, 3))
+    points = grid[chosen] + rng.uniform(-step / 2, step / 2, (count, 3))
+    # The last cell along an axis may stick out of the scene.
+    return np.clip(points, low, high)
 
 
 def quats_from_normals(normals: Float[np.ndarray, "N 3"]) -> Float[Tensor, "N 4"]:

@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Upright bodies are found although every device sees only its own side of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rfgs_core.radio import preset
+from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.train.localise import PairMaps, locate_bodies, pair_maps
+from rfgs_core.train.observations import Observations
+
+ROOM_M = np.array([[0.0, 0.0, 0.0], [3.6, 3.2, 2.2]])
+
+
+def cylinder(xy: tuple[float, float], count: int, rng: np.random.Generator) -> tuple:
+    """Points on a body's surface and their normals."""
+    angle = rng.uniform(0, 2 * np.pi, count)
+    normals = np.stack([np.cos(angle), np.sin(angle), np.zeros(count)], axis=1)
+    points = 0.13 * normals
+    points[:, :2] += xy
+    points[:, 2] = rng.uniform(0.1, 1.7, count)
+    return points, normals
+
+
+def lit(observations: Observations, bodies: list[tuple[float, float]], seed: int) -> Observations:
+    """Random scatterers on each body; an antenna behind the tangent plane sees nothing."""
+    rng = np.random.default_rng(seed)
+    delta = np.zeros(observations.delta.shape, np.complex128)
+    k = 2 * np.pi * observations.freq_hz / SPEED_OF_LIGHT
+    for xy in bodies:
+        points, normals = cylinder(xy, 150, rng)
+        strength = rng.standard_normal(150) + 1j * rng.standard_normal(150)
+        for point, normal, gamma in zip(points, normals, strength, strict=True):
+            ends = []
+            for xyz in (observations.tx_xyz, observations.rx_xyz):
+                away = xyz - point
+                distance = np.linalg.norm(away, axis=1)
+                seen = (away @ normal > 0) / distance
+                ends.append(seen[:, None] * np.exp(-1j * k * distance[:, None]))
+            delta += gamma * ends[0][:, None] * ends[1][None]
+    return observations.with_delta(delta * observations.measured[..., None])
+
+
+@pytest.fixture(scope="module")
+def _cache() -> dict:
+    return {}
+
+
+@pytest.fixture
+def maps_of(make_observations, _cache: dict) -> Callable[..., PairMaps]:
+    """Maps of bodies at given places, kept between the tests of this module."""
+
+    def make(*bodies: tuple[float, float]) -> PairMaps:
+        if bodies not in _cache:
+            radio = replace(preset("mmwave"), freq_max_hz=62e9, num_subcarriers=160)
+            radio = replace(radio, tx_rows=4)
+            observations = make_observations(radio=radio, bounds_m=ROOM_M)
+            _cache[bodies] = pair_maps(lit(observations, list(bodies), seed=len(bodies)))
+        return _cache[bodies]
+
+    return make
+
+
+def test_one_body_is_found_at_its_axis(maps_of) -> None:
+    for body in ((2.1, 1.3), (1.3, 2.0)):
+        found = locate_bodies(maps_of(body), ROOM_M)
+        assert found.shape == (1, 2)
+        assert np.linalg.norm(found[0] - body) < 0.06
+
+
+def test_two_bodies_are_found(maps_of) -> None:
+    bodies = np.array([(1.0, 1.1), (2.5, 2.1)])
+    found = locate_bodies(maps_of(*map(tuple, bodies.tolist())), ROOM_M, count=2)
+    order = np.linalg.norm(found[:, None] - bodies, axis=2).argmin(axis=1)
+    assert sorted(order.tolist()) == [0, 1]
+    assert np.linalg.norm(found - bodies[order], axis=1).max() < 0.06
+
+
+def test_the_previous_frame_restricts_the_search(maps_of) -> None:
+    """Each body is the one near its earlier place, in the same order."""
+    bodies = ((1.0, 1.1), (2.5, 2.1))
+    maps = maps_of(*bodies)
+    for order in ([0, 1], [1, 0]):
+        near = np.array(bodies)[order] + np.array([0.15, -0.2])
+        found = locate_bodies(maps, ROOM_M, count=2, near=near)
+        assert np.linalg.norm(found - np.array(bodies)[order], axis=1).max() < 0.06
+    # Far from both the answer stays within the reach, though nothing is there.
+    corner = np.array([[3.4, 0.2]])
+    found = locate_bodies(maps, ROOM_M, count=1, near=corner)
+    assert np.abs(found - corner).max() <= 0.8 + 1e-9
+
+
+def test_bodies_do_not_stand_in_walls_or_in_each_other(maps_of) -> None:
+    found = locate_bodies(maps_of((2.1, 1.3)), ROOM_M, count=3)
+    assert (found >= 0.12 - 1e-9).all()
+    assert (found <= ROOM_M[1, :2] - 0.12 + 1e-9).all()
+    apart = np.linalg.norm(found[:, None] - found, axis=2)
+    assert apart[np.triu_indices(3, 1)].min() >= 0.4
+
+
+def test_maps_have_mean_one_and_read_between_grid_points(maps_of) -> None:
+    maps = maps_of((2.1, 1.3))
+    np.testing.assert_allclose(maps.power.mean(axis=(1, 2, 3)), 1.0, rtol=1e-3)
+    assert len(maps.power) == len(maps.tx_xyz) == len(maps.rx_xyz) == 4
+    low, high = maps.power[:, 10, 20, 5], maps.power[:, 11, 20, 5]
+    place = maps.origin_m + maps.spacing_m * np.array([10.25, 20, 5])
+    got = maps.at(np.array([place, maps.origin_m - 5.0]))
+    np.testing.assert_allclose(got[:, 0], 0.75 * low + 0.25 * high, rtol=1e-4)
+    np.testing.assert_allclose(got[:, 1], maps.power[:, 0, 0, 0], rtol=1e-5)
+
+
+def test_the_grid_follows_the_finer_of_range_and_room(make_observations) -> None:
+    """Half the range resolution, but between 4 and 12 cm."""
+    bounds_m = np.array([[0.0, 0.0, 0.0], [1.2, 1.2, 1.2]])
+    coarse = pair_maps(make_observations(bounds_m=bounds_m, inset_m=0.1, heights_m=(0.5,)))
+    assert coarse.spacing_m == pytest.approx(0.12)
+    assert coarse.power.shape == (16, 10, 10, 10)
+    np.testing.assert_allclose(coarse.origin_m, 0.06)

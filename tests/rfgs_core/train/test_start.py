@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The first Gaussians: where they may lie, how they face, how much they cover."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from rfgs_core.gaussians.model import rotation_matrices
+from rfgs_core.train.localise import PairMaps
+from rfgs_core.train.start import (
+    draw_points,
+    gaussians_at,
+    log_density,
+    outward_normals,
+    quats_from_normals,
+)
+
+#: No whole number of the grid's 4 cm cells.
+BOUNDS_M = np.array([[0.0, 0.0, 0.1], [1.55, 1.49, 1.45]])
+
+
+def flat_maps(power: np.ndarray | None = None) -> PairMaps:
+    """Maps that prefer no place, or the given ones."""
+    power = np.ones((2, 8, 8, 10), np.float32) if power is None else power
+    ends = np.zeros((len(power), 3))
+    return PairMaps(power, np.array([0.1, 0.1, 0.2]), 0.2, ends, ends)
+
+
+def test_local_z_turns_into_the_normal() -> None:
+    rng = np.random.default_rng(0)
+    normals = rng.standard_normal((50, 3))
+    special = [[0, 0, 1], [0, 0, -1], [1, 0, 0], [0, -1, 0], [1e-4, 0, -1], [0, 1e-7, -1]]
+    normals = np.concatenate([normals, special])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    quats = quats_from_normals(normals)
+    torch.testing.assert_close(torch.linalg.norm(quats, dim=1), torch.ones(56))
+    matrices = rotation_matrices(quats)
+    np.testing.assert_allclose(matrices[:, :, 2], normals, atol=1e-6)
+    np.testing.assert_allclose(torch.linalg.det(matrices), np.ones(56), atol=1e-5)
+
+
+def test_normals_point_away_from_the_nearest_axis() -> None:
+    axes = np.array([[0.0, 0.0], [3.0, 0.0]])
+    points = np.array([[0.5, 0.0, 1.0], [2.0, 0.0, 1.0], [3.0, 2.0, 0.3], [0.0, 0.0, 1.0]])
+    normals = outward_normals(points, axes)
+    np.testing.assert_allclose(normals, [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, 0, 0]], atol=1e-12)
+
+
+def test_density_is_a_body_where_the_maps_tell_nothing() -> None:
+    """Gaussian of 0.2 m around the axis; a half Gaussian of 0.08 m above 1.6 m."""
+    axes = np.array([[0.7, 0.7]])
+    places = np.array([[0.7, 0.7, 1.0], [0.9, 0.7, 1.0], [0.7, 0.3, 0.2], [0.7, 0.7, 1.76]])
+    got = log_density(flat_maps(), axes, places)
+    np.testing.assert_allclose(got - got[0], [0, -0.5, -2.0, -2.0], atol=1e-6)
+
+
+def test_density_follows_the_maps_with_a_quarter_power() -> None:
+    power = np.ones((2, 8, 8, 10), np.float32)
+    power[0, 3:5] = math.exp(8.0)
+    axes = np.array([[0.7, 0.7]])
+    got = log_density(flat_maps(power), axes, np.array([[0.7, 0.7, 1.0]]))
+    plain = log_density(flat_maps(), axes, np.array([[0.7, 0.7, 1.0]]))
+    # Mean of the two maps' logarithms, 8 and 0, times a quarter.
+    assert (got - plain).item() == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("axis", [(0.75, 0.7), (0.13, 0.13), (1.4, 1.34)])
+def test_drawn_points_stay_in_bounds(axis: tuple[float, float]) -> None:
+    rng = np.random.default_rng(1)
+    points = draw_points(flat_maps(), np.array([axis]), BOUNDS_M, 4000, rng)
+    assert points.shape == (4000, 3)
+    assert (points >= BOUNDS_M[0]).all()
+    assert (points <= BOUNDS_M[1]).all()
+    # They fill the bounds too: the wall is reached where the body stands at it.
+    assert np.abs(points[:, :2] - axis).max(axis=0).min() > 0.3
+
+
+def test_drawn_points_follow_the_density() -> None:
+    bounds_m = np.array([[-2.0, -2.0, 0.0], [2.0, 2.0, 2.5]])
+    rng = np.random.default_rng(2)
+    points = draw_points(flat_maps(), np.array([[0.1, -0.2]]), bounds_m, 20_000, rng)
+    radius = points[:, :2] - [0.1, -0.2]
+    # 5 standard errors; cells of 4 cm widen a standard deviation of 0.2 m by 0.2 %.
+    error = 5 * 0.2 / math.sqrt(2 * 20_000)
+    np.testing.assert_allclose(radius.std(axis=0), 0.2, atol=error + 0.001)
+    np.testing.assert_allclose(radius.mean(axis=0), 0, atol=5 * 0.2 / math.sqrt(20_000))
+    below = points[points[:, 2] < 1.6, 2]
+    assert below.mean() == pytest.approx(0.8, abs=5 * 1.6 / math.sqrt(12 * 20_000))
+    # Mass above: 0.08 sqrt(π/2) against 1.6.
+    share = 0.08 * math.sqrt(math.pi / 2) / (1.6 + 0.08 * math.sqrt(math.pi / 2))
+    deviation = math.sqrt(share * (1 - share) / 20_000)
+    assert 1 - len(below) / 20_000 == pytest.approx(share, abs=5 * deviation)
+
+
+def test_the_draw_is_that_of_its_seed() -> None:
+    axes = np.array([[0.7, 0.7]])
+    draws = [
+        draw_points(flat_maps(), axes, BOUNDS_M, 50, np.random.default_rng(seed))
+        for seed in (0, 0, 1)
+    ]
+    np.testing.assert_array_equal(draws[0], draws[1])
+    assert not np.array_equal(draws[0], draws[2])
+
+
+@pytest.mark.parametrize("count", [300, 6000])
+def test_new_gaussians_cover_a_silhouette_one_and_a_half_times(count: int) -> None:
+    points = np.random.default_rng(0).uniform(0, 1, (count, 3))
+    normals = np.tile([[0.0, 1.0, 0.0]], (count, 1))
+    gaussians = gaussians_at(points, normals)
+    # A blob of peak α hides 2π s² α of what lies behind it.
+    hidden = (gaussians.opacities * 2 * math.pi * 0.04 * 0.04).sum().item()
+    assert hidden == pytest.approx(1.5 * 0.75, rel=1e-4)
+    np.testing.assert_allclose(gaussians.means, points, atol=1e-7)
+    np.testing.assert_allclose(gaussians.scales[0], [0.04, 0.04, 0.025], rtol=1e-6)
+    np.testing.assert_allclose(gaussians.rotations[:, :, 2], normals, atol=1e-6)
+    assert (gaussians.features == 0).all()
+
+
+def test_few_gaussians_stay_half_transparent() -> None:
+    gaussians = gaussians_at(np.zeros((3, 3)), np.tile([[0.0, 0.0, 1.0]], (3, 1)))
+    torch.testing.assert_close(gaussians.opacities, torch.full((3,), 0.5))

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import importlib
-import importlib.util
 import time
 from collections.abc import Callable
 from typing import Any
@@ -16,6 +14,7 @@ from tqdm import tqdm
 from rfgs_core.evaluate.controls import CONTROLS, ControlResult
 from rfgs_core.evaluate.geometry import GEOMETRY_KEYS, geometry_metrics
 from rfgs_core.evaluate.image import IMAGE_KEYS
+from rfgs_core.evaluate.oracle import oracle_scores
 from rfgs_core.evaluate.pictures import Values, has_pictures, mean_of, picture_metrics
 from rfgs_core.evaluate.provenance import conditions, hardware, limits, now, versions
 from rfgs_core.evaluate.rf import RF_KEYS, frame_rf, pool_rf, rf_values
@@ -28,8 +27,6 @@ SCHEMA = "rfgs-metrics/1"
 #: Name of the evaluated method among the controls while they are computed alike.
 METHOD = "method"
 MEDIANS = ("element_snr_median_db", "subcarrier_snr_median_db")
-#: Module of the trainer that starts the fit on the true surface.
-ORACLE_MODULE = "rfgs_core.train.oracle"
 
 
 def evaluate_run(run: EvaluatedRun, *, oracle: bool = True) -> dict[str, Any]:
@@ -195,10 +192,7 @@ def _add_oracle(scene: Scene, table: _Table, wanted: bool) -> None:
     if not wanted:
         table.why["oracle_init"] = "left out with --no-oracle"
         return
-    if importlib.util.find_spec(ORACLE_MODULE) is None:
-        table.why["oracle_init"] = "this version has no fit that starts on the true surface"
-        return
-    scores = importlib.import_module(ORACLE_MODULE).oracle_scores(scene.run)
+    scores = oracle_scores(scene)
     for frame, score in scores.items():
         result = ControlResult(score=score, reason="only its geometry is compared")
         _add(scene, table, "oracle_init", frame, result, scene.reference(frame), scene.csi(frame))

@@ -60,11 +60,11 @@ def start_on_surface(
     )
 
 
-def oracle_scores(run: EvaluatedRun) -> dict[int, Float32[np.ndarray, "x y z"]]:
+def oracle_scores(scene: Scene) -> dict[int, Float32[np.ndarray, "x y z"]]:
     """Score volume of each frame after the run's own fit from the true surface."""
     names = {field.name for field in fields(TrainConfig)}
+    run, grid = scene.run, scene.grid
     config = TrainConfig(**{name: run.config[name] for name in names})
-    grid = Scene.of(run).grid
     scores = {}
     for frame in tqdm(run.frames, desc="oracle_init", unit="frame"):
         observations = observe(run.sequence, run.config["radio"], frame)

@@ -27,8 +27,11 @@ fi
 
 [ "$(id -u)" = 0 ] || fail "installing Blender needs root; run: sudo $0 $dir
 (or set BLENDER=/path/to/a/blender of version 5.0 or newer)"
-command -v debootstrap >/dev/null || fail "debootstrap is missing; run: apt-get install debootstrap"
 command -v apt-get >/dev/null || fail "this script needs Debian's apt; set BLENDER=/path/to/blender instead"
+if ! command -v debootstrap >/dev/null; then
+  echo "installing debootstrap"
+  apt-get update -qq && apt-get install -y -qq debootstrap >/dev/null || fail "debootstrap is missing; run: apt-get install debootstrap"
+fi
 
 # The mirror this machine already uses: the first Debian main archive in apt's configuration.
 mirror=$(apt-get indextargets --format '$(ORIGIN) $(COMPONENT) $(REPO_URI)' 'Created-By: Packages' |

@@ -18,6 +18,7 @@ from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.files import read_json
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.gaussians.ply import read_ply
+from rfgs_core.train.arrays import load_arrays
 from rfgs_core.train.channel import Channel
 from rfgs_core.train.head import RadioHead
 from rfgs_core.train.observations import observe
@@ -66,11 +67,7 @@ class Run:
         path = self.path / "gaussians" / f"{frame:06d}.features.npz"
         if not path.exists():
             raise RfgsError(f"{self.path} holds no frame {frame}; it has {self.frames}")
-        try:
-            with np.load(path, allow_pickle=False) as stored:
-                return {name: stored[name] for name in stored.files}
-        except (OSError, ValueError, EOFError) as error:
-            raise RfgsFormatError(f"{path}: damaged ({error}); train this run again") from error
+        return load_arrays(path, "train this run again")
 
     def gaussians(self, frame: int) -> Gaussians:
         """Static Gaussians, then the moving ones of a frame."""
@@ -90,12 +87,12 @@ class Run:
     @property
     def head(self) -> RadioHead:
         """Decodes reflectivities from features."""
-        with np.load(self.path / "radio_head.npz", allow_pickle=False) as stored:
-            return RadioHead(
-                torch.from_numpy(stored["directions"]),
-                float(stored["gamma_scale_m"]),
-                float(stored["rho_logit"]),
-            )
+        stored = load_arrays(self.path / "radio_head.npz", "train this run again")
+        return RadioHead(
+            torch.from_numpy(stored["directions"]),
+            float(stored["gamma_scale_m"]),
+            float(stored["rho_logit"]),
+        )
 
     def predict(self, frame: int) -> Complex64[np.ndarray, "tx rx subcarrier"]:
         """Predicted csi − csi_static on every measured link, held-out ones included."""

@@ -37,6 +37,8 @@ class TrainableGaussians:
 
     def __init__(self, gaussians: Gaussians, rates: LearningRates) -> None:
         self.rates = rates
+        #: Whether rows have come or gone since the start.
+        self.edited = False
         self._adopt({name: value.detach().clone() for name, value in gaussians.items()})
 
     def _adopt(self, values: dict[str, Tensor]) -> None:
@@ -58,6 +60,7 @@ class TrainableGaussians:
 
         New rows start with zero moments.
         """
+        self.edited = True
         old = {name: self.optimiser.state.get(leaf, {}) for name, leaf in self.leaves.items()}
         added = dict((new or Gaussians.none()).items())
         self._adopt(
@@ -78,7 +81,7 @@ class TrainableGaussians:
 
     def state(self) -> dict[str, np.ndarray]:
         """Parameters and moments as arrays, for a checkpoint without pickle."""
-        arrays = {}
+        arrays = {"edited": np.array(self.edited)}
         for name, leaf in self.leaves.items():
             arrays[name] = leaf.detach().numpy()
             state = self.optimiser.state.get(leaf, {})
@@ -97,9 +100,11 @@ class TrainableGaussians:
             fields = {
                 name: torch.from_numpy(arrays[name].copy()) for name, _ in Gaussians.none().items()
             }
+            edited = bool(arrays["edited"])
         except KeyError as error:
             raise RfgsFormatError(f"checkpoint without {error}; delete it to start over") from error
         result = TrainableGaussians(Gaussians(**fields), rates)
+        result.edited = edited
         for name, leaf in result.leaves.items():
             if f"{name}.step" in arrays:
                 result.optimiser.state[leaf] = {

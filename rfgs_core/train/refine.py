@@ -13,9 +13,9 @@ from jaxtyping import Complex, Float
 from torch import Tensor
 
 from rfgs_core.errors import RfgsError
-from rfgs_core.files import replacing
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.seeds import sub_seed
+from rfgs_core.train.arrays import load_arrays, save_arrays
 from rfgs_core.train.channel import Channel
 from rfgs_core.train.config import TrainConfig
 from rfgs_core.train.density import DensityRule, PaperDensity
@@ -122,8 +122,8 @@ def refine(
         loss = _loss(task, state, trained.gaussians, links, points)
         if not torch.isfinite(loss):
             raise RfgsError(
-                f"the loss became {float(loss)} at step {step}; the channel of this frame may be "
-                "damaged (`rfgs-factory validate`), or lower the learning rates"
+                f"the loss became {float(loss.detach())} at step {step}; the channel of this "
+                "frame may be damaged (`rfgs-factory validate`), or lower the learning rates"
             )
         trained.optimiser.zero_grad()
         loss.backward()
@@ -134,13 +134,7 @@ def refine(
             save_arrays(checkpoint, {**trained.state(), "finished_steps": np.array(step)})
         if on_step is not None:
             on_step(float(loss.detach()), len(trained.gaussians))
-    return _with_gaussians(state, trained.gaussians.detach())
-
-
-def save_arrays(path: Path, arrays: dict[str, np.ndarray]) -> None:
-    """Writes arrays as .npz in one step, without pickle."""
-    with replacing(path) as temporary, temporary.open("wb") as stream:
-        np.savez(stream, **arrays)  # type: ignore[arg-type]
+    return _with_gaussians(state, trained)
 
 
 def _resume(
@@ -148,19 +142,19 @@ def _resume(
 ) -> tuple[TrainableGaussians, int]:
     if checkpoint is None or not checkpoint.exists():
         return TrainableGaussians(start, rates), 0
-    with np.load(checkpoint, allow_pickle=False) as stored:
-        arrays = {name: stored[name] for name in stored.files}
+    arrays = load_arrays(checkpoint, "delete it to start this frame over")
     return TrainableGaussians.restore(arrays, rates), int(arrays["finished_steps"])
 
 
-def _with_gaussians(state: FrameState, gaussians: Gaussians) -> FrameState:
-    """The state with other Gaussians; where their number changed, powers and tracks are new."""
-    if len(gaussians) == len(state.gaussians):
+def _with_gaussians(state: FrameState, trained: TrainableGaussians) -> FrameState:
+    """The state with the trained Gaussians; where rows came or went, powers and tracks are new."""
+    gaussians = trained.gaussians.detach()
+    if not trained.edited:
         return replace(state, gaussians=gaussians)
     strength = torch.linalg.norm(gaussians.features, dim=1) ** 2 * gaussians.opacities
     return replace(
         state,
         gaussians=gaussians,
-        power=strength,
+        power=strength * state.head.gamma_scale_m**2,
         track_id=np.arange(len(gaussians), dtype=np.int64),
     )

@@ -19,11 +19,12 @@ from rfgs_core.gaussians import Gaussians
 from rfgs_core.gaussians.ply import cloud_of, read_ply, write_ply
 from rfgs_core.run import SCHEMA, Run, open_run, relative_dataset
 from rfgs_core.seeds import sub_seed
+from rfgs_core.train.arrays import load_arrays, save_arrays
 from rfgs_core.train.config import TrainConfig
 from rfgs_core.train.frame import FrameState, solve_reflectivity, start_frame
 from rfgs_core.train.head import RadioHead
 from rfgs_core.train.observations import observe
-from rfgs_core.train.refine import refine, save_arrays
+from rfgs_core.train.refine import refine
 
 
 def train_sequence(
@@ -149,8 +150,7 @@ def _finished(run: Run, frame: int) -> FrameState | None:
     path = _state_path(run, frame)
     if not path.exists():
         return None
-    with np.load(path, allow_pickle=False) as stored:
-        arrays = {name: stored[name] for name in stored.files}
+    arrays = load_arrays(path, "delete it to fit this frame again")
     fields = {name: torch.from_numpy(arrays[name]) for name, _ in Gaussians.none().items()}
     head = RadioHead(
         torch.from_numpy(arrays["head.directions"]),

@@ -59,7 +59,9 @@ def test_kept_rows_keep_their_moments_and_new_ones_have_none(
     before = copied(trained)
     keep = torch.tensor([True, False, True, True, False, True])
     new = make_gaussians(2, seed=9)
+    assert not trained.edited
     trained.edit_rows(keep, new)
+    assert TrainableGaussians.restore(trained.state(), LearningRates()).edited
     after = copied(trained)
     for name, value in new.items():
         assert len(after[name]) == 6
@@ -93,7 +95,7 @@ def test_a_restored_state_is_the_same_to_the_bit(trained: TrainableGaussians) ->
     other = TrainableGaussians.restore(copied(trained), LearningRates())
     first, second = copied(trained), copied(other)
     assert sorted(first) == sorted(second)
-    assert len(first) == 5 * 4
+    assert len(first) == 5 * 4 + 1
     for name, value in first.items():
         np.testing.assert_array_equal(value, second[name])
         assert value.dtype == second[name].dtype
@@ -102,7 +104,7 @@ def test_a_restored_state_is_the_same_to_the_bit(trained: TrainableGaussians) ->
     for name, value in trained.state().items():
         np.testing.assert_array_equal(value, other.state()[name])
     # And without the moments the next step would be another one.
-    bare = {name: first[name] for name, _ in Gaussians.none().items()}
+    bare = {name: first[name] for name in ("edited", *(n for n, _ in Gaussians.none().items()))}
     forgetful = TrainableGaussians.restore(bare, LearningRates())
     step(forgetful, 2)
     assert not torch.equal(forgetful.leaves["means"], trained.leaves["means"])

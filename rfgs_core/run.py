@@ -25,6 +25,7 @@ from rfgs_core.train.observations import observe
 
 #: Schema of `config.json`.
 SCHEMA = "rfgs-run/1"
+_NEEDED = ("dataset", "dataset_fingerprint", "sequence", "radio", "frames")
 
 
 @dataclass(frozen=True)
@@ -138,5 +139,11 @@ def open_run(path: Path) -> Run:
         raise RfgsFormatError(
             f"{path / 'config.json'}: expected schema {SCHEMA}, found {found}; "
             "use the version of rfgs that made it, or train again"
+        )
+    missing = [name for name in _NEEDED if name not in config]
+    if missing:
+        raise RfgsFormatError(
+            f"{path / 'config.json'}: expected entries {', '.join(missing)}, which are missing; "
+            "train again"
         )
     return Run(path, config)

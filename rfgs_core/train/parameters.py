@@ -39,7 +39,12 @@ class TrainableGaussians:
         self.rates = rates
         #: Whether rows have come or gone since the start.
         self.edited = False
-        self._adopt({name: value.detach().clone() for name, value in gaussians.items()})
+        # Row-major whatever came: kernels round differently on another layout, and a checkpoint
+        # would not bring that layout back.
+        layout = torch.contiguous_format
+        self._adopt(
+            {name: value.detach().clone(memory_format=layout) for name, value in gaussians.items()}
+        )
 
     def _adopt(self, values: dict[str, Tensor]) -> None:
         self.leaves = {name: value.requires_grad_(True) for name, value in values.items()}

@@ -53,6 +53,17 @@ def test_the_given_gaussians_are_not_touched(make_gaussians) -> None:
         assert not torch.equal(trained.leaves[name].detach(), value)
 
 
+def test_the_layout_of_the_given_tensors_does_not_matter(make_gaussians) -> None:
+    """A checkpoint holds values only, so the same values must step the same."""
+    gaussians = make_gaussians(4)
+    gaussians.features = gaussians.features.T.contiguous().T
+    trained = TrainableGaussians(gaussians, LearningRates())
+    step(trained, 2)
+    assert all(value.is_contiguous() for value in trained.leaves.values())
+    for state in trained.optimiser.state.values():
+        assert state["exp_avg"].is_contiguous()
+
+
 def test_kept_rows_keep_their_moments_and_new_ones_have_none(
     trained: TrainableGaussians, make_gaussians
 ) -> None:

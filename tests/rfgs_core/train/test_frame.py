@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Stages of one frame: visibility, powers, noise levels and the warm start."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from rfgs_core.dataset import open_dataset
+from rfgs_core.train.channel import Channel
+from rfgs_core.train.delay_power import DelayPowerModel
+from rfgs_core.train.frame import (
+    fit_power,
+    noise_per_link,
+    solve_reflectivity,
+    start_frame,
+    target_of,
+    visibility,
+)
+from rfgs_core.train.observations import Observations, observe
+
+
+@pytest.fixture
+def observations(tiny_dataset: Path) -> Observations:
+    return observe(open_dataset(tiny_dataset).sequence(), "wifi", 1)
+
+
+def test_visibility_is_the_propagation_models_own(observations) -> None:
+    """A logistic step of steepness 6 towards both ends, squared for power."""
+    point = np.array([[1.5, 1.5, 1.0]])
+    normal = np.array([[1.0, 0.0, 0.0]])
+    model = DelayPowerModel(observations, point)
+    got = visibility(point, normal, model)
+    assert got.shape == (len(model.maps), 1)
+    for row, entry in zip(got[:, 0], model.maps, strict=True):
+        expected = 1.0
+        for end in (entry.tx_xyz.mean(axis=0), entry.rx_xyz.mean(axis=0)):
+            towards = end - point[0]
+            expected /= 1 + math.exp(-6.0 * towards[0] / np.linalg.norm(towards))
+        assert row == pytest.approx(expected**2, rel=1e-5)
+    both = visibility(np.repeat(point, 2, axis=0), np.array([[1.0, 0, 0], [-1.0, 0, 0]]), model)
+    assert (both[:, 0] != both[:, 1]).all()
+
+
+def test_noise_is_a_share_of_each_pairs_mean_power(observations) -> None:
+    target = target_of(observations)
+    assert target.shape == (84, 14)
+    noise = noise_per_link(observations, target, 0.5)
+    pair, names = observations.pairs
+    index = pair[observations.links]
+    power = (target.abs() ** 2).mean(dim=1).numpy()
+    for number in range(len(names)):
+        expected = 0.5 * power[index == number].mean()
+        np.testing.assert_allclose(noise[index == number], expected, rtol=1e-5)
+
+
+def test_a_silent_pair_is_not_trusted_without_end(observations) -> None:
+    pair, _ = observations.pairs
+    delta = np.where((pair == 2)[..., None], 0, observations.delta)
+    quiet = observations.with_delta(delta)
+    noise = noise_per_link(quiet, target_of(quiet), 0.5)
+    assert (noise > 0).all()
+
+
+def test_target_keeps_the_order_of_links(observations) -> None:
+    channel = Channel.of(observations, observations.links, observations.tones)
+    tones = np.flatnonzero(observations.tones)
+    expected = observations.delta[channel.tx, channel.rx][:, tones]
+    np.testing.assert_array_equal(target_of(observations), expected)
+
+
+def test_powers_follow_the_channels_scale(observations, make_gaussians, quick_config) -> None:
+    """Ten times the channel is a hundred times the power."""
+    gaussians = make_gaussians(20)
+    power = fit_power(observations, gaussians, quick_config)
+    louder = fit_power(observations.with_delta(10 * observations.delta), gaussians, quick_config)
+    assert (power > 0).all()
+    torch.testing.assert_close(louder, 100 * power, rtol=1e-3, atol=0)
+
+
+def test_without_trust_all_powers_are_equal(observations, make_gaussians, quick_config) -> None:
+    gaussians = make_gaussians(20)
+    power = fit_power(observations, gaussians, replace(quick_config, power_trust=0.0))
+    torch.testing.assert_close(power, power[:1].expand(20))
+    spread = fit_power(observations, gaussians, replace(quick_config, power_trust=1.0))
+    assert spread.max() > 1.1 * spread.min()
+
+
+def test_a_started_frame_reflects_nothing_until_it_is_solved(observations, quick_config) -> None:
+    state = start_frame(observations, quick_config, 3, None)
+    scale = state.head.gamma_scale_m
+    assert state.gamma.abs().max() < 1e-5 * scale
+    assert scale == pytest.approx(state.power.mean().sqrt().item(), rel=1e-5)
+    solved = solve_reflectivity(observations, state, quick_config)
+    assert solved.gamma.abs().max() > 1e-3 * scale
+    for name in ("means", "quats", "log_scales", "logit_opacities"):
+        assert torch.equal(getattr(solved.gaussians, name), getattr(state.gaussians, name))
+
+
+def test_later_frames_move_the_earlier_gaussians(tiny_dataset: Path, quick_config) -> None:
+    sequence = open_dataset(tiny_dataset).sequence()
+    first = start_frame(observe(sequence, "wifi", 1), quick_config, 3, None)
+    second = start_frame(observe(sequence, "wifi", 2), quick_config, 4, first)
+    kept = np.isin(second.track_id, first.track_id)
+    assert kept.sum() == 40 - 13
+    moved = (second.gaussians.means - first.gaussians.means).numpy()[kept]
+    shift = (second.axes_xy - first.axes_xy)[0]
+    np.testing.assert_allclose(moved[:, :2], np.tile(shift, (len(moved), 1)), atol=1e-5)
+    np.testing.assert_allclose(moved[:, 2], 0, atol=1e-6)
+    assert second.head is first.head
+    assert np.abs(shift).max() <= 0.8 + 1e-9

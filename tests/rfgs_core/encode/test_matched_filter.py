@@ -58,6 +58,15 @@ def test_the_plain_sum_is_its_twin(small: tuple) -> None:
     assert np.abs(got - expected).max() < 0.01 * np.abs(expected).std()
 
 
+def test_long_paths_alias_as_the_plain_sum_does(small: tuple) -> None:
+    """Paths of 60 to 260 m; delays repeat every 120 m."""
+    points = np.random.default_rng(8).uniform(-75, 75, (60, 3))
+    points = points[np.linalg.norm(points, axis=1) > 35]
+    expected = plain(*small, points)
+    got = matched_filter(*small, points)[:, 0]
+    assert np.abs(got - expected).max() < 0.01 * np.abs(expected).std()
+
+
 def test_sub_bands_are_the_sums_over_their_tones(small: tuple) -> None:
     csi, tx_xyz, rx_xyz, pair, freq_hz = small
     points = np.random.default_rng(2).uniform(0, 4, (40, 3))

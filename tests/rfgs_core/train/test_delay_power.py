@@ -90,7 +90,8 @@ def test_expected_map_is_the_mean_over_phases(observations: Observations) -> Non
         assert mean[~kept].max() < 4e-3 * mean.max()
 
 
-def test_an_update_never_raises_the_divergence(observations: Observations) -> None:
+@pytest.mark.parametrize("level", [0.2, 1.0, 1.5, 8.0])
+def test_an_update_never_raises_the_divergence(observations: Observations, level: float) -> None:
     """With the floors of its own step, from powers that are far off."""
     rng = np.random.default_rng(1)
     true = rng.uniform(0.1, 3.0, len(POINTS))
@@ -99,7 +100,7 @@ def test_an_update_never_raises_the_divergence(observations: Observations) -> No
     points = np.concatenate([POINTS, rng.uniform(0.5, 2.5, (30, 3))])
     model = DelayPowerModel(observations.with_delta(delta), points)
     seen = rng.uniform(0.1, 1.0, (len(model.parts), len(points))).astype(np.float32)
-    power = model.scaled(rng.uniform(0.01, 10, len(points)).astype(np.float32), seen)
+    power = level * model.scaled(rng.uniform(0.01, 10, len(points)).astype(np.float32), seen)
 
     def cost(power: np.ndarray, floors: list[float]) -> float:
         return sum(

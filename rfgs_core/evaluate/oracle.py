@@ -13,6 +13,7 @@ from tqdm import tqdm
 from rfgs_core.evaluate.grid import splat_gaussians
 from rfgs_core.evaluate.scene import EvaluatedRun, Scene
 from rfgs_core.seeds import sub_seed
+from rfgs_core.threads import one_torch_thread
 from rfgs_core.train.config import TrainConfig
 from rfgs_core.train.frame import FrameState, fit_power, new_head, solve_reflectivity
 from rfgs_core.train.observations import Observations, observe
@@ -60,6 +61,14 @@ def start_on_surface(
     )
 
 
+def _fit_from_surface(run: EvaluatedRun, config: TrainConfig, frame: int) -> FrameState:
+    observations = observe(run.sequence, run.config["radio"], frame)
+    state = start_on_surface(run, observations, config, frame)
+    if config.objective != "paper":
+        state = solve_reflectivity(observations, state, config)
+    return refine(observations, state, config, sub_seed(config.seed, "oracle", frame))
+
+
 def oracle_scores(scene: Scene) -> dict[int, Float32[np.ndarray, "x y z"]]:
     """Score volume of each frame after the run's own fit from the true surface."""
     names = {field.name for field in fields(TrainConfig)}
@@ -67,12 +76,8 @@ def oracle_scores(scene: Scene) -> dict[int, Float32[np.ndarray, "x y z"]]:
     config = TrainConfig(**{name: run.config[name] for name in names})
     scores = {}
     for frame in tqdm(run.frames, desc="oracle_init", unit="frame"):
-        observations = observe(run.sequence, run.config["radio"], frame)
-        state = start_on_surface(run, observations, config, frame)
-        if config.objective != "paper":
-            state = solve_reflectivity(observations, state, config)
-        seed = sub_seed(config.seed, "oracle", frame)
-        state = refine(observations, state, config, seed)
+        with one_torch_thread():
+            state = _fit_from_surface(run, config, frame)
         with torch.no_grad():
             g = state.gaussians
             scores[frame] = splat_gaussians(

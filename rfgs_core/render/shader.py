@@ -9,8 +9,7 @@ finished `SplatPlan` and features without gradient, so pictures cannot reach the
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,6 +23,7 @@ from rfgs_core.files import replacing
 from rfgs_core.gaussians.model import FEATURE_DIM
 from rfgs_core.render.rasterizer import SplatPlan
 from rfgs_core.seeds import sub_seed
+from rfgs_core.threads import one_torch_thread
 
 #: Width of both hidden layers.
 HIDDEN = 64
@@ -155,7 +155,7 @@ def fit_shader(
     """
     if not views:
         raise RfgsError("no training picture to fit the shader to; the test split holds them all")
-    with _one_thread():
+    with one_torch_thread():
         return _fit(views, config, on_step)
 
 
@@ -180,20 +180,6 @@ def _fit(
             on_step(float(loss.detach()))
     final = _standardised(weights, rms)
     return Shader(W1=final.W1.detach(), W2=final.W2.detach(), W3=final.W3.detach())
-
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """Sums of matrices in one order, so that the shader does not depend on the machine's cores.
-
-    The matrices are small, one thread is also the faster choice.
-    """
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
 
 
 def _standardised(weights: dict[str, Tensor], rms: Tensor) -> Shader:

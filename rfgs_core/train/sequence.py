@@ -19,6 +19,7 @@ from rfgs_core.gaussians import Gaussians
 from rfgs_core.gaussians.ply import cloud_of, read_ply, write_ply
 from rfgs_core.run import SCHEMA, Run, open_run, relative_dataset
 from rfgs_core.seeds import sub_seed
+from rfgs_core.threads import one_torch_thread
 from rfgs_core.train.arrays import load_arrays, save_arrays
 from rfgs_core.train.config import TrainConfig
 from rfgs_core.train.frame import FrameState, solve_reflectivity, start_frame
@@ -59,7 +60,8 @@ def train_sequence(
             begin = time.perf_counter()
             state = _finished(run, frame)
             if state is None:
-                state = fit_frame(run, frame, config, before, bar)
+                with one_torch_thread():
+                    state = fit_frame(run, frame, config, before, bar)
                 _store(run, frame, state)
                 spent += time.perf_counter() - begin
                 write_json(out / "config.json", {**settings, "train_s": round(spent, 2)})

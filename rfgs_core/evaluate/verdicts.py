@@ -81,8 +81,8 @@ def _error_share(metrics: dict[str, Any]) -> list[str]:
     share = (own - other) / (1.0 - other)
     text = f"{100 * share:.0f} % of the matched filter's error 1 − F10 is removed"
     if share >= ERROR_SHARE:
-        return [f"{WON}{text}; a third was asked for."]
-    return [f"{LOST}{text}; a third was asked for. {_why(metrics, 'f10', other)}"]
+        return [f"{WON}{text}; the mark is a third."]
+    return [f"{LOST}{text}; the mark is a third. {_why(metrics, 'f10', other)}"]
 
 
 def _other_geometry(metrics: dict[str, Any]) -> list[str]:

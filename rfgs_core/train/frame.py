@@ -31,6 +31,8 @@ from rfgs_core.train.start import (
 
 #: Range resolution that tells limbs from a trunk [m].
 LIMB_M = 0.1
+#: A phase-free fit that would count for less than this is not made: powers stay equal.
+LEAST_TRUST = 0.05
 
 
 @dataclass(frozen=True)
@@ -87,12 +89,12 @@ def fit_power(
         for k, (_, _, data) in enumerate(model.parts)
     ]
     seen = seen * np.array(gain, dtype=np.float32)[:, None]
-    power = start
-    for _ in range(config.power_steps):
-        power = model.update(power, seen)
     bandwidth_hz = float(observations.freq_hz[-1] - observations.freq_hz[0])
     resolution_m = SPEED_OF_LIGHT / (2 * bandwidth_hz)
     trust = config.power_trust * min(1.0, LIMB_M / resolution_m)
+    power = start
+    for _ in range(config.power_steps if trust > LEAST_TRUST else 0):
+        power = model.update(power, seen)
     ratio = np.maximum(power / start, 1e-6) ** trust
     # The level that suits the typical pair: the median keeps shadowed pairs out of it.
     return torch.from_numpy((start * ratio * np.median(gain)).astype(np.float32))

@@ -124,6 +124,18 @@ def person_bundle(make_bundle: MakeBundle) -> Bundle:
 
 
 @pytest.fixture
+def coarse_capsule() -> Mesh:
+    """A person-sized ellipsoid of few faces."""
+    return capsule(3)
+
+
+@pytest.fixture
+def three_sheets() -> list[Mesh]:
+    """Three sheets of the room."""
+    return room()[:3]
+
+
+@pytest.fixture
 def small_radio() -> Radio:
     """Two devices of one transmitter and 2 by 2 receivers; long waves keep points few."""
     return replace(

@@ -36,10 +36,9 @@ def test_direct_term_matches_the_solver(
     make_bundle: MakeBundle,
     small_radio: Radio,
     two_devices: list[DevicePose],
+    coarse_capsule: tuple[np.ndarray, np.ndarray],
     quat: tuple[float, float, float, float],
 ) -> None:
-    from conftest import capsule
-
     from dataset_factory.trace.bounces import with_facets
     from dataset_factory.trace.direct import direct_channel
     from dataset_factory.trace.paths import path_set
@@ -48,7 +47,7 @@ def test_direct_term_matches_the_solver(
 
     radio = replace(small_radio, rx_rows=1, rx_cols=1, num_subcarriers=4)
     devices = [replace(device, quat_wxyz=quat) for device in two_devices]
-    tracer, points = posed_body(make_bundle(static=[], mover=capsule(3)), radio, devices)
+    tracer, points = posed_body(make_bundle(static=[], mover=coarse_capsule), radio, devices)
     elements = layout(radio, devices)
     bounces = tracer._bounces
     bounces._hang(points.lifted)
@@ -93,13 +92,15 @@ def test_joined_legs_match_the_original_solver(
 
 
 def test_bounced_elements_match_tracing_each_of_them(
-    make_bundle: MakeBundle, small_radio: Radio, two_devices: list[DevicePose]
+    make_bundle: MakeBundle,
+    small_radio: Radio,
+    two_devices: list[DevicePose],
+    coarse_capsule: tuple[np.ndarray, np.ndarray],
+    three_sheets: list[tuple[np.ndarray, np.ndarray]],
 ) -> None:
-    from conftest import capsule, room
-
     radio = replace(small_radio, rx_rows=2, rx_cols=2, own_device_links="excluded")
     single = replace(radio, rx_rows=1, rx_cols=1)
-    bundle = make_bundle(static=room()[:3], mover=capsule(3))
+    bundle = make_bundle(static=three_sheets, mover=coarse_capsule)
     tracer, points = posed_body(bundle, radio, two_devices)
     ours = tracer._bounced(points, tracer._bounces)[0, 4::3]
     elements = layout(radio, two_devices).rx_xyz[4::3]

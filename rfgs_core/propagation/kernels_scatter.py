@@ -41,6 +41,11 @@ UTX, UTY, UTZ, URX, URY, URZ, INV_T, INV_R, HIDE_T, HIDE_R, SEEN = range(7, 18)
 BY_AMPLITUDE, BY_DISTANCE, BY_SPREAD, MOMENTS = 18, 19, 20, 21
 ROWS = MOMENTS + 6
 
+#: Rows kept free on both sides of a block's scratch. Vector code asks at run time whether what it
+#: writes lies near what it reads, and takes the scalar way (other last bits) where it does: the
+#: heap's layout would show in the result.
+_APART = 32
+
 OPTIONS: dict[str, Any] = {"fastmath": FAST_MATH, "cache": True, "error_model": "numpy"}
 
 
@@ -72,6 +77,14 @@ class Plan(NamedTuple):
     """First output column, padded tones and gain piece per chunk, int64 [chunk, 3]."""
     tone: np.ndarray
     """First frequency, spacing, centre frequency [Hz] and centre offset, float64 [chunk, 4]."""
+
+
+@njit(**OPTIONS)
+def scratch(cloud: Cloud) -> tuple[np.ndarray, np.ndarray]:
+    """Zeroed w [ROWS, LANES] and path lengths [LANES] of one block, apart from other arrays."""
+    w = np.zeros((ROWS + 2 * _APART, LANES), dtype=cloud.shape.dtype)
+    distance = np.zeros((1 + 2 * _APART, LANES))
+    return w[_APART:-_APART], distance[_APART]
 
 
 @njit(**OPTIONS)
@@ -212,8 +225,7 @@ def scatter_forward(cloud: Cloud, plan: Plan, out: np.ndarray) -> None:
     """Writes sum_i A z kappa-coefficients, float64 out[link, order, re/im, padded tone]."""
     total = cloud.means.shape[1]
     for link in prange(plan.ends.shape[0]):
-        w = np.zeros((ROWS, LANES), dtype=cloud.shape.dtype)
-        distance = np.zeros(LANES)
+        w, distance = scratch(cloud)
         for first in range(0, total, LANES):
             n = min(LANES, total - first)
             illuminate(cloud, plan.ends[link], first, n, distance, w)

@@ -47,6 +47,7 @@ from rfgs_core.propagation.kernels_scatter import (
     E,
     Plan,
     illuminate,
+    scratch,
     see,
     start_tones,
     turn,
@@ -200,8 +201,7 @@ def scatter_backward(cloud: Cloud, plan: Plan, seed: np.ndarray, grad: CloudGrad
     """Adds to `grad`, given seed[link, order, re/im, padded tone] = G kappa^order."""
     total = cloud.means.shape[1]
     for block in prange((total + LANES - 1) // LANES):
-        w = np.zeros((ROWS, LANES), dtype=cloud.shape.dtype)
-        distance = np.zeros(LANES)
+        w, distance = scratch(cloud)
         first = block * LANES
         n = min(LANES, total - first)
         for link in range(plan.ends.shape[0]):

@@ -3,10 +3,8 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
-
+import numba
+import numpy as np
 import pytest
 import torch
 
@@ -128,52 +126,47 @@ def test_shadow_gradients_pass_gradcheck(make_cloud, make_paths, backend) -> Non
     assert torch.autograd.gradcheck(run, values, eps=1e-7, atol=1e-6, rtol=1e-4)
 
 
-#: Prints a digest of channel, shadow and gradients of one seeded cloud.
-_DIGEST = """
-import hashlib, torch
-from rfgs_core.propagation import EnvironmentPaths, Links, Tones, scatter, shadow
-rng = torch.Generator().manual_seed(0)
-def rand(*size, dtype=torch.float32):
-    return torch.rand(*size, generator=rng, dtype=dtype)
-means = (rand(700, 3, dtype=torch.float64) + 2.0).requires_grad_()
-quats, scales = (rand(700, 4) + 0.1).requires_grad_(), (0.01 + 0.01 * rand(700, 3)).requires_grad_()
-gamma = torch.complex(rand(700, 1), rand(700, 1)).requires_grad_()
-alpha = (0.01 * rand(700)).requires_grad_()
-normals = torch.nn.functional.normalize(rand(700, 3) - 0.5, dim=1).requires_grad_()
-ends = rand(9, 6, dtype=torch.float64)
-links = Links(ends[:, :3].contiguous(), (ends[:, 3:] + 4.0).contiguous())
-zero = torch.zeros(9, dtype=torch.float64)
-paths = EnvironmentPaths(
-    torch.arange(9), torch.ones(9, dtype=torch.complex128), zero, links.tx_xyz, links.rx_xyz,
-    zero, zero, 0.05,
-)
-csi = scatter(means, quats, scales, gamma, links, Tones(5.72e9, 2.5e6, 33), normals, 2.0)
-through = shadow(means, quats, scales, alpha, paths)
-wanted = [means, quats, scales, gamma, alpha, normals]
-grads = torch.autograd.grad(csi.abs().sum() + through.abs().sum(), wanted)
-digest = hashlib.sha256()
-for value in (csi.detach(), through.detach(), *grads):
-    assert torch.isfinite(torch.view_as_real(value) if value.is_complex() else value).all()
-    digest.update(value.contiguous().numpy().tobytes())
-print(digest.hexdigest())
-"""
+#: What `channel_and_gradients` differentiates by.
+WANTED = ("means", "quats", "scales", "scales_rf", "gamma", "alpha", "normals")
 
 
-def test_same_bytes_for_any_number_of_threads() -> None:
-    """The same program gives the same bytes, whatever number of threads it is given."""
+@pytest.fixture
+def channel_and_gradients(make_cloud, make_links, make_paths):
+    every = make_cloud(700)
+    links, tones, paths = make_links(9), Tones(5.72e9, 2.5e6, 33), make_paths(7, 0.05)
 
-    def digest(threads: int) -> str:
-        environment = {**os.environ, "NUMBA_NUM_THREADS": str(threads)}
-        answer = subprocess.run(
-            [sys.executable, "-c", _DIGEST],
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        return answer.stdout.strip()
+    def run() -> list[torch.Tensor]:
+        csi = scatter(*(every[name] for name in SCATTER[:4]), links, tones, every["normals"], 2.0)
+        through = shadow(*(every[name] for name in SHADOW), paths)
+        loss = csi.abs().sum() + through.abs().sum()
+        grads = torch.autograd.grad(loss, [every[name] for name in WANTED])
+        return [csi.detach(), through.detach(), *grads]
 
-    assert digest(1) == digest(2)
+    return run
+
+
+def _same_bytes(first: list[torch.Tensor], second: list[torch.Tensor]) -> bool:
+    return all(torch.equal(a, b) for a, b in zip(first, second, strict=True))
+
+
+def test_same_bytes_for_any_number_of_threads(channel_and_gradients) -> None:
+    threads = numba.get_num_threads()
+    first = channel_and_gradients()
+    try:
+        numba.set_num_threads(1)
+        second = channel_and_gradients()
+    finally:
+        numba.set_num_threads(threads)
+    assert _same_bytes(first, second)
+
+
+def test_same_bytes_wherever_the_heap_puts_the_arrays(channel_and_gradients) -> None:
+    rng, held = np.random.default_rng(0), []
+    first = channel_and_gradients()
+    for _ in range(300):
+        kept = [array for array in held if rng.random() < 0.5]
+        held = kept + [np.zeros(rng.integers(1, 4000)) for _ in range(rng.integers(0, 20))]
+        assert _same_bytes(first, channel_and_gradients())
 
 
 def test_memory_does_not_grow_with_links_times_gaussians(make_cloud, make_links) -> None:

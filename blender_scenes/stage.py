@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What watches and lights a scene: cameras, access points, lamps and render settings."""
+"""What watches a scene: cameras, access points and render settings."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import bpy
 import numpy as np
-from mathutils import Matrix, Vector
+from mathutils import Matrix
 
 Point = tuple[float, float, float]
 
@@ -71,39 +71,6 @@ def add_access_points(
     return made
 
 
-def add_lights(collection: bpy.types.Collection) -> None:
-    """Afternoon sun through the east window, a soft ceiling and the floor lamp."""
-    sun = _light("sun", "SUN", 5.0, (1.0, 0.90, 0.76), collection)
-    sun.data.angle = 0.02
-    sun.rotation_euler = Vector((-0.80, 0.12, -0.70)).to_track_quat("-Z", "Y").to_euler()
-    for name, place, size, power, colour in (
-        ("soft_ceiling", (0.0, 0.0, 2.58), (3.6, 2.8), 62.0, (1.0, 0.96, 0.90)),
-        ("window_glow", (2.94, -0.35, 1.52), (1.7, 1.25), 42.0, (0.86, 0.93, 1.0)),
-    ):
-        lamp = _light(name, "AREA", power, colour, collection)
-        lamp.data.shape, lamp.data.size, lamp.data.size_y = "RECTANGLE", *size
-        lamp.location = place
-        lamp.visible_camera = lamp.visible_glossy = False
-    collection.objects["window_glow"].rotation_euler = (0.0, math.radians(90), 0.0)
-    bulb = _light("floor_lamp_bulb", "POINT", 9.0, (1.0, 0.78, 0.5), collection)
-    bulb.data.shadow_soft_size = 0.05
-    bulb.location = (-1.42, -2.10, 1.45)
-
-
-def _light(
-    name: str,
-    kind: str,
-    power: float,
-    colour: tuple[float, float, float],
-    collection: bpy.types.Collection,
-) -> bpy.types.Object:
-    data = bpy.data.lights.new(name, kind)
-    data.energy, data.color = power, colour
-    lamp = bpy.data.objects.new(name, data)
-    collection.objects.link(lamp)
-    return lamp
-
-
 def set_render(scene: bpy.types.Scene, frames: int, fps: int) -> None:
     """Cycles, square pictures, view transform Standard, `frames` frames from 1."""
     scene.frame_start, scene.frame_end = 1, frames
@@ -120,6 +87,40 @@ def set_render(scene: bpy.types.Scene, frames: int, fps: int) -> None:
     background.inputs["Color"].default_value = (0.62, 0.76, 0.95, 1.0)
     background.inputs["Strength"].default_value = 0.5
     scene.world = world
+
+
+def corners(
+    half_m: tuple[float, float], heights_m: Sequence[float] = (1.2, 2.2), inset_m: float = 0.2
+) -> list[Point]:
+    """The four corners of a room, `inset_m` from its walls, at alternating heights [m]."""
+    x, y = half_m[0] - inset_m, half_m[1] - inset_m
+    around = [(-x, -y), (x, -y), (x, y), (-x, y)]
+    return [(*place, heights_m[index % len(heights_m)]) for index, place in enumerate(around)]
+
+
+def around_room(
+    half_m: tuple[float, float], low_m: float = 1.5, high_m: float = 2.4
+) -> list[Point]:
+    """Twelve places for cameras: high and low in the corners, and along the walls [m].
+
+    Any first few of them look from all around.
+    """
+    x, y = half_m[0] - 0.22, half_m[1] - 0.18
+    middle = 0.5 * (low_m + high_m)
+    return [
+        (-x, -y, high_m),
+        (x, y, high_m),
+        (x, -y, low_m),
+        (-x, y, low_m),
+        (0.08 * x, y, middle),
+        (-0.12 * x, -y, middle),
+        (-x, -y, low_m),
+        (x, -y, high_m),
+        (x, y, low_m),
+        (-x, y, high_m),
+        (0.4 * x, -y, low_m),
+        (-0.3 * x, y, high_m),
+    ]
 
 
 def show_first_camera(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:

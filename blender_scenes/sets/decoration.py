@@ -7,6 +7,7 @@ import math
 
 import bpy
 
+from blender_scenes.sets.lighting import NEUTRAL, bulb, soft_light, sun
 from blender_scenes.shapes import Builder, Point
 
 #: Outline of a leaf: distance from the foot and width as shares of its length, rise [m].
@@ -32,6 +33,17 @@ def build_decoration(collection: bpy.types.Collection) -> list[bpy.types.Object]
     ):
         pieces.append(picture(name, size, paint).build(collection, location=(x, wall_y, z)))
     return pieces
+
+
+def light_room(collection: bpy.types.Collection) -> None:
+    """Afternoon sun through the east window, a soft ceiling and the floor lamp."""
+    sun((-0.80, 0.12, -0.70), 5.0, (1.0, 0.90, 0.76), collection)
+    soft_light("soft_ceiling", (0.0, 0.0, 2.58), (3.6, 2.8), 62.0, NEUTRAL, collection)
+    glow = soft_light(
+        "window_glow", (2.94, -0.35, 1.52), (1.7, 1.25), 42.0, (0.86, 0.93, 1.0), collection
+    )
+    glow.rotation_euler = (0.0, math.radians(90), 0.0)
+    bulb("floor_lamp_bulb", (-1.42, -2.10, 1.45), 9.0, (1.0, 0.78, 0.5), collection)
 
 
 def curtain(name: str) -> Builder:

@@ -11,8 +11,8 @@ import math
 
 import bpy
 
-from blender_scenes.decoration import build_decoration
-from blender_scenes.seating import armchair, chair, cushion, sofa
+from blender_scenes.sets.decoration import build_decoration
+from blender_scenes.sets.seating import armchair, chair, cushion, sofa
 from blender_scenes.shapes import Builder
 
 #: Gap between a piece of furniture and the floor or a wall [m].

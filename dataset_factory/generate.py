@@ -45,7 +45,7 @@ from rfgs_core.dataset.writer import (
 )
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json, write_json
-from rfgs_core.radio import DevicePose, layout, preset
+from rfgs_core.radio import DevicePose, frame_samples, layout, preset
 
 logger = logging.getLogger(__name__)
 
@@ -226,7 +226,10 @@ def _prepare(
     times = [(frame - sequence.frame_start) / sequence.fps for frame in sequence.frames]
     for name, poses in devices.items():
         radio = preset(name)
-        create_csi(job.files.csi(name), radio, layout(radio, poses), sequence.frames, times)
+        samples = frame_samples(radio, sequence.fps)
+        create_csi(
+            job.files.csi(name), radio, layout(radio, poses), sequence.frames, times, samples
+        )
     return sequence
 
 

@@ -111,15 +111,21 @@ def _sequence_faults(sequence: Sequence, has: list[str]) -> Iterator[str]:
 def _radio_faults(sequence: Sequence, radio: str) -> Iterator[str]:
     store = sequence.files.csi(radio)
     data, layout = sequence.radio(radio), sequence.layout(radio)
-    if data["frame"].values.tolist() != sequence.frames:
-        yield f"{store}: frame: expected the frames of sequence.json"
+    times_s = [sequence.sample_times_s(radio, frame) for frame in sequence.frames]
+    if data["frame"].values.tolist() != np.repeat(sequence.frames, len(times_s[0])).tolist():
+        yield f"{store}: frame: expected the frames of sequence.json, once per sample"
+    elif not np.allclose(data["time_s"].values, np.concatenate(times_s), rtol=0.0, atol=1e-9):
+        yield f"{store}: time_s: differs from frames and samples in sequence.json"
     if not np.allclose(data["freq_hz"].values, sequence.radio_spec(radio).freq_hz, rtol=1e-12):
         yield f"{store}: freq_hz: differs from the radio in sequence.json"
     for name in ("tx_xyz", "rx_xyz", "measured", "tx_device", "rx_device", "rx_column"):
-        if not np.allclose(data[name].values, getattr(layout, name), atol=1e-9):
+        values = data[name].values
+        # Antennas that move stand at the first sample where the layout puts them.
+        first = values[0] if "time" in data[name].dims else values
+        if not (np.isfinite(values).all() and np.allclose(first, getattr(layout, name), atol=1e-9)):
             yield f"{store}: {name}: differs from the devices in sequence.json"
-    static = sequence.csi_static(radio)
-    yield from channel_faults(sequence, radio, static, chunk_file(store, None))
+    static = sequence.csi_static_samples(radio)
+    yield from channel_faults(sequence, radio, static[0], chunk_file(store, None))
     for index, frame in enumerate(sequence.frames):
         file = chunk_file(store, index)
         yield from _caught(
@@ -130,15 +136,15 @@ def _radio_faults(sequence: Sequence, radio: str) -> Iterator[str]:
 def _frame_faults(
     sequence: Sequence, radio: str, frame: int, file: Path, static: np.ndarray
 ) -> Iterator[str]:
-    value = sequence.csi(radio, frame)
+    value = sequence.csi_samples(radio, frame)
     measured = sequence.layout(radio).measured
     if not np.isfinite(value).all():
         yield f"{file}: frame {frame}: values that are not finite"
-    elif value[~measured].any():
+    elif value[:, ~measured].any():
         yield f"{file}: frame {frame}: values on links that are not measured"
-    elif not np.abs(value[measured]).any():
+    elif not np.abs(value[:, measured]).any(axis=(1, 2)).all():
         yield f"{file}: frame {frame}: silent channel"
-    elif np.array_equal(value, static):
+    elif (value == static).all(axis=(1, 2, 3)).any():
         yield f"{file}: frame {frame}: equals the static channel, nobody is in it"
 
 

@@ -46,7 +46,7 @@ class Worker:
             Seconds spent per stage so far by the radio's tracer.
         """
         tracer = self._tracer(radio)
-        value = tracer.static() if frame is None else tracer.frame(self.bundle.frame(frame))
+        value = tracer.static() if frame is None else tracer.samples(self.bundle.frame(frame))
         index = None if frame is None else self.bundle.frames.index(frame)
         write_csi(self.files.csi(radio), index, value, self.files.csi_done(radio, frame))
         return dict(tracer.timings)

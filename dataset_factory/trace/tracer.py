@@ -105,6 +105,14 @@ class Tracer:
         channel = environment_channel(self._environment, self._radio, self._layout)
         return channel.astype(np.complex64)
 
+    def samples(self, frame: BundleFrame) -> np.ndarray:
+        """Channels at every sample of a frame, complex64, shape (sample, tx, rx, subcarrier).
+
+        What the samples are, `rfgs_core.radio.frame_samples` says: their times, and the places
+        of antennas that move within a frame.
+        """
+        return self.frame(frame)[None]
+
     def frame(self, frame: BundleFrame) -> np.ndarray:
         """Channel at one frame; the result does not depend on frames traced before.
 

@@ -8,19 +8,22 @@ import os
 import shutil
 import uuid
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Complex64
 
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.files import read_json, write_json
-from rfgs_core.radio import Layout, Radio
+from rfgs_core.radio import FrameSamples, Layout, Radio
 
 if TYPE_CHECKING:
     import xarray
 
 DIMENSIONS = ("time", "tx", "rx", "subcarrier")
+
+#: A frame is one chunk, and the codec takes no larger one [bytes].
+LARGEST_CHUNK_BYTES = 2**31 - 2**20
 
 _UNITS = {
     "csi": "1",
@@ -33,67 +36,92 @@ _UNITS = {
 
 
 def create_csi(
-    path: Path, radio: Radio, layout: Layout, frames: list[int], time_s: list[float]
+    path: Path,
+    radio: Radio,
+    layout: Layout,
+    frames: list[int],
+    time_s: list[float],
+    samples: FrameSamples | None = None,
 ) -> None:
     """Creates an empty store in one step; an existing one is left as it is.
 
-    Values that have not been written read as NaN, never as silence.
+    Values that have not been written read as NaN, never as silence. `time` runs over the
+    samples of all frames, frame by frame, with the coordinates `frame`, `time_s` and, where a
+    frame has several samples, `sample_index` (which of its frame). Antennas that move within a
+    frame have `tx_xyz` or `rx_xyz` over (time, element, xyz), and `csi_static` then has a
+    leading axis `sample`, to be taken at `sample_index`.
 
     Args:
         path: Folder of the store.
         radio: Gives the tones.
         layout: Gives the antenna elements.
-        frames: Frame number of each time step.
-        time_s: Time of each time step [s].
+        frames: Frame numbers.
+        time_s: Time of each frame [s].
+        samples: The samples of every frame; None for one per frame.
+
+    Raises:
+        RfgsError: A frame's samples are more than one chunk can hold.
     """
+    samples = samples or FrameSamples()
+    links = layout.measured.size * radio.num_subcarriers
+    if len(samples) * links * np.dtype(np.complex64).itemsize > LARGEST_CHUNK_BYTES:
+        raise RfgsError(
+            f"radio {radio.name!r}: {len(samples)} samples per frame of {links} values exceed "
+            f"{LARGEST_CHUNK_BYTES / 2**30:.0f} GiB; ask for fewer samples per frame"
+        )
     if path.exists():
         return
     temporary = path.with_name(f".tmp-{uuid.uuid4().hex[:8]}-{path.name}")
     temporary.parent.mkdir(parents=True, exist_ok=True)
     try:
-        _create(temporary, radio, layout, frames, time_s)
+        _create(temporary, radio, layout, frames, time_s, samples)
         os.replace(temporary, path)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
 
 
-def write_csi(
-    path: Path, index: int | None, value: Complex64[np.ndarray, "tx rx subcarrier"], marker: Path
-) -> None:
+def write_csi(path: Path, index: int | None, value: np.ndarray, marker: Path) -> None:
     """Writes one frame's channel, then its marker.
 
     A frame is one chunk of its own, so processes that write different frames never meet.
 
     Args:
         path: The store.
-        index: Time step; None writes the static channel.
-        value: The channel; entries of links that do not exist are zero.
+        index: Which frame of the store; None writes the static channel.
+        value: The channel, complex64, (sample, tx, rx, subcarrier), or without `sample` for a
+            frame of one sample or a static channel of antennas that stand still; entries of
+            links that do not exist are zero.
         marker: File that is written last, with the digest of the values.
     """
     import zarr
 
     array = zarr.open_array(str(path / ("csi_static" if index is None else "csi")), mode="r+")
-    expected = array.shape if index is None else array.shape[1:]
+    count = 1 if array.ndim == 3 else int(array.chunks[0])
+    value = value.reshape(-1, *value.shape[-3:])
+    expected = (count, *array.shape[-3:])
     if value.shape != expected or value.dtype != np.complex64:
         raise ValueError(f"expected complex64 {expected}, got {value.dtype} {value.shape}")
     if not np.isfinite(value).all():
-        raise RfgsError(f"{path}: step {index}: the traced channel is not finite")
+        raise RfgsError(f"{path}: frame {index}: the traced channel is not finite")
     if index is None:
-        array[...] = value
+        array[...] = value.reshape(array.shape)
     else:
-        array[index] = value
+        array[index * count : (index + 1) * count] = value
     write_json(marker, {"sha256": digest(value)})
 
 
 def read_csi(
     path: Path, index: int | None, marker: Path | None
-) -> Complex64[np.ndarray, "tx rx subcarrier"]:
+) -> Complex64[np.ndarray, "sample tx rx subcarrier"]:
     """Reads one frame's channel and checks it against its marker.
 
     Args:
         path: The store.
-        index: Time step; None reads the static channel.
+        index: Which frame of the store; None reads the static channel.
         marker: Marker to check against; None checks only that the chunk is whole.
+
+    Returns:
+        All samples of the frame; one for a static channel of antennas that stand still.
 
     Raises:
         RfgsFormatError: The chunk is missing, truncated or altered; the message names its file.
@@ -105,25 +133,29 @@ def read_csi(
         array = zarr.open_array(str(path / name), mode="r")
     except (FileNotFoundError, ValueError, KeyError, TypeError) as error:
         raise RfgsFormatError(f"{path / name}: damaged or missing array ({error})") from error
+    if array.dtype != np.complex64 or array.ndim not in ((3, 4) if index is None else (4,)):
+        raise RfgsFormatError(f"{path / name}: expected complex64 (…, tx, rx, subcarrier)")
     file = chunk_file(path, index)
     if not file.is_file():
         raise RfgsFormatError(f"{file}: no such chunk; this frame was never finished")
+    count = int(array.chunks[0])
     try:
-        value = np.asarray(array[...] if index is None else array[index])
+        which = ... if index is None else slice(index * count, (index + 1) * count)
+        value = np.asarray(array[which])
     except (RuntimeError, ValueError, OSError, IndexError) as error:
         raise RfgsFormatError(f"{file}: truncated or damaged CSI chunk ({error})") from error
-    if value.dtype != np.complex64 or value.ndim != 3:
-        raise RfgsFormatError(f"{file}: expected complex64 (tx, rx, subcarrier)")
     if marker is not None and _recorded(marker) != digest(value):
         raise RfgsFormatError(f"{file}: CSI chunk differs from the digest in {marker}")
-    return value
+    return value.reshape(-1, *value.shape[-3:])
 
 
 def chunk_file(path: Path, index: int | None) -> Path:
     """File that holds one frame's channel, or the static one for None."""
-    if index is None:
-        return path / "csi_static" / "c" / "0" / "0" / "0"
-    return path / "csi" / "c" / str(index) / "0" / "0" / "0"
+    if index is not None:
+        return path / "csi" / "c" / str(index) / "0" / "0" / "0"
+    chunk = path / "csi_static" / "c" / "0" / "0" / "0"
+    # Antennas that move within a frame give the static channel one axis more.
+    return chunk / "0" if chunk.is_dir() else chunk
 
 
 def digest(value: np.ndarray) -> str:
@@ -158,14 +190,50 @@ def _recorded(marker: Path) -> str:
 
 
 def _create(
-    path: Path, radio: Radio, layout: Layout, frames: list[int], time_s: list[float]
+    path: Path,
+    radio: Radio,
+    layout: Layout,
+    frames: list[int],
+    time_s: list[float],
+    samples: FrameSamples,
 ) -> None:
     import xarray
     import zarr
 
-    coordinates = {
-        "frame": ("time", np.asarray(frames, np.int64)),
-        "time_s": ("time", np.asarray(time_s, np.float64)),
+    dataset = xarray.Dataset(coords=_coordinates(radio, layout, frames, time_s, samples))
+    for name, unit in _UNITS.items():
+        if name in dataset:
+            dataset[name].attrs["units"] = unit
+    dataset.attrs["radio"] = radio.name
+    dataset.to_zarr(path, mode="w", zarr_format=3, consolidated=False)
+    group = zarr.open_group(str(path), mode="r+")
+    links = (*layout.measured.shape, radio.num_subcarriers)
+    count = len(samples)
+    static = ("sample",) if samples.antennas_move else ()
+    for name, leading, size, chunk in (
+        ("csi", ("time",), (len(frames) * count,), (count,)),
+        ("csi_static", static, (count,)[: len(static)], (count,)[: len(static)]),
+    ):
+        group.create_array(
+            name,
+            shape=(*size, *links),
+            chunks=(*chunk, *links),
+            dtype="complex64",
+            fill_value=complex(np.nan, np.nan),
+            dimension_names=(*leading, *DIMENSIONS[1:]),
+            attributes={"units": _UNITS[name]},
+        )
+
+
+def _coordinates(
+    radio: Radio, layout: Layout, frames: list[int], time_s: list[float], samples: FrameSamples
+) -> dict[str, tuple[Any, np.ndarray]]:
+    """Every coordinate of a store with its dimensions."""
+    count = len(samples)
+    time = np.asarray(time_s, np.float64)[:, None] + samples.offset_s
+    found: dict[str, tuple[Any, np.ndarray]] = {
+        "frame": ("time", np.repeat(np.asarray(frames, np.int64), count)),
+        "time_s": ("time", time.ravel()),
         "tx_device": ("tx", layout.tx_device),
         "rx_device": ("rx", layout.rx_device),
         "rx_column": ("rx", layout.rx_column),
@@ -174,24 +242,9 @@ def _create(
         "freq_hz": ("subcarrier", radio.freq_hz),
         "measured": (("tx", "rx"), layout.measured),
     }
-    dataset = xarray.Dataset(coords=coordinates)
-    for name, unit in _UNITS.items():
-        if name in dataset:
-            dataset[name].attrs["units"] = unit
-    dataset.attrs["radio"] = radio.name
-    dataset.to_zarr(path, mode="w", zarr_format=3, consolidated=False)
-    group = zarr.open_group(str(path), mode="r+")
-    links = (*layout.measured.shape, radio.num_subcarriers)
-    for name, leading, dimensions in (
-        ("csi", (len(frames),), DIMENSIONS),
-        ("csi_static", (), DIMENSIONS[1:]),
-    ):
-        group.create_array(
-            name,
-            shape=(*leading, *links),
-            chunks=(*(1 for _ in leading), *links),
-            dtype="complex64",
-            fill_value=complex(np.nan, np.nan),
-            dimension_names=dimensions,
-            attributes={"units": _UNITS[name]},
-        )
+    if count > 1:
+        found["sample_index"] = ("time", np.tile(np.arange(count), len(frames)))
+    for name, moved in (("tx", samples.tx_xyz), ("rx", samples.rx_xyz)):
+        if moved is not None:
+            found[f"{name}_xyz"] = (("time", name, "xyz"), np.tile(moved, (len(frames), 1, 1)))
+    return found

@@ -25,7 +25,7 @@ from rfgs_core.dataset.schema import (
 )
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.files import inside, sha256
-from rfgs_core.radio import DevicePose, Layout, Radio, layout
+from rfgs_core.radio import DevicePose, Layout, Radio, frame_samples, layout
 
 if TYPE_CHECKING:
     import xarray
@@ -164,6 +164,11 @@ class Sequence:
         """Time of a frame [s]."""
         return (frame - self.info.frame_start) / self.fps
 
+    def sample_times_s(self, name: str, frame: int) -> Float64[np.ndarray, "sample"]:
+        """Time of each of a radio's samples of a frame [s]; the first is the frame's own."""
+        self._index(frame)
+        return self.time_s(frame) + frame_samples(self.radio_spec(name), self.fps).offset_s
+
     def radio_spec(self, name: str) -> Radio:
         """The radio's band and antennas."""
         return radio_from_json(self.files.info, self.info.radios[self._radio(name)])
@@ -184,15 +189,26 @@ class Sequence:
         return open_csi(self.files.csi(self._radio(name)))
 
     def csi(self, name: str, frame: int) -> Complex64[np.ndarray, "tx rx subcarrier"]:
-        """Channel of one frame, checked against the digest in its marker.
+        """Channel at a frame's own time, checked against the digest in its marker.
+
+        Raises:
+            RfgsError: There is no such radio or frame.
+            RfgsFormatError: The chunk is missing, truncated or altered.
+        """
+        return self.csi_samples(name, frame)[0]
+
+    def csi_samples(
+        self, name: str, frame: int
+    ) -> Complex64[np.ndarray, "sample tx rx subcarrier"]:
+        """Channels of all samples of a frame (packets, chirps, pulses), checked like `csi`.
 
         Raises:
             RfgsError: There is no such radio or frame.
             RfgsFormatError: The chunk is missing, truncated or altered.
         """
         index = self._index(frame)
-        store = self.files.csi(self._radio(name))
-        return self._fitting(name, read_csi(store, index, self.files.csi_done(name, frame)), frame)
+        value = read_csi(self.files.csi(self._radio(name)), index, self.files.csi_done(name, frame))
+        return self._fitting(name, value, frame, (self.radio_spec(name).samples_per_frame,))
 
     def csi_static(self, name: str) -> Complex64[np.ndarray, "tx rx subcarrier"]:
         """Channel without anything that moves, checked against its digest.
@@ -200,8 +216,18 @@ class Sequence:
         Raises:
             RfgsFormatError: The chunk is missing, truncated or altered.
         """
-        store = self.files.csi(self._radio(name))
-        return self._fitting(name, read_csi(store, None, self.files.csi_done(name, None)), None)
+        return self.csi_static_samples(name)[0]
+
+    def csi_static_samples(self, name: str) -> Complex64[np.ndarray, "sample tx rx subcarrier"]:
+        """Channel without anything that moves at each sample of a frame.
+
+        There is a single one, for all samples, unless the antennas move within a frame.
+
+        Raises:
+            RfgsFormatError: The chunk is missing, truncated or altered.
+        """
+        value = read_csi(self.files.csi(self._radio(name)), None, self.files.csi_done(name, None))
+        return self._fitting(name, value, None, (1, self.radio_spec(name).samples_per_frame))
 
     def moving_mesh(
         self, frame: int
@@ -268,11 +294,15 @@ class Sequence:
             raise RfgsError(f"{self.path}: no camera {name!r}; it holds {', '.join(names)}")
         return name
 
-    def _fitting(self, name: str, value: np.ndarray, frame: int | None) -> np.ndarray:
+    def _fitting(
+        self, name: str, value: np.ndarray, frame: int | None, counts: tuple[int, ...]
+    ) -> np.ndarray:
+        """Refuses channels whose shape is not that of the radio with one of `counts` samples."""
         shape = (*self.layout(name).measured.shape, self.radio_spec(name).num_subcarriers)
-        if value.shape != shape:
+        if value.shape[1:] != shape or len(value) not in counts:
             raise RfgsFormatError(
-                f"{self.files.csi(name)}: frame {frame}: expected shape {shape}, got {value.shape}"
+                f"{self.files.csi(name)}: frame {frame}: expected shape {(counts[-1], *shape)}, "
+                f"got {value.shape}"
             )
         return value
 

@@ -5,5 +5,16 @@ from __future__ import annotations
 
 from rfgs_core.radio.layout import DevicePose, Layout, layout, place_devices
 from rfgs_core.radio.presets import PRESETS, Radio, preset
+from rfgs_core.radio.samples import FrameSamples, frame_samples
 
-__all__ = ["PRESETS", "DevicePose", "Layout", "Radio", "layout", "place_devices", "preset"]
+__all__ = [
+    "PRESETS",
+    "DevicePose",
+    "FrameSamples",
+    "Layout",
+    "Radio",
+    "frame_samples",
+    "layout",
+    "place_devices",
+    "preset",
+]

@@ -53,6 +53,10 @@ class Radio:
     """Antenna pattern, one of Sionna's names."""
     polarization: str = "V"
     """Antenna polarisation, one of Sionna's names."""
+    samples_per_frame: int = 1
+    """Packets, chirps or pulses of every frame; the first is taken at the frame's own time."""
+    sample_interval_s: float = 0.0
+    """Time between a frame's samples [s]; 0 spreads them evenly until the next frame."""
 
     @property
     def bandwidth_hz(self) -> float:
@@ -120,6 +124,7 @@ PRESETS: dict[str, Radio] = {
             own_device_links="only",
             noise_figure_db=12.0,
             power_dbm=12.0,
+            sample_interval_s=0.25e-3,
         ),
     )
 }

@@ -86,12 +86,18 @@ def visible_links(sequence: Any, radio: str) -> tuple[np.ndarray, np.ndarray, np
 
 
 def observe(sequence: Any, radio: str, frame: int) -> Observations:
-    """Reads one frame and hides what is held out.
+    """Reads one frame at its own time and hides what is held out.
 
     Raises:
-        RfgsError: The channel holds values that are not finite.
+        RfgsError: The channel holds values that are not finite, or its antennas move within a
+            frame.
     """
     data = sequence.radio(radio)
+    if data["tx_xyz"].ndim != 2 or data["rx_xyz"].ndim != 2:
+        raise RfgsError(
+            f"{sequence.name}, {radio}: the antennas move within a frame, and training takes one "
+            "sample per frame; choose a radio whose antennas stand still"
+        )
     links, tones, measured = visible_links(sequence, radio)
     csi, static = sequence.csi(radio, frame), sequence.csi_static(radio)
     seen = links[:, :, None] & tones

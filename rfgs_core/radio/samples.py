@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""When, and from where, a radio measures within every frame: packets, chirps or pulses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float64
+
+from rfgs_core.errors import RfgsError
+from rfgs_core.radio.presets import Radio
+
+
+@dataclass(frozen=True)
+class FrameSamples:
+    """The samples of a frame, the same in every frame.
+
+    The first one is taken at the frame's own time, so whoever wants one channel per frame
+    takes that.
+    """
+
+    offset_s: Float64[np.ndarray, "sample"] = field(default_factory=lambda: np.zeros(1))
+    """Time of each sample after its frame [s], ascending from 0."""
+    tx_xyz: Float64[np.ndarray, "sample tx 3"] | None = None
+    """Transmitting elements at each sample [m]; None where they stand still."""
+    rx_xyz: Float64[np.ndarray, "sample rx 3"] | None = None
+    """Receiving elements at each sample [m]; None where they stand still."""
+
+    def __len__(self) -> int:
+        return len(self.offset_s)
+
+    @property
+    def antennas_move(self) -> bool:
+        """Whether antennas change place from sample to sample, as in a synthetic aperture."""
+        return self.tx_xyz is not None or self.rx_xyz is not None
+
+
+def frame_samples(radio: Radio, fps: float) -> FrameSamples:
+    """The samples a radio takes of each frame.
+
+    Sample k is `k · sample_interval_s` after its frame, or `k/(N · fps)` where the radio gives
+    no interval.
+
+    Raises:
+        RfgsError: There is no sample, or they would run into the next frame.
+    """
+    count, frame_s = radio.samples_per_frame, 1.0 / fps
+    interval_s = radio.sample_interval_s or frame_s / max(count, 1)
+    if count < 1 or interval_s < 0.0 or count * interval_s > frame_s * (1.0 + 1e-9):
+        raise RfgsError(
+            f"radio {radio.name!r}: {count} samples per frame, {interval_s * 1e3:g} ms apart, do "
+            f"not fit a frame of {frame_s * 1e3:g} ms; ask for at least 1 and at most "
+            f"{int(frame_s / interval_s * (1.0 + 1e-9)) if interval_s > 0.0 else 1}"
+        )
+    return FrameSamples(np.arange(count) * interval_s)

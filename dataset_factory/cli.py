@@ -52,7 +52,7 @@ class GenerateArgs:
     out: Path
     """Folder of the dataset."""
     frames: str = ""
-    """Blender frames FIRST:LAST or FIRST:LAST:STEP, both ends included; default: all."""
+    """Blender frames A:B[:STEP] (inclusive), or one number; default: all."""
     cameras: int = 0
     """How many of the scene's cameras, in order of their names; 0 takes all."""
     resolution: int = 256

@@ -45,6 +45,7 @@ from rfgs_core.dataset.writer import (
 )
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json, write_json
+from rfgs_core.frames import parse_frames
 from rfgs_core.radio import DevicePose, frame_samples, layout, preset
 
 logger = logging.getLogger(__name__)
@@ -271,8 +272,7 @@ def _render(job: Job, sequence: SequenceInfo) -> None:
     size = ["--out", str(rendered), *_picture_size(job), "--samples", str(job.plan.samples)]
     for run in frame_runs(missing):
         shutil.rmtree(rendered, ignore_errors=True)
-        first, last, step = (int(part) for part in run.split(":"))
-        frames = list(range(first, last + 1, step))
+        frames = list(parse_frames(run))
         with _bar("render") as progress:
 
             def encode(done: int, total: int, frames: list[int] = frames) -> None:

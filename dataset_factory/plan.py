@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import asdict, dataclass
 from importlib import metadata
 from pathlib import Path
@@ -13,12 +12,11 @@ from dataset_factory.scenes import Scene, blend_digest
 from rfgs_core.dataset.csi_store import chunk_file
 from rfgs_core.dataset.names import SequenceFiles
 from rfgs_core.errors import RfgsError
+from rfgs_core.frames import parse_frames
 from rfgs_core.radio import preset
 
 #: Packages whose version may change a byte of the data.
 PACKAGES = ("rfgs", "sionna-rt", "mitsuba", "drjit", "numpy", "scipy", "numba", "zarr", "OpenEXR")
-
-_FRAMES = re.compile(r"(-?\d+):(-?\d+)(?::(\d+))?")
 
 
 @dataclass(frozen=True)
@@ -55,7 +53,7 @@ def make_plan(scene: Scene, radios: tuple[str, ...], frames: str, **options: Any
     Args:
         scene: Where the data comes from.
         radios: Preset names.
-        frames: Frames `A:B[:STEP]` or empty.
+        frames: Frames `A:B[:STEP]`, one number, or empty.
         **options: The other fields of `Plan`.
 
     Raises:
@@ -67,8 +65,9 @@ def make_plan(scene: Scene, radios: tuple[str, ...], frames: str, **options: Any
         preset(name)
     if len(set(radios)) != len(radios):
         raise RfgsError(f"a radio is named twice: {', '.join(radios)}")
-    if frames:
-        parse_frames(frames)
+    if frames and len(only := parse_frames(frames)) == 1:
+        # Inside Blender frames are always a range.
+        frames = f"{only[0]}:{only[0]}"
     limits = {"depth": (1, 5), "resolution": (16, 8192), "samples": (1, 65536), "cameras": (0, 999)}
     for name, (low, high) in limits.items():
         if not low <= options[name] <= high:
@@ -80,25 +79,6 @@ def make_plan(scene: Scene, radios: tuple[str, ...], frames: str, **options: Any
         frames=frames,
         **options,
     )
-
-
-def parse_frames(text: str) -> list[int]:
-    """Frame numbers of `A:B[:STEP]`, B included.
-
-    Raises:
-        RfgsError: The text is of another form or holds no frame.
-
-    Example:
-        >>> parse_frames("10:20:5")
-        [10, 15, 20]
-    """
-    match = _FRAMES.fullmatch(text)
-    if not match:
-        raise RfgsError(f"--frames {text!r}: expected FIRST:LAST or FIRST:LAST:STEP, as in 1:60:2")
-    first, last, step = int(match[1]), int(match[2]), int(match[3] or 1)
-    if last < first or step < 1:
-        raise RfgsError(f"--frames {text!r}: expected FIRST <= LAST and STEP >= 1")
-    return list(range(first, last + 1, step))
 
 
 def frame_runs(frames: list[int]) -> list[str]:

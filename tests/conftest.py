@@ -1,10 +1,40 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shape checks at run time for every test: jaxtyping annotations are enforced by beartype."""
+"""Shape checks at run time for every test, and Pythons of their own for those that need one."""
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
 from jaxtyping import install_import_hook
+
+ROOT = Path(__file__).resolve().parents[1]
 
 # Packages with numba kernels are left out: the hook would wrap a kernel that calls another, and
 # numba's cache cannot store the wrapper.
 install_import_hook(["rfgs_core.radio", "rfgs_core.gaussians"], "beartype.beartype")
+
+
+@pytest.fixture(scope="session")
+def python() -> Callable[..., subprocess.CompletedProcess[str]]:
+    """Runs Python in the repository's folder; `must_work` shows what a failed run said."""
+
+    def run(*arguments: str | Path, must_work: bool = False) -> subprocess.CompletedProcess[str]:
+        done = subprocess.run(
+            [sys.executable, *map(str, arguments)],
+            cwd=ROOT,
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+            capture_output=True,
+            text=True,
+            timeout=400,
+            check=False,
+        )
+        if must_work:
+            assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
+        return done
+
+    return run

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Literal
 import tyro
 
 from rfgs_core.errors import RfgsError
+from rfgs_core.frames import chosen_frames
 
 if TYPE_CHECKING:
     import numpy as np
@@ -33,8 +34,8 @@ class RenderArgs:
     """Folder for OUT/cam00/000001.png, and 000001_beside_true.png where a true picture exists."""
     split: Literal["train", "test"] = "test"
     """Pictures the shader was fitted to, or those it never saw."""
-    frames: tuple[int, ...] = ()
-    """Frames to render; all of the run if none is given."""
+    frames: tuple[str, ...] = ()
+    """Frames to render, as numbers or A:B[:STEP] (inclusive); all of the run if none is given."""
     person_only: bool = False
     """Only what moves, on mid-grey, instead of in the room."""
 
@@ -74,13 +75,8 @@ def render_run(trained: TrainedRun, args: RenderArgs) -> None:
 def _chosen(trained: TrainedRun, args: RenderArgs) -> list[tuple[str, int]]:
     from rfgs_core.render.view import pictures_of
 
-    unknown = sorted(set(args.frames) - set(trained.frames))
-    if unknown:
-        raise RfgsError(
-            f"{args.run}: no frame {unknown[0]}; the run has {trained.frames[0]} to "
-            f"{trained.frames[-1]}"
-        )
-    wanted = set(args.frames or trained.frames)
+    texts = args.frames or (None,)
+    wanted = {frame for text in texts for frame in chosen_frames(text, trained.frames)}
     pictures = [row for row in pictures_of(trained, args.split) if row[1] in wanted]
     if not pictures:
         raise RfgsError(f"{args.run}: the {args.split} split holds no picture of these frames")

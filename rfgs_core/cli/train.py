@@ -45,37 +45,11 @@ class TrainArgs:
     """Colour the frozen Gaussians from training pictures afterwards, for display only."""
 
 
-def chosen_frames(text: str | None, available: list[int]) -> list[int]:
-    """Frames of a dataset that A:B[:STEP] asks for.
-
-    Raises:
-        RfgsError: The text is not of that form, or names no frame the dataset has.
-    """
-    from rfgs_core.errors import RfgsError
-
-    if text is None:
-        return list(available)
-    try:
-        parts = [int(part) for part in text.split(":")]
-    except ValueError as error:
-        raise RfgsError(f"--frames {text}: expected A:B, A:B:STEP or one number") from error
-    if len(parts) > 3 or (len(parts) == 3 and parts[2] < 1):
-        raise RfgsError(f"--frames {text}: expected A:B, A:B:STEP or one number")
-    first, last = parts[0], parts[min(1, len(parts) - 1)]
-    step = parts[2] if len(parts) == 3 else 1
-    wanted = range(first, last + 1, step)
-    frames = [frame for frame in available if frame in wanted]
-    if not frames:
-        raise RfgsError(
-            f"--frames {text}: none of these is in the dataset, which holds {available}"
-        )
-    return frames
-
-
 def run(args: TrainArgs) -> int:
     """Trains, then colours the result where the dataset has pictures."""
     from rfgs_core.dataset import open_dataset
     from rfgs_core.errors import RfgsError
+    from rfgs_core.frames import chosen_frames
     from rfgs_core.render.shader import ShaderConfig
     from rfgs_core.render.view import fit_run_shader
     from rfgs_core.seeds import sub_seed

@@ -78,6 +78,7 @@ def test_other_settings_in_the_same_folder_are_refused(
         generate(make_job(box_dataset, seed=5))
     with pytest.raises(RfgsError, match="frames = '1:2', this run asks for '1:3'"):
         generate(make_job(box_dataset, frames="1:3"))
+    assert make_job(box_dataset, frames="2").plan.frames == "2:2"
 
 
 def test_foreign_folders_are_left_alone(make_job: MakeJob, tmp_path: Path) -> None:

@@ -3,9 +3,8 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
-import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -19,29 +18,17 @@ pytestmark = pytest.mark.blender
 
 ROOT = Path(__file__).resolve().parents[2]
 LIVING_ROOM = ROOT / "blender_scenes" / "living_room_walk.blend"
+Run = Callable[..., subprocess.CompletedProcess[str]]
 COMMON = ("--frames", "1:9:8", "--resolution", "64", "--cameras", "2")
 
 
-def pip_bpy(*arguments: str | Path) -> None:
-    done = subprocess.run(
-        [sys.executable, *map(str, arguments)],
-        cwd=ROOT,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        timeout=280,
-        check=False,
-    )
-    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
-
-
 @pytest.fixture(scope="module")
-def blend(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def blend(python: Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The living room, or a small scene of the tests' own."""
     if LIVING_ROOM.is_file():
         return LIVING_ROOM
     folder = tmp_path_factory.mktemp("scenes")
-    pip_bpy(ROOT / "tests" / "addon_rfgs" / "build_scenes.py", folder)
+    python(ROOT / "tests" / "addon_rfgs" / "build_scenes.py", folder, must_work=True)
     return folder / "big.blend"
 
 
@@ -58,8 +45,9 @@ def test_blender_is_at_least_5(blender) -> None:
         pytest.skip(f"Blender {blender.version} ran; 5.0 or newer is what counts")
 
 
-def test_bundle_equals_pip_bpy_s(bundle: Path, blend: Path, tmp_path: Path) -> None:
-    pip_bpy("-m", "addon_rfgs", "--blend", blend, "export", "--out", tmp_path / "pip", *COMMON)
+def test_bundle_equals_pip_bpy_s(python: Run, bundle: Path, blend: Path, tmp_path: Path) -> None:
+    export = ("export", "--out", tmp_path / "pip", *COMMON)
+    python("-m", "addon_rfgs", "--blend", blend, *export, must_work=True)
     ours, theirs = read_bundle(bundle), read_bundle(tmp_path / "pip")
     for key in ("frames", "fps", "instances", "objects", "materials", "blend_sha256"):
         assert ours.info[key] == theirs.info[key], key

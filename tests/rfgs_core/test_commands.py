@@ -13,8 +13,6 @@ import pytest
 from rfgs_core.cli import COMMANDS, main
 from rfgs_core.cli.demo import Stages
 from rfgs_core.cli.info import find_blender
-from rfgs_core.cli.train import chosen_frames
-from rfgs_core.errors import RfgsError
 
 TINY = ["--gaussians", "40", "--iterations", "1", "--no-shader"]
 
@@ -77,8 +75,8 @@ def test_train_without_a_dataset(tmp_path: Path, capsys) -> None:
     ("extra", "message"),
     [
         (["--radio", "radar"], "has no radio 'radar'; it has wifi"),
-        (["--radio", "wifi", "--frames", "one"], "--frames one: expected A:B"),
-        (["--radio", "wifi", "--frames", "7:9"], "none of these is in the dataset"),
+        (["--radio", "wifi", "--frames", "one"], "--frames 'one': expected FIRST:LAST"),
+        (["--radio", "wifi", "--frames", "7:9"], "none of these is there; there are [1, 2]"),
         (["--radio", "wifi", "--sequence", "no"], "no sequence 'no'; expected one of tiny"),
         (["--radio", "wifi", "--gaussians", "0"], "--gaussians 0: expected at least 1"),
         (["--radio", "wifi", "--iterations", "-1"], "--iterations -1: expected at least 0"),
@@ -131,31 +129,6 @@ def test_train_refuses_a_run_whose_settings_are_damaged(
     (tmp_path / "config.json").write_text("[1]")
     arguments = ["train", str(tiny_dataset), "--radio", "wifi", "--out", str(tmp_path)]
     assert "config.json" in error_line(arguments, capsys)
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        (None, [10, 15, 20, 25, 30]),
-        ("15", [15]),
-        ("10:20", [10, 15, 20]),
-        ("11:26", [15, 20, 25]),
-        ("10:30:10", [10, 20, 30]),
-        ("12:30:3", [15, 30]),
-        ("30:99", [30]),
-        ("-5:10", [10]),
-    ],
-)
-def test_chosen_frames(text: str | None, expected: list[int]) -> None:
-    assert chosen_frames(text, [10, 15, 20, 25, 30]) == expected
-
-
-@pytest.mark.parametrize(
-    "text", ["", "a", "1:", "1:2:0", "1:2:-1", "1:2:3:4", "1.5", "12", "20:10"]
-)
-def test_frames_that_mean_nothing_are_refused(text: str) -> None:
-    with pytest.raises(RfgsError, match=f"--frames {text}:"):
-        chosen_frames(text, [10, 15, 20])
 
 
 def test_stages_run_once_and_again_when_their_result_is_gone(tmp_path: Path) -> None:

@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
-import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.ndimage import maximum_filter, minimum_filter
 
 from dataset_factory.bundle import Bundle, read_bundle
 from rfgs_core.dataset.pictures import read_exr
@@ -18,34 +18,22 @@ from rfgs_core.render.meshes import MeshPicture, rasterize_mesh
 
 pytest.importorskip("bpy")
 
-ROOT = Path(__file__).resolve().parents[3]
 FRAMES = (1, 2)
 
 
-def blender(*arguments: str) -> None:
-    """Runs Python in the project's root; a failure shows what it said."""
-    done = subprocess.run(
-        [sys.executable, *arguments],
-        cwd=ROOT,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-
-
 @pytest.fixture(scope="module")
-def rendered(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def rendered(
+    python: Callable[..., subprocess.CompletedProcess[str]],
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Path:
     """Folder with `bundle` and `gt`: a torus over a floor, seen by three unlike cameras."""
     folder = tmp_path_factory.mktemp("cameras")
     scene = str(folder / "cameras.blend")
-    blender(str(Path(__file__).with_name("build_camera_scene.py")), scene)
+    python(Path(__file__).with_name("build_camera_scene.py"), scene, must_work=True)
     program = ("-m", "addon_rfgs", "--blend", scene)
-    blender(*program, "export", "--out", str(folder / "bundle"))
-    truth = ("--out", str(folder / "gt"), "--frames", "1:2", "--samples", "1", "--passes")
-    blender(*program, "groundtruth", *truth)
+    python(*program, "export", "--out", folder / "bundle", must_work=True)
+    truth = ("--out", folder / "gt", "--frames", "1:2", "--samples", "1", "--passes")
+    python(*program, "groundtruth", *truth, must_work=True)
     return folder
 
 
@@ -72,14 +60,8 @@ def planes(folder: Path, camera: str, frame: int) -> tuple[np.ndarray, np.ndarra
 
 
 def border_of(mask: np.ndarray) -> np.ndarray:
-    """Pixels within one pixel of another value."""
-    padded = np.pad(mask, 1, mode="edge")
-    height, width = mask.shape
-    near = np.zeros(mask.shape, bool)
-    for down in range(3):
-        for right in range(3):
-            near |= padded[down : down + height, right : right + width] != mask
-    return near
+    """Pixels with another value among their eight neighbours."""
+    return maximum_filter(mask, 3) != minimum_filter(mask, 3)
 
 
 def test_masks_and_depths_agree_with_blender(rendered: Path) -> None:

@@ -47,7 +47,7 @@ def test_render_writes_each_picture_alone_and_beside_the_true_one(hand_made_run,
 
 
 def test_person_only_stands_on_mid_grey(hand_made_run, tmp_path, caplog) -> None:
-    args = RenderArgs(hand_made_run.path, tmp_path / "p", "train", frames=(1,), person_only=True)
+    args = RenderArgs(hand_made_run.path, tmp_path / "p", "train", frames=("1",), person_only=True)
     render_run(hand_made_run, args)
     assert "no shader has been fitted" in caplog.text
     pictures = [row for row in pictures_of(hand_made_run, "train") if row[1] == 1]
@@ -60,8 +60,8 @@ def test_person_only_stands_on_mid_grey(hand_made_run, tmp_path, caplog) -> None
 
 
 def test_frames_that_are_not_there_are_named(hand_made_run, tmp_path: Path) -> None:
-    with pytest.raises(RfgsError, match="no frame 7; the run has 1 to 2"):
-        render_run(hand_made_run, RenderArgs(hand_made_run.path, tmp_path, frames=(7,)))
+    with pytest.raises(RfgsError, match=r"'7': none of these is there; there are \[1, 2\]"):
+        render_run(hand_made_run, RenderArgs(hand_made_run.path, tmp_path, frames=("1:2", "7")))
     with pytest.raises(RfgsError, match="no frame 7; the run has 1 to 2"):
         export_run(hand_made_run, ExportArgs(hand_made_run.path, tmp_path / "a.ply", frame=7))
     with pytest.raises(RfgsError, match=r"ending in \.ply"):

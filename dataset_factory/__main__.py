@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`python -m dataset_factory`, the same as `rfgs-factory`."""
+"""`rfgs-factory`, and `python -m dataset_factory`, which is the same."""
 
 from __future__ import annotations
 
-import sys
+from rfgs_core.interrupts import run_program
 
-from dataset_factory.cli import main
 
-sys.exit(main())
+def main() -> None:
+    """Entry point; does not return."""
+    run_program("dataset_factory.cli")
+
+
+if __name__ == "__main__":
+    main()

@@ -103,6 +103,8 @@ def generate(job: Job) -> bool:
     """
     if not _open_folder(job):
         return False
+    begun = (job.out / "dataset.json").exists()
+    logger.info("%s: %s", job.out, "continuing" if begun else "a new dataset")
     with _locked(job):
         _sweep(job.out)
         info = DatasetInfo(versions(), asdict(job.plan), job.plan.seed, _contents(job), [job.name])

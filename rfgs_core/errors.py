@@ -7,6 +7,8 @@ import errno
 import sys
 from collections.abc import Callable
 
+from rfgs_core.interrupts import MESSAGE, STOPPED
+
 
 class RfgsError(Exception):
     """A mistake in the input or the machine's set-up: the message says what to do."""
@@ -35,8 +37,8 @@ def run_cli(command: Callable[[], int | None]) -> int:
         sys.stderr.write(f"error: {error}\n")
         return 2
     except KeyboardInterrupt:
-        sys.stderr.write("\nstopped; finished work is kept, run the same command to continue\n")
-        return 130
+        sys.stderr.write(MESSAGE)
+        return STOPPED
     except OSError as error:
         if error.errno != errno.ENOSPC:
             raise

@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`python -m rfgs_core.cli`: the same as the `rfgs` command."""
+"""`rfgs`, and `python -m rfgs_core.cli`, which is the same."""
 
 from __future__ import annotations
 
-import sys
+from rfgs_core.interrupts import run_program
 
-from rfgs_core.cli import main
 
-sys.exit(main())
+def main() -> None:
+    """Entry point; does not return."""
+    run_program("rfgs_core.cli")
+
+
+if __name__ == "__main__":
+    main()

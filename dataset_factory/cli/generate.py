@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`rfgs-factory generate`."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import tyro
+
+from rfgs_core.errors import RfgsError
+
+
+@dataclass(frozen=True)
+class GenerateArgs:
+    """Makes a dataset; run it again to continue where it stopped.
+
+    Takes any Blender file with something that moves; the file is never changed and none of its
+    scripts runs. Stop at any moment: the same command continues and ends in the same bytes.
+    """
+
+    scene: tyro.conf.Positional[str]
+    """Name from `rfgs-factory scenes`, or path of a .blend file."""
+    radio: tyro.conf.UseAppendAction[tuple[str, ...]]
+    """Radio to trace: wifi or mmwave; repeat the option for several."""
+    out: Path
+    """Folder of the dataset."""
+    frames: str = ""
+    """Blender frames A:B[:STEP] (inclusive), or one number; default: all."""
+    cameras: int = 0
+    """How many of the scene's cameras, in order of their names; 0 takes all."""
+    resolution: int = 256
+    """Longer side of the pictures [px]."""
+    samples: int = 16
+    """Light samples per pixel; more is less noisy and slower."""
+    depth: int = 2
+    """Interactions of a path that meets a person: 1 the person alone (fast), 2 also one wall."""
+    seed: int = 0
+    """Root seed; the same seed gives the same bytes."""
+    workers: int = 2
+    """Tracing processes; each keeps one core busy."""
+    shadow: Literal["kirchhoff", "hard"] = "kirchhoff"
+    """How bodies shadow paths: diffracted at the silhouette, or cut off sharply."""
+    images: bool = True
+    """Render pictures with Blender."""
+    blender: Path | None = None
+    """A real Blender with the add-on enabled; default: $BLENDER, else pip's bpy."""
+
+
+def run(args: GenerateArgs) -> int:
+    """Makes the dataset, or what is missing of it."""
+    from dataset_factory.blender import Blender
+    from dataset_factory.generate import Job, generate
+    from dataset_factory.plan import make_plan
+    from dataset_factory.scenes import find_scene
+    from rfgs_core.llvm import use_llvm
+
+    if not 1 <= args.workers <= 256:
+        raise RfgsError(f"--workers {args.workers}: expected 1 to 256")
+    scene = find_scene(args.scene)
+    plan = make_plan(
+        scene,
+        args.radio,
+        args.frames,
+        cameras=args.cameras,
+        resolution=args.resolution,
+        samples=args.samples,
+        depth=args.depth,
+        seed=args.seed,
+        shadow=args.shadow,
+        images=args.images,
+    )
+    use_llvm()
+    made = generate(Job(args.out, plan, Blender(scene.blend, args.blender), args.workers))
+    what = "finished" if made else "already complete"
+    sys.stdout.write(f"{args.out}: {what}; look at it with: rfgs-factory preview {args.out}\n")
+    return 0

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A command-line program made of commands, each a module of one package."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from rfgs_core.errors import run_cli
+
+
+@dataclass(frozen=True)
+class Program:
+    """A program and its commands.
+
+    A command's module holds its arguments, a frozen dataclass that says in its docstring what
+    the command does, and `run`, which takes them and returns the exit code.
+    """
+
+    name: str
+    """What the user types."""
+    package: str
+    """Where the modules of the commands are."""
+    commands: dict[str, tuple[str, str]]
+    """Command → module below `package` and name of its arguments."""
+    introduction: str
+    """Shown above the list of commands."""
+    closing: str
+    """Shown below it: how to begin."""
+
+    def main(self, arguments: Sequence[str] | None = None) -> int:
+        """Runs one command; returns the exit code.
+
+        Args:
+            arguments: Without the program's name; None takes those of the process.
+        """
+        given = list(sys.argv[1:] if arguments is None else arguments)
+        if not given or given[0] in ("-h", "--help"):
+            sys.stdout.write(self.overview())
+            return 0 if given else 2
+        if given[0] not in self.commands:
+            known = ", ".join(self.commands)
+            sys.stderr.write(f"error: unknown command {given[0]!r}; expected one of {known}\n")
+            return 2
+        return run_cli(lambda: self._run(given[0], given[1:]))
+
+    def overview(self) -> str:
+        """Help on the program, one line per command."""
+        lines = "\n".join(self._summary(name) for name in self.commands)
+        return (
+            f"usage: {self.name} COMMAND ...\n\n{self.introduction}\n\ncommands:\n{lines}\n\n"
+            f"{self.closing}\n`{self.name} COMMAND --help` explains a command.\n"
+        )
+
+    def _summary(self, name: str) -> str:
+        _, kind = self._command(name)
+        return f"  {name:<10}{(kind.__doc__ or '').strip().splitlines()[0]}"
+
+    def _run(self, name: str, arguments: Sequence[str]) -> int | None:
+        import tyro
+
+        module, kind = self._command(name)
+        run: Callable[[Any], int | None] = module.run
+        return run(tyro.cli(kind, args=list(arguments), prog=f"{self.name} {name}"))
+
+    def _command(self, name: str) -> tuple[Any, type]:
+        file, kind = self.commands[name]
+        module: Any = importlib.import_module(f"{self.package}.{file}")
+        return module, getattr(module, kind)

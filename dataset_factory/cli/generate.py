@@ -52,7 +52,8 @@ class GenerateArgs:
 def run(args: GenerateArgs) -> int:
     """Makes the dataset, or what is missing of it."""
     from dataset_factory.blender import Blender
-    from dataset_factory.generate import Job, generate
+    from dataset_factory.generate import generate
+    from dataset_factory.job import Job
     from dataset_factory.plan import make_plan
     from dataset_factory.scenes import find_scene
     from rfgs_core.llvm import use_llvm

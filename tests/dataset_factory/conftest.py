@@ -14,7 +14,8 @@ from pathlib import Path
 import pytest
 
 from dataset_factory.blender import Blender
-from dataset_factory.generate import Job, generate
+from dataset_factory.generate import generate
+from dataset_factory.job import Job
 from dataset_factory.plan import make_plan
 from dataset_factory.scenes import find_scene
 

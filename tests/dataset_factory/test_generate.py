@@ -16,7 +16,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from dataset_factory.generate import Job, generate
+from dataset_factory.generate import generate
+from dataset_factory.job import Job
 from dataset_factory.validate import validate
 from rfgs_core.dataset import open_dataset
 from rfgs_core.errors import RfgsError

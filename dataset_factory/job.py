@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One run of the factory: what to make, where, and how long each stage took."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from dataset_factory.blender import Blender
+from dataset_factory.bundle import sanitised
+from dataset_factory.plan import Plan
+from rfgs_core.dataset.names import SequenceFiles
+from rfgs_core.files import write_json
+
+
+@dataclass
+class Job:
+    """One run of the factory on one folder."""
+
+    out: Path
+    """Folder of the dataset."""
+    plan: Plan
+    """What it shall hold."""
+    blender: Blender
+    """Opens the scene."""
+    workers: int
+    """Tracing processes."""
+    seconds: dict[str, float] = field(default_factory=dict)
+    """Wall time per stage of this run [s]."""
+
+    @property
+    def work(self) -> Path:
+        """Half-made work, removed at the end."""
+        return self.out / ".work"
+
+    @property
+    def name(self) -> str:
+        """Name of the sequence."""
+        return sanitised(self.plan.scene)
+
+    @property
+    def files(self) -> SequenceFiles:
+        """Where the sequence's files lie."""
+        return SequenceFiles(self.out / self.name)
+
+    @property
+    def picture_size(self) -> list[str]:
+        """Arguments of the add-on that choose cameras and resolution."""
+        cameras = ["--cameras", str(self.plan.cameras)] if self.plan.cameras else []
+        return [*cameras, "--resolution", str(self.plan.resolution)]
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Measures a stage; times go to the log, never into the data."""
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[name] = round(time.perf_counter() - start, 3)
+            write_json(self.out / "log" / "generate.json", {"seconds": self.seconds})

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from rfgs_core.dataset import Sequence
-from rfgs_core.radio import Layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
 #: Median amplitude of clear direct paths relative to free space; one path alone may add to a
@@ -37,7 +36,7 @@ def channel_faults(sequence: Sequence, radio: str, static: np.ndarray, file: Pat
     vertices, faces = sequence.static_mesh()
     triangles = vertices[faces].astype(np.float64)
     clear = []
-    for a, b in device_pairs(layout):
+    for a, b in layout.device_pairs:
         tx, rx = layout.tx_device == a, layout.rx_device == b
         links = static[np.ix_(tx, rx)]
         distance_m = np.linalg.norm(layout.tx_xyz[tx][:, None] - layout.rx_xyz[rx][None], axis=-1)
@@ -64,13 +63,6 @@ def _direct_faults(sequence: Sequence, radio: str, file: Path, clear: np.ndarray
             f"{file}: clear direct paths are {late_m:.2f} m from where the geometry puts them, "
             f"more than half a delay cell ({cell_m:.2f} m)"
         )
-
-
-def device_pairs(layout: Layout) -> list[tuple[int, int]]:
-    """Measured (transmitting, receiving) pairs of devices, ascending."""
-    tx, rx = np.nonzero(layout.measured)
-    pairs = np.unique(np.stack([layout.tx_device[tx], layout.rx_device[rx]], axis=1), axis=0)
-    return [(int(a), int(b)) for a, b in pairs]
 
 
 def blocked(start: np.ndarray, end: np.ndarray, triangles: np.ndarray) -> bool:

@@ -6,7 +6,6 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from dataset_factory.physics import device_pairs
 from rfgs_core.dataset import Sequence
 from rfgs_core.radio import Layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
@@ -27,7 +26,7 @@ def profile_figure(sequence: Sequence, radio: str, frame: int) -> Figure:
     """Amplitude image above delay profiles of up to eight device pairs."""
     csi, static = sequence.csi(radio, frame), sequence.csi_static(radio)
     layout, spec = sequence.layout(radio), sequence.radio_spec(radio)
-    pairs = device_pairs(layout)[:8]
+    pairs = layout.device_pairs[:8]
     rows = -(-len(pairs) // 4)
     figure = Figure(figsize=(12, 3.0 + 2.2 * rows), layout="constrained")
     grid = figure.add_gridspec(rows + 1, 4, height_ratios=[1.2, *([1] * rows)])
@@ -166,7 +165,7 @@ def _listening_pairs(layout: Layout) -> list[tuple[int, int]]:
     """For each receiving device one transmitting device, another one where that is measured."""
     chosen: dict[int, tuple[int, int]] = {}
     count = int(layout.rx_device.max()) + 1
-    for a, b in sorted(device_pairs(layout), key=lambda pair: (pair[0] - pair[1] - 1) % count):
+    for a, b in sorted(layout.device_pairs, key=lambda pair: (pair[0] - pair[1] - 1) % count):
         chosen.setdefault(b, (a, b))
     return [chosen[b] for b in sorted(chosen)]
 

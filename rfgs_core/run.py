@@ -99,7 +99,7 @@ class Run:
         """Predicted csi − csi_static on every measured link, held-out ones included."""
         observations = observe(self.sequence, self.config["radio"], frame)
         everything = np.ones(len(observations.freq_hz), dtype=bool)
-        channel = Channel.of(observations, observations.measured, everything)
+        channel = Channel.of(observations, observations.layout.measured, everything)
         with torch.no_grad():
             change = channel.change(self.head, self.moving(frame)).numpy()
         csi = np.zeros_like(observations.delta)

@@ -63,7 +63,7 @@ def direct_channel(
     sees_tx = [visible(mi_scene, lifted, centre) for centre in tx_centres]
     sees_rx = [visible(mi_scene, lifted, centre) for centre in rx_centres]
     out = np.zeros((len(layout.tx_xyz), len(layout.rx_xyz), len(freq_hz)), dtype=np.complex128)
-    for a, b in device_pairs(layout):
+    for a, b in layout.device_pairs:
         both = sees_tx[a] & sees_rx[b]
         factor = copolar(
             lifted - tx_centres[a],
@@ -85,13 +85,6 @@ def direct_channel(
             )
             out[np.ix_(tx, rx)] += part * coefficient
     return out
-
-
-def device_pairs(layout: Layout) -> list[tuple[int, int]]:
-    """Pairs of a transmitting and a receiving device that have a measured link."""
-    links = np.argwhere(layout.measured)
-    pairs = np.stack([layout.tx_device[links[:, 0]], layout.rx_device[links[:, 1]]], axis=1)
-    return [(int(a), int(b)) for a, b in np.unique(pairs, axis=0)]
 
 
 def copolar(

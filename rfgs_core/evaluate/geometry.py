@@ -56,6 +56,32 @@ def voxel_budget(instances: Sequence[dict[str, Any]], voxel_m: float = VOXEL_M) 
     return round(VOXELS_PER_FACE * surface / voxel_m**2)
 
 
+def surface_samples(
+    vertices: Float[np.ndarray, "V 3"],
+    faces: Int[np.ndarray, "T 3"],
+    count: int,
+    rng: np.random.Generator,
+) -> tuple[Float64[np.ndarray, "count 3"], Float64[np.ndarray, "count 3"]]:
+    """Points [m] on a mesh, spread evenly over its area, and the normals of their faces.
+
+    Raises:
+        RfgsError: The mesh has no area.
+    """
+    corners = np.asarray(vertices, dtype=np.float64)[np.asarray(faces)]
+    edge_a, edge_b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    cross = np.cross(edge_a, edge_b)
+    area = np.linalg.norm(cross, axis=1)
+    if not area.sum() > 0.0:
+        raise RfgsError(f"expected a moving mesh with area, got {len(faces)} faces of zero area")
+    face = rng.choice(len(area), size=count, p=area / area.sum())
+    # Uniform over a triangle: fold the unit square along its diagonal.
+    u, v = rng.random((2, count))
+    fold = u + v > 1.0
+    u[fold], v[fold] = 1.0 - u[fold], 1.0 - v[fold]
+    points = corners[face, 0] + u[:, None] * edge_a[face] + v[:, None] * edge_b[face]
+    return points, cross[face] / np.maximum(area[face], 1e-30)[:, None]
+
+
 def reference_points(
     vertices: Float[np.ndarray, "V 3"],
     faces: Int[np.ndarray, "T 3"],
@@ -76,18 +102,7 @@ def reference_points(
     Raises:
         RfgsError: The mesh has no area.
     """
-    corners = np.asarray(vertices, dtype=np.float64)[np.asarray(faces)]
-    edge_a, edge_b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    area = 0.5 * np.linalg.norm(np.cross(edge_a, edge_b), axis=1)
-    if not area.sum() > 0.0:
-        raise RfgsError(f"expected a moving mesh with area, got {len(faces)} faces of zero area")
-    generator = np.random.default_rng(seed)
-    face = generator.choice(len(area), size=n, p=area / area.sum())
-    # Uniform over a triangle: fold the unit square along its diagonal.
-    u, v = generator.random((2, n))
-    fold = u + v > 1.0
-    u[fold], v[fold] = 1.0 - u[fold], 1.0 - v[fold]
-    return corners[face, 0] + u[:, None] * edge_a[face] + v[:, None] * edge_b[face]
+    return surface_samples(vertices, faces, n, np.random.default_rng(seed))[0]
 
 
 def best_voxels(score: Float[np.ndarray, "x y z"], count: int) -> Int64[np.ndarray, "k"]:

@@ -7,9 +7,10 @@ from dataclasses import fields, replace
 
 import numpy as np
 import torch
-from jaxtyping import Float32, Float64
+from jaxtyping import Float32
 from tqdm import tqdm
 
+from rfgs_core.evaluate.geometry import surface_samples
 from rfgs_core.evaluate.grid import splat_gaussians
 from rfgs_core.evaluate.scene import EvaluatedRun, Scene
 from rfgs_core.seeds import sub_seed
@@ -20,25 +21,6 @@ from rfgs_core.train.observations import Observations, observe
 from rfgs_core.train.refine import refine
 from rfgs_core.train.sampling import encode
 from rfgs_core.train.start import gaussians_at
-
-
-def surface_samples(
-    vertices: Float32[np.ndarray, "V 3"],
-    faces: np.ndarray,
-    count: int,
-    rng: np.random.Generator,
-) -> tuple[Float64[np.ndarray, "count 3"], Float64[np.ndarray, "count 3"]]:
-    """Area-weighted points on a mesh and the normals of their faces."""
-    corners = vertices[faces].astype(np.float64)
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = np.linalg.norm(cross, axis=1)
-    chosen = rng.choice(len(faces), size=count, p=area / area.sum())
-    a, b = rng.random((2, count))
-    outside = a + b > 1
-    a[outside], b[outside] = 1 - a[outside], 1 - b[outside]
-    first, second, third = corners[chosen].transpose(1, 0, 2)
-    points = first + a[:, None] * (second - first) + b[:, None] * (third - first)
-    return points, cross[chosen] / np.maximum(area[chosen], 1e-30)[:, None]
 
 
 def start_on_surface(

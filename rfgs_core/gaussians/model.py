@@ -10,6 +10,8 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
+from rfgs_core.rotations import rotation_rows
+
 #: Length of the radio feature each Gaussian carries (paper section 3.2).
 FEATURE_DIM = 32
 
@@ -90,10 +92,5 @@ class Gaussians:
 
 def rotation_matrices(quats: Float[Tensor, "M 4"]) -> Float[Tensor, "M 3 3"]:
     """Rotation matrices of quaternions, w first, normalised here."""
-    w, x, y, z = torch.nn.functional.normalize(quats, dim=-1).unbind(-1)
-    rows = [
-        torch.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], -1),
-        torch.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], -1),
-        torch.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], -1),
-    ]
-    return torch.stack(rows, dim=-2)
+    rows = rotation_rows(*torch.nn.functional.normalize(quats, dim=-1).unbind(-1))
+    return torch.stack([torch.stack(row, dim=-1) for row in rows], dim=-2)

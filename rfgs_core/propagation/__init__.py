@@ -8,17 +8,19 @@
 k = 2 pi f / c, u the unit vectors from a Gaussian to the two antennas. The Gaussian factor is
 the Fourier transform of a Gaussian cloud of scatterers, so a flat one reflects like a mirror.
 
-Every function exists twice: compiled for the CPU (`backend="numba"`, the default) and in plain
-torch (`backend="torch"`), which is the definition that tests compare the former with.
+`scatter` and `shadow` exist twice: compiled for the CPU (`backend="numba"`, the default) and in
+plain torch (`backend="torch"`), which is the definition that tests compare the former with.
 """
 
 from __future__ import annotations
 
 import importlib
+import math
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Literal, get_args
 
+import torch
 from jaxtyping import Complex, Float
 from torch import Tensor
 
@@ -133,9 +135,12 @@ def environment(
         tones: Subcarriers.
         num_links: Rows of the result.
     """
-    from rfgs_core.propagation import reference
-
-    return reference.environment(transmission, paths, tones, num_links)
+    turns = paths.delay_s.to(torch.float64)[:, None] * tones.freq_hz
+    phase = (-2 * math.pi) * (turns - turns.detach().round())
+    phasors = torch.polar(torch.ones_like(phase), phase).to(transmission.dtype)
+    terms = (transmission * paths.amplitude.to(transmission.dtype))[:, None] * phasors
+    total = torch.zeros(num_links, tones.num_selected, dtype=terms.dtype)
+    return total.index_add(0, paths.link, terms)
 
 
 @dataclass(frozen=True)

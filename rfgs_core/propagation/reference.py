@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The propagation model in plain torch: readable, differentiable in any precision, slow.
 
-Every function has the same arguments and result as its fast twin in `fast`.
+`scatter` and `shadow` have the same arguments and results as their fast twins in `fast`.
 """
 
 from __future__ import annotations
@@ -170,18 +170,3 @@ def shadow(
     edge = _smooth_step(along / EDGE_M) * _smooth_step((length - along) / EDGE_M)
     blocked = (alpha * edge.to(real)) * blob_shadow(offset, spread, kappa)
     return torch.prod(1 - blocked, dim=1)
-
-
-def environment(
-    transmission: Complex[Tensor, "path"],
-    paths: EnvironmentPaths,
-    tones: Tones,
-    num_links: int,
-) -> Complex[Tensor, "link subcarrier"]:
-    """Twin of `rfgs_core.propagation.environment`."""
-    turns = paths.delay_s.to(torch.float64)[:, None] * tones.freq_hz
-    phase = (-2 * math.pi) * (turns - turns.detach().round())
-    phasors = torch.polar(torch.ones_like(phase), phase).to(transmission.dtype)
-    terms = (transmission * paths.amplitude.to(transmission.dtype))[:, None] * phasors
-    total = torch.zeros(num_links, tones.num_selected, dtype=terms.dtype)
-    return total.index_add(0, paths.link, terms)

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
 from rfgs_core.radio.presets import Radio
+from rfgs_core.rotations import rotation_rows
 
 
 @dataclass(frozen=True)
@@ -40,17 +41,17 @@ class Layout:
     measured: Bool[np.ndarray, "tx rx"]
     """Links that the radio measures."""
 
+    @property
+    def device_pairs(self) -> list[tuple[int, int]]:
+        """Measured (transmitting, receiving) pairs of devices, ascending."""
+        tx, rx = np.nonzero(self.measured)
+        pairs = np.unique(np.stack([self.tx_device[tx], self.rx_device[rx]], axis=1), axis=0)
+        return [(int(a), int(b)) for a, b in pairs]
+
 
 def rotation(quat_wxyz: tuple[float, float, float, float]) -> Float64[np.ndarray, "3 3"]:
     """Rotation matrix of a quaternion, w first; the quaternion is normalised first."""
-    w, x, y, z = np.asarray(quat_wxyz, dtype=np.float64) / np.linalg.norm(quat_wxyz)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    return np.array(rotation_rows(*np.asarray(quat_wxyz) / np.linalg.norm(quat_wxyz)))
 
 
 def element_offsets(

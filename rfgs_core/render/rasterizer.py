@@ -152,6 +152,19 @@ def _alpha(splat: np.ndarray, row: int, column: int) -> float:
 
 
 @numba.njit(inline="always")
+def _take_light(
+    light: np.ndarray, splat: np.ndarray, row: int, column: int, top: int, left: int
+) -> float:
+    """Share of a pixel that one splat gives, taken from the light that still passes there."""
+    passing = light[row - top, column - left]
+    if passing < LIGHT_MIN:
+        return 0.0
+    alpha = _alpha(splat, row, column)
+    light[row - top, column - left] = passing * (1.0 - alpha)
+    return passing * alpha
+
+
+@numba.njit(inline="always")
 def _tile_corner(tile: int, width: int, height: int) -> tuple[int, int, int, int]:
     """First and one-past-last column and row of a tile."""
     columns = (width + TILE_PX - 1) // TILE_PX
@@ -180,17 +193,12 @@ def _blend_tiles(
             for row in range(top, bottom):
                 first, last = _span(splat, row, left, right)
                 for column in range(first, last):
-                    passing = light[row - top, column - left]
-                    if passing < LIGHT_MIN:
-                        continue
-                    alpha = _alpha(splat, row, column)
-                    if alpha == 0.0:
+                    share = _take_light(light, splat, row, column, top, left)
+                    if share == 0.0:
                         continue
                     for channel in range(channels):
-                        picture[row, column, channel] += passing * alpha * value[channel]
-                    passing *= 1.0 - alpha
-                    light[row - top, column - left] = passing
-                    open_pixels -= passing < LIGHT_MIN
+                        picture[row, column, channel] += share * value[channel]
+                    open_pixels -= light[row - top, column - left] < LIGHT_MIN
 
 
 @numba.njit(parallel=True, cache=True)
@@ -213,17 +221,12 @@ def _blend_backward_tiles(
             for row in range(top, bottom):
                 first, last = _span(splat, row, left, right)
                 for column in range(first, last):
-                    passing = light[row - top, column - left]
-                    if passing < LIGHT_MIN:
-                        continue
-                    alpha = _alpha(splat, row, column)
-                    if alpha == 0.0:
+                    share = _take_light(light, splat, row, column, top, left)
+                    if share == 0.0:
                         continue
                     for channel in range(channels):
-                        shares[entry, channel] += passing * alpha * towards[row, column, channel]
-                    passing *= 1.0 - alpha
-                    light[row - top, column - left] = passing
-                    open_pixels -= passing < LIGHT_MIN
+                        shares[entry, channel] += share * towards[row, column, channel]
+                    open_pixels -= light[row - top, column - left] < LIGHT_MIN
 
 
 @numba.njit(cache=True)

@@ -30,6 +30,13 @@ class Column:
     """One sentence for readers who do not know it."""
 
 
+_CHANNEL_COLUMNS = (
+    Column("element_snr_db", "elements", "dB", True, 1, "SNR on unseen array columns"),
+    Column("subcarrier_snr_db", "subcarriers", "dB", True, 1, "SNR on unseen tones"),
+    Column("device_gain_mae_db", "pair gain", "dB", False, 1, "error on unseen pairs"),
+    Column("delay_profile_corr", "delay profile", "", True, 2, "correlation, unseen links"),
+)
+
 #: Group of `metrics.json` → title and columns.
 GROUPS: dict[str, tuple[str, tuple[Column, ...]]] = {
     "geometry": (
@@ -47,21 +54,11 @@ GROUPS: dict[str, tuple[str, tuple[Column, ...]]] = {
     ),
     "rf": (
         "Held-out channel, csi − csi_static",
-        (
-            Column("element_snr_db", "elements", "dB", True, 1, "SNR on unseen array columns"),
-            Column("subcarrier_snr_db", "subcarriers", "dB", True, 1, "SNR on unseen tones"),
-            Column("device_gain_mae_db", "pair gain", "dB", False, 1, "error on unseen pairs"),
-            Column("delay_profile_corr", "delay profile", "", True, 2, "correlation, unseen links"),
-        ),
+        _CHANNEL_COLUMNS,
     ),
     "rf_csi": (
         "Held-out channel, whole csi (secondary; who brings no empty room gets the kriged one)",
-        (
-            Column("element_snr_db", "elements", "dB", True, 1, "SNR on unseen array columns"),
-            Column("subcarrier_snr_db", "subcarriers", "dB", True, 1, "SNR on unseen tones"),
-            Column("device_gain_mae_db", "pair gain", "dB", False, 1, "error on unseen pairs"),
-            Column("delay_profile_corr", "delay profile", "", True, 2, "correlation, unseen links"),
-        ),
+        _CHANNEL_COLUMNS,
     ),
     "image": (
         "Pictures the shader never saw (display)",

@@ -21,7 +21,7 @@ def direct_gain(
 ) -> Complex128[np.ndarray, "pair"]:
     """Complex factor on Friis' direct path per device pair, by least squares."""
     tx, rx = np.nonzero(pair >= 0)
-    length = np.linalg.norm(observations.tx_xyz[tx] - observations.rx_xyz[rx], axis=1)
+    length = np.linalg.norm(observations.layout.tx_xyz[tx] - observations.layout.rx_xyz[rx], axis=1)
     freq_hz = observations.freq_hz[observations.tones]
     wave = np.exp(-2j * np.pi * freq_hz * length[:, None] / SPEED_OF_LIGHT)
     wave *= SPEED_OF_LIGHT / (4 * np.pi * freq_hz * length[:, None])
@@ -49,7 +49,7 @@ def direct_paths(observations: Observations, links: Bool[np.ndarray, "tx rx"]) -
     gains = dict(zip(names, direct_gain(observations, pair, len(names)), strict=True))
     cross = [gain for (a, b), gain in gains.items() if a != b]
     tx, rx = np.nonzero(links)
-    device_t, device_r = observations.tx_device[tx], observations.rx_device[rx]
+    device_t, device_r = observations.layout.tx_device[tx], observations.layout.rx_device[rx]
     between = device_t != device_r if cross else np.zeros(len(tx), dtype=bool)
     tx, rx, link = tx[between], rx[between], np.nonzero(between)[0]
     gain = np.array(
@@ -59,7 +59,7 @@ def direct_paths(observations: Observations, links: Bool[np.ndarray, "tx rx"]) -
         ],
         dtype=np.complex128,
     )
-    a_xyz, b_xyz = observations.tx_xyz[tx], observations.rx_xyz[rx]
+    a_xyz, b_xyz = observations.layout.tx_xyz[tx], observations.layout.rx_xyz[rx]
     length = np.linalg.norm(a_xyz - b_xyz, axis=1)
     wavelength_m = SPEED_OF_LIGHT / observations.centre_hz
     nothing = torch.zeros(len(link), dtype=torch.float64)

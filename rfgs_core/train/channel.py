@@ -45,7 +45,8 @@ class Channel:
         blocks = tuple((int(a), int(b - a)) for a, b in zip(edges[::2], edges[1::2], strict=True))
         return Channel(
             links=Links(
-                torch.from_numpy(observations.tx_xyz[tx]), torch.from_numpy(observations.rx_xyz[rx])
+                torch.from_numpy(observations.layout.tx_xyz[tx]),
+                torch.from_numpy(observations.layout.rx_xyz[rx]),
             ),
             tones=Tones(float(freq_hz[0]), float(freq_hz[1] - freq_hz[0]), len(freq_hz), blocks),
             paths=direct_paths(observations, links),

@@ -81,7 +81,7 @@ def power_maps(observations: Observations) -> list[PowerMap]:
         tx, rx = np.nonzero(pair == index)
         for group in [tx >= 0] if a == b else [tx == t for t in np.unique(tx)]:
             t, r = tx[group], rx[group]
-            tx_xyz, rx_xyz = observations.tx_xyz[t], observations.rx_xyz[r]
+            tx_xyz, rx_xyz = observations.layout.tx_xyz[t], observations.layout.rx_xyz[r]
             virtual = (rx_xyz - rx_xyz.mean(axis=0)) + (tx_xyz - tx_xyz.mean(axis=0))
             beams = _beams(virtual, wavelength_m)
             size = OVERSAMPLING * len(window)

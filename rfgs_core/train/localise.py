@@ -66,8 +66,8 @@ def pair_maps(observations: Observations) -> PairMaps:
     pair, names = observations.pairs
     power = matched_filter_map(
         observations.delta,
-        observations.tx_xyz,
-        observations.rx_xyz,
+        observations.layout.tx_xyz,
+        observations.layout.rx_xyz,
         pair,
         freq_hz,
         points.reshape(-1, 3),
@@ -75,8 +75,8 @@ def pair_maps(observations: Observations) -> PairMaps:
     power /= np.maximum(power.mean(axis=(1, 2, 3), keepdims=True), 1e-30)
     centres = [
         [
-            observations.tx_xyz[np.unique(np.nonzero(pair == k)[0])].mean(axis=0),
-            observations.rx_xyz[np.unique(np.nonzero(pair == k)[1])].mean(axis=0),
+            observations.layout.tx_xyz[np.unique(np.nonzero(pair == k)[0])].mean(axis=0),
+            observations.layout.rx_xyz[np.unique(np.nonzero(pair == k)[1])].mean(axis=0),
         ]
         for k in range(len(names))
     ]

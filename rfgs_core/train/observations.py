@@ -4,13 +4,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Bool, Complex64, Float64, Int64
 
 from rfgs_core.encode.matched_filter import device_pairs
 from rfgs_core.errors import RfgsError
+from rfgs_core.radio import Layout
+
+if TYPE_CHECKING:
+    import xarray
+
+    from rfgs_core.dataset import Sequence
 
 
 @dataclass(frozen=True)
@@ -25,16 +31,8 @@ class Observations:
     """Links that training may use."""
     tones: Bool[np.ndarray, "subcarrier"]
     """Tones that training may use."""
-    measured: Bool[np.ndarray, "tx rx"]
-    """Links that the radio has at all, held out or not."""
-    tx_xyz: Float64[np.ndarray, "tx 3"]
-    """Transmitting elements [m]."""
-    rx_xyz: Float64[np.ndarray, "rx 3"]
-    """Receiving elements [m]."""
-    tx_device: Int64[np.ndarray, "tx"]
-    """Device of each transmitting element."""
-    rx_device: Int64[np.ndarray, "rx"]
-    """Device of each receiving element."""
+    layout: Layout
+    """Antenna elements, and the links that the radio has at all, held out or not."""
     freq_hz: Float64[np.ndarray, "subcarrier"]
     """Tone frequencies [Hz], equally spaced."""
     bounds_m: Float64[np.ndarray, "2 3"]
@@ -49,43 +47,45 @@ class Observations:
     def monostatic(self) -> bool:
         """Whether every visible link stays within one device (a radar)."""
         tx, rx = np.nonzero(self.links)
-        return bool((self.tx_device[tx] == self.rx_device[rx]).all())
+        return bool((self.layout.tx_device[tx] == self.layout.rx_device[rx]).all())
 
     @property
     def pairs(self) -> tuple[Int64[np.ndarray, "tx rx"], list[tuple[int, int]]]:
         """Device pair of each visible link (−1 elsewhere) and the list of pairs."""
-        return device_pairs(self.tx_device, self.rx_device, self.links)
+        return device_pairs(self.layout.tx_device, self.layout.rx_device, self.links)
 
     def with_delta(self, delta: Complex64[np.ndarray, "tx rx subcarrier"]) -> Observations:
         """The same observations with another channel change, for example a residual."""
         return replace(self, delta=delta.astype(np.complex64))
 
 
-def visible_links(sequence: Any, radio: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Masks of what training may see.
+def _stored_layout(data: xarray.Dataset) -> Layout:
+    """Antenna elements as the channel itself names them."""
+    return Layout(
+        tx_xyz=np.asarray(data["tx_xyz"].values, dtype=np.float64),
+        rx_xyz=np.asarray(data["rx_xyz"].values, dtype=np.float64),
+        tx_device=np.asarray(data["tx_device"].values, dtype=np.int64),
+        rx_device=np.asarray(data["rx_device"].values, dtype=np.int64),
+        rx_column=np.asarray(data["rx_column"].values, dtype=np.int64),
+        measured=np.asarray(data["measured"].values, dtype=bool),
+    )
 
-    Args:
-        sequence: A `rfgs_core.dataset.Sequence`.
-        radio: Name of the radio.
 
-    Returns:
-        Visible links (tx, rx), visible tones (subcarrier), measured links (tx, rx).
-    """
-    data = sequence.radio(radio)
-    split = sequence.splits["rf"][radio]
-    measured = np.asarray(data["measured"].values, dtype=bool)
-    links = measured.copy()
+def _visible(
+    split: dict[str, Any], elements: Layout, num_subcarriers: int
+) -> tuple[Bool[np.ndarray, "tx rx"], Bool[np.ndarray, "subcarrier"]]:
+    """Links and tones that training may see."""
+    links = elements.measured.copy()
     links[:, split["rx_elements"]] = False
-    tx_device, rx_device = data["tx_device"].values, data["rx_device"].values
     for a, b in split["device_pairs"]:
         for first, second in ((a, b), (b, a)):
-            links[(tx_device[:, None] == first) & (rx_device[None, :] == second)] = False
-    tones = np.ones(data.sizes["subcarrier"], dtype=bool)
+            links[(elements.tx_device[:, None] == first) & (elements.rx_device == second)] = False
+    tones = np.ones(num_subcarriers, dtype=bool)
     tones[split["subcarriers"]] = False
-    return links, tones, measured
+    return links, tones
 
 
-def observe(sequence: Any, radio: str, frame: int) -> Observations:
+def observe(sequence: Sequence, radio: str, frame: int) -> Observations:
     """Reads one frame at its own time and hides what is held out.
 
     Raises:
@@ -98,7 +98,8 @@ def observe(sequence: Any, radio: str, frame: int) -> Observations:
             f"{sequence.name}, {radio}: the antennas move within a frame, and training takes one "
             "sample per frame; choose a radio whose antennas stand still"
         )
-    links, tones, measured = visible_links(sequence, radio)
+    elements = _stored_layout(data)
+    links, tones = _visible(sequence.splits["rf"][radio], elements, data.sizes["subcarrier"])
     csi, static = sequence.csi(radio, frame), sequence.csi_static(radio)
     seen = links[:, :, None] & tones
     for name, values in (("csi", csi), ("csi_static", static)):
@@ -112,11 +113,7 @@ def observe(sequence: Any, radio: str, frame: int) -> Observations:
         static=np.where(seen, static, 0).astype(np.complex64),
         links=links,
         tones=tones,
-        measured=measured,
-        tx_xyz=np.asarray(data["tx_xyz"].values, dtype=np.float64),
-        rx_xyz=np.asarray(data["rx_xyz"].values, dtype=np.float64),
-        tx_device=np.asarray(data["tx_device"].values, dtype=np.int64),
-        rx_device=np.asarray(data["rx_device"].values, dtype=np.int64),
+        layout=elements,
         freq_hz=np.asarray(data["freq_hz"].values, dtype=np.float64),
         bounds_m=np.asarray(sequence.bounds_m, dtype=np.float64),
     )

@@ -32,8 +32,8 @@ def line_points(observations: Observations, rng: np.random.Generator) -> Float64
     for a, b in names:
         if a == b:
             continue
-        start = observations.tx_xyz[observations.tx_device == a].mean(axis=0)
-        end = observations.rx_xyz[observations.rx_device == b].mean(axis=0)
+        start = observations.layout.tx_xyz[observations.layout.tx_device == a].mean(axis=0)
+        end = observations.layout.rx_xyz[observations.layout.rx_device == b].mean(axis=0)
         share = (np.arange(POINTS_PER_LINE) + rng.random(POINTS_PER_LINE)) / POINTS_PER_LINE
         lines.append(start + share[:, None] * (end - start))
     return np.concatenate(lines) if lines else np.zeros((0, 3))
@@ -44,8 +44,8 @@ def encode(observations: Observations, points: Float64[np.ndarray, "N 3"]) -> Sa
     pair, _ = observations.pairs
     features = matched_filter_features(
         observations.delta,
-        observations.tx_xyz,
-        observations.rx_xyz,
+        observations.layout.tx_xyz,
+        observations.layout.rx_xyz,
         pair,
         observations.freq_hz,
         points,

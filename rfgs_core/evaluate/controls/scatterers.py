@@ -92,8 +92,7 @@ class PointModel:
         )
         layout = self.layout
         delta = np.zeros(self.evidence.delta.shape, dtype=np.complex64)
-        _, measured_pairs = device_pairs(layout.tx_device, layout.rx_device, layout.measured)
-        for a, b in measured_pairs:
+        for a, b in layout.device_pairs:
             here = (layout.tx_device[:, None] == a) & (layout.rx_device == b)
             tx, rx = np.nonzero(here & layout.measured)
             if (a, b) in self.pairs:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rfgs_core.evaluate.oracle import surface_samples
+from rfgs_core.evaluate.geometry import surface_samples
 
 
 def test_samples_lie_on_the_mesh_in_proportion_to_area_with_outward_normals():

@@ -120,3 +120,13 @@ def test_four_devices_go_round_counter_clockwise() -> None:
 def test_elements_of_a_radio_without_devices_in_the_scene_are_its_own() -> None:
     radio = Radio("x", 1e9, 2e9, 10, 2, 1, 1, 2, (0.0, 0.0, 0.0), num_devices=1)
     assert layout(radio, place_devices(radio, BOUNDS_M)).measured.shape == (2, 2)
+
+
+def test_device_pairs_are_those_with_a_measured_link() -> None:
+    pairs = {}
+    for own in ("included", "only", "excluded"):
+        radio = replace(preset("wifi"), own_device_links=own, num_devices=2)
+        pairs[own] = layout(radio, place_devices(radio, BOUNDS_M)).device_pairs
+    assert pairs["included"] == [(0, 0), (0, 1), (1, 0), (1, 1)]
+    assert pairs["only"] == [(0, 0), (1, 1)]
+    assert pairs["excluded"] == [(0, 1), (1, 0)]

@@ -74,11 +74,7 @@ def make_observations() -> MakeObservations:
             static=np.where(seen, static, 0).astype(np.complex64),
             links=links,
             tones=tones,
-            measured=elements.measured,
-            tx_xyz=elements.tx_xyz,
-            rx_xyz=elements.rx_xyz,
-            tx_device=elements.tx_device,
-            rx_device=elements.rx_device,
+            layout=elements,
             freq_hz=radio.freq_hz,
             bounds_m=bounds_m,
         )

@@ -13,7 +13,8 @@ from rfgs_core.train.background import direct_gain, direct_paths
 
 def between(observations, first: int, second: int) -> np.ndarray:
     """Links from one device to another."""
-    return (observations.tx_device[:, None] == first) & (observations.rx_device == second)
+    elements = observations.layout
+    return (elements.tx_device[:, None] == first) & (elements.rx_device == second)
 
 
 @pytest.fixture
@@ -50,8 +51,8 @@ def test_paths_rebuild_the_empty_room_at_the_centre(make_observations, gain) -> 
     turn = np.exp(-2j * np.pi * observations.centre_hz * paths.delay_s.numpy())
     got = paths.amplitude.numpy() * turn
     np.testing.assert_allclose(got, expected, rtol=1e-4, atol=1e-9)
-    np.testing.assert_array_equal(paths.a_xyz.numpy(), observations.tx_xyz[tx[link]])
-    np.testing.assert_array_equal(paths.b_xyz.numpy(), observations.rx_xyz[rx[link]])
+    np.testing.assert_array_equal(paths.a_xyz.numpy(), observations.layout.tx_xyz[tx[link]])
+    np.testing.assert_array_equal(paths.b_xyz.numpy(), observations.layout.rx_xyz[rx[link]])
     assert paths.wavelength_m == pytest.approx(SPEED_OF_LIGHT / 5.8e9)
 
 
@@ -60,7 +61,7 @@ def test_links_within_a_device_have_no_path(make_observations) -> None:
     paths = direct_paths(observations, observations.links)
     tx, rx = np.nonzero(observations.links)
     with_path = np.isin(np.arange(len(tx)), paths.link.numpy())
-    own = observations.tx_device[tx] == observations.rx_device[rx]
+    own = observations.layout.tx_device[tx] == observations.layout.rx_device[rx]
     np.testing.assert_array_equal(with_path, ~own)
     assert 0 < len(paths) < len(tx)
 

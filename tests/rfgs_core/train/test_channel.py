@@ -77,9 +77,10 @@ def test_a_given_reflectivity_replaces_that_of_the_features(
 def test_an_opaque_screen_takes_away_the_direct_path(make_observations, head) -> None:
     """A wall of opaque blobs before the receiving device leaves little of Friis' path."""
     observations = make_observations()
-    chosen = (observations.tx_device[:, None] == 0) & (observations.rx_device == 2)
+    elements = observations.layout
+    chosen = (elements.tx_device[:, None] == 0) & (elements.rx_device == 2)
     channel = Channel.of(observations, chosen, observations.tones)
-    a, b = observations.tx_xyz[0], observations.rx_xyz[observations.rx_device == 2].mean(axis=0)
+    a, b = elements.tx_xyz[0], elements.rx_xyz[elements.rx_device == 2].mean(axis=0)
     along = (b - a) / np.linalg.norm(b - a)
     side = np.cross(along, [0.0, 0.0, 1.0])
     side /= np.linalg.norm(side)

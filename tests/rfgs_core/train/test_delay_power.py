@@ -21,7 +21,8 @@ def channels(observations: Observations, points: np.ndarray) -> np.ndarray:
     """What points of unit reflectivity scatter on the visible entries, (point, tx, rx, tone)."""
     tx, rx = np.nonzero(observations.links)
     links = Links(
-        torch.from_numpy(observations.tx_xyz[tx]), torch.from_numpy(observations.rx_xyz[rx])
+        torch.from_numpy(observations.layout.tx_xyz[tx]),
+        torch.from_numpy(observations.layout.rx_xyz[rx]),
     )
     freq_hz = observations.freq_hz
     tones = Tones(float(freq_hz[0]), float(freq_hz[1] - freq_hz[0]), len(freq_hz))

@@ -37,13 +37,13 @@ def lit(observations: Observations, bodies: list[tuple[float, float]], seed: int
         strength = rng.standard_normal(150) + 1j * rng.standard_normal(150)
         for point, normal, gamma in zip(points, normals, strength, strict=True):
             ends = []
-            for xyz in (observations.tx_xyz, observations.rx_xyz):
+            for xyz in (observations.layout.tx_xyz, observations.layout.rx_xyz):
                 away = xyz - point
                 distance = np.linalg.norm(away, axis=1)
                 seen = (away @ normal > 0) / distance
                 ends.append(seen[:, None] * np.exp(-1j * k * distance[:, None]))
             delta += gamma * ends[0][:, None] * ends[1][None]
-    return observations.with_delta(delta * observations.measured[..., None])
+    return observations.with_delta(delta * observations.layout.measured[..., None])
 
 
 @pytest.fixture(scope="module")

@@ -30,7 +30,7 @@ def test_held_out_entries_are_zero_and_the_rest_is_the_data(tiny_dataset: Path) 
     ((a, b),) = split["device_pairs"]
     for tx in range(4):
         for rx in range(32):
-            pair = {int(seen.tx_device[tx]), int(seen.rx_device[rx])}
+            pair = {int(seen.layout.tx_device[tx]), int(seen.layout.rx_device[rx])}
             expected = rx not in split["rx_elements"] and pair != {a, b}
             assert seen.links[tx, rx] == expected
     keep = seen.links[..., None] & seen.tones
@@ -38,7 +38,7 @@ def test_held_out_entries_are_zero_and_the_rest_is_the_data(tiny_dataset: Path) 
     np.testing.assert_array_equal(seen.static[keep], static[keep])
     assert (seen.delta[~keep] == 0).all()
     assert (seen.static[~keep] == 0).all()
-    assert seen.measured.all()
+    assert seen.layout.measured.all()
 
 
 def test_visible_nan_is_refused_and_hidden_nan_is_not_read(own_dataset: Path) -> None:
@@ -78,8 +78,8 @@ def test_line_points_lie_between_devices(make_observations) -> None:
     points = line_points(observations, np.random.default_rng(0))
     # 12 ordered pairs of different devices with 64 points each.
     assert points.shape == (768, 3)
-    start = observations.tx_xyz[0]
-    end = observations.rx_xyz[observations.rx_device == 1].mean(axis=0)
+    start = observations.layout.tx_xyz[0]
+    end = observations.layout.rx_xyz[observations.layout.rx_device == 1].mean(axis=0)
     along = end - start
     share = (points[:64] - start) @ along / (along @ along)
     np.testing.assert_allclose(points[:64], start + share[:, None] * along, atol=1e-12)

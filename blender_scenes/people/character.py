@@ -7,8 +7,8 @@ import bmesh
 import bpy
 import numpy as np
 
-from blender_scenes.body import Body
-from blender_scenes.clothes import Cut, cuts, limb_weights, surface_of
+from blender_scenes.people.body import Body
+from blender_scenes.people.clothes import Cut, cuts, limb_weights, surface_of
 from blender_scenes.surfaces import material
 
 #: Share of the body's triangles that is kept.

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from blender_scenes.body import Body
+from blender_scenes.people.body import Body
 
 LIMBS = ("head", "torso", "arm", "hand", "leg", "foot")
 

@@ -111,12 +111,13 @@ def joints(scene: bpy.types.Scene, people: list[Instance]) -> np.ndarray:
 
 
 def action_label(person: Instance, frame: int) -> str:
-    """Name of the action that drives the person's armature at `frame`."""
+    """What the person does at `frame`: the last pose marker there, else the action's name."""
     data = person.armature.animation_data if person.armature else None
     if data is None:
         return ""
     if data.action is not None:
-        return data.action.name
+        passed = [marker for marker in data.action.pose_markers if marker.frame <= frame]
+        return max(passed, key=lambda m: m.frame).name if passed else data.action.name
     for track in reversed(data.nla_tracks):
         for strip in track.strips:
             if not track.mute and strip.frame_start <= frame <= strip.frame_end and strip.action:

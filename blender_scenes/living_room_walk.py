@@ -60,7 +60,7 @@ def _fill(scene: bpy.types.Scene, folders: Folders) -> None:
     steps = EndlessSteps(PATH, gait.step_m, gait.stance, gait.width_m, gait.toe_out_rad)
     phases = (START_S + np.arange(FRAMES) / FPS) / gait.step_s
     poses = [walking_pose(gait, skeleton, steps, float(phase)) for phase in phases]
-    key_poses(person, poses, ["walk"] * FRAMES, first_frame=1)
+    key_poses(person, poses, ["walk"] * FRAMES, first_frame=1, hold=False)
     add_access_points(corners(SHELL.half_m), (0.0, 0.0), folders["Stage"])
     watch(scene, CAMERAS, [person], folders["Stage"])
     light_room(folders["Stage"])

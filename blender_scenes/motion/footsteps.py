@@ -94,9 +94,7 @@ class EndlessSteps:
 
     def footprint(self, number: int) -> Footprint:
         """Footprint `number`, at `number` steps along the path."""
-        return footprint_on(
-            self.path, number * self.step_m, number, self.width_m, self.toe_out_rad
-        )
+        return footprint_on(self.path, number * self.step_m, number, self.width_m, self.toe_out_rad)
 
     def guide(self, phase: float) -> Guide:
         """The pelvis passes over a foot in the middle of that foot's stance."""

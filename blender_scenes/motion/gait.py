@@ -127,6 +127,7 @@ class Gait:
             arm_swing=manner.arm_swing * min(stride, 1.4),
         )
 
+
 @dataclass(frozen=True)
 class Feet:
     """Both feet at one time, left first."""

@@ -183,9 +183,7 @@ def plan_steps(
         leaving = 0.75 if ends[0] else 1.0
         place = made.place + np.array([0.0, 0.0, floor_m[index]])
         prints.append(Footprint(place, made.yaw_rad, landing, leaving))
-    return PlannedSteps(
-        path, prints, along_m, turn_rad, gait.stance, first, open_start, open_end
-    )
+    return PlannedSteps(path, prints, along_m, turn_rad, gait.stance, first, open_start, open_end)
 
 
 def walk_clip(figure: Figure, gait: Gait, steps: PlannedSteps, label: str) -> Clip:

@@ -7,7 +7,7 @@ Every piece begins in the posture the one before it ended in, so nothing jumps.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -25,7 +25,7 @@ class Figure:
 
     skeleton: Skeleton
     """Joints of the body."""
-    manner: Manner = Manner()
+    manner: Manner = field(default_factory=Manner)
     """What makes this person's motion differ from another's."""
 
 

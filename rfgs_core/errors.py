@@ -9,6 +9,12 @@ from collections.abc import Callable
 
 from rfgs_core.interrupts import MESSAGE, STOPPED
 
+#: The user named a place that is not theirs, no folder, or no file.
+_WRONG_PLACE = (
+    *(errno.EACCES, errno.EPERM, errno.EROFS),
+    *(errno.EISDIR, errno.ENOTDIR, errno.EEXIST, errno.ENAMETOOLONG),
+)
+
 
 class RfgsError(Exception):
     """A mistake in the input or the machine's set-up: the message says what to do."""
@@ -29,7 +35,8 @@ def run_cli(command: Callable[[], int | None]) -> int:
         command: The command; its return value is the exit code, None meaning 0.
 
     Returns:
-        Exit code: 2 for an `RfgsError` or a full disk, 130 after Ctrl-C.
+        Exit code: 2 for an `RfgsError`, a full disk or a place that cannot be written or read,
+        130 after Ctrl-C.
     """
     try:
         return command() or 0
@@ -40,6 +47,12 @@ def run_cli(command: Callable[[], int | None]) -> int:
         sys.stderr.write(MESSAGE)
         return STOPPED
     except OSError as error:
+        place = error.filename2 or error.filename
+        if error.errno in _WRONG_PLACE and place:
+            sys.stderr.write(
+                f"error: {place}: {error.strerror}; check the path and who may use it\n"
+            )
+            return 2
         if error.errno != errno.ENOSPC:
             raise
         where = f" while writing {error.filename}" if error.filename else ""

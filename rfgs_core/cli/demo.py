@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 RADIOS = ("wifi", "mmwave")
@@ -20,7 +20,7 @@ class DemoArgs:
 
     Stages: generate a dataset from the Blender scene, validate it, train on Wi-Fi and on
     mmWave, evaluate beside the controls, bring the Gaussians back into Blender. Finished
-    stages are kept: a second run only writes the report.
+    stages are kept: a second run with the same settings only writes the report.
     """
 
     out: Path = Path("demo")
@@ -60,6 +60,27 @@ class Stages:
         work()
         self.seconds[name] = round(time.perf_counter() - begin, 1)
         write_json(self._path, self.seconds)
+
+
+def keep_settings(args: DemoArgs) -> None:
+    """Remembers what a demo was asked for: its finished stages are only good for the same.
+
+    Raises:
+        RfgsError: The folder holds a demo with other settings.
+    """
+    from rfgs_core.errors import RfgsError
+    from rfgs_core.files import read_json, write_json
+
+    path = args.out / "settings.json"
+    asked = {name: value for name, value in asdict(args).items() if name != "out"}
+    found = read_json(path) if path.exists() else asked
+    differing = [name for name, value in asked.items() if found.get(name) != value]
+    if differing:
+        raise RfgsError(
+            f"{args.out} holds a demo with another {', '.join(differing)}; choose another --out or "
+            "delete that folder"
+        )
+    write_json(path, asked)
 
 
 def _call(*command: str | Path) -> None:
@@ -103,6 +124,7 @@ def run(args: DemoArgs) -> int:
     from rfgs_core.report import write_demo_report
     from rfgs_core.run import open_run
 
+    keep_settings(args)
     stages = Stages(args.out)
     dataset = args.out / "dataset"
     runs = {radio: args.out / f"run-{radio}" for radio in RADIOS}

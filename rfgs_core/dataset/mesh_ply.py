@@ -44,7 +44,7 @@ def read_mesh(
         faces = np.asarray(ply["face"].data["vertex_indices"], np.int32).reshape(-1, 3)
     except FileNotFoundError as error:
         raise RfgsFormatError(f"{path}: no such file; the folder is incomplete") from error
-    except (PlyParseError, KeyError, ValueError, OSError) as error:
+    except (PlyParseError, KeyError, ValueError, TypeError, MemoryError, OSError) as error:
         raise RfgsFormatError(f"{path}: expected a triangle mesh in PLY ({error})") from error
     if faces.size and not 0 <= faces.min() <= faces.max() < len(vertices):
         raise RfgsFormatError(f"{path}: expected triangles of existing vertices")

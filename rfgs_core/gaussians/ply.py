@@ -142,10 +142,16 @@ def read_ply(path: Path) -> GaussianCloud:
     """
     table = _vertex_table(path)
     present = table.dtype.names or ()
-    missing = [name for names in _REQUIRED.values() for name in names if name not in present]
+    needed = [name for names in _REQUIRED.values() for name in names]
+    missing = [name for name in needed if name not in present]
     if missing:
         raise RfgsFormatError(
             f"{path}: expected a PLY of Gaussians, but the vertex properties {missing} are missing"
+        )
+    lists = [name for name in present if table.dtype[name].hasobject]
+    if lists:
+        raise RfgsFormatError(
+            f"{path}: expected numbers, but the vertex properties {lists} are lists"
         )
     values = {
         key: np.stack([np.asarray(table[name], np.float32) for name in names], axis=-1)
@@ -166,7 +172,7 @@ def _vertex_table(path: Path) -> np.ndarray:
         raise RfgsError(f"{path}: no such file; expected a PLY of Gaussians") from error
     except KeyError as error:
         raise RfgsFormatError(f"{path}: expected a PLY with an element 'vertex'") from error
-    except (PlyParseError, ValueError, TypeError, IndexError, EOFError) as error:
+    except (PlyParseError, ValueError, TypeError, IndexError, EOFError, MemoryError) as error:
         raise RfgsFormatError(f"{path}: not a whole PLY file ({error})") from error
 
 

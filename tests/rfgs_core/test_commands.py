@@ -11,8 +11,9 @@ from pathlib import Path
 import pytest
 
 from rfgs_core.cli import COMMANDS, main
-from rfgs_core.cli.demo import Stages
+from rfgs_core.cli.demo import DemoArgs, Stages, keep_settings
 from rfgs_core.cli.info import find_blender
+from rfgs_core.errors import RfgsError
 
 TINY = ["--gaussians", "40", "--iterations", "1", "--no-shader"]
 
@@ -148,6 +149,13 @@ def test_stages_run_once_and_again_when_their_result_is_gone(tmp_path: Path) -> 
     (tmp_path / "timings.json").unlink()
     Stages(tmp_path).run("first", done, work)
     assert len(calls) == 3
+
+
+def test_a_demo_with_other_settings_is_not_mixed_in(tmp_path: Path) -> None:
+    keep_settings(DemoArgs(out=tmp_path))
+    keep_settings(DemoArgs(out=tmp_path))
+    with pytest.raises(RfgsError, match="holds a demo with another frames, seed; choose another"):
+        keep_settings(DemoArgs(out=tmp_path, frames="1:3", seed=1))
 
 
 def test_blender_is_taken_from_the_environment(

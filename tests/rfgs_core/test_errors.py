@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from rfgs_core.errors import MissingToolError, RfgsError, RfgsFormatError, run_cli
+from rfgs_core.files import write_text
 
 
 def raising(error: BaseException):
@@ -29,6 +30,17 @@ def test_the_commands_own_code_is_passed_on(answer: int | None, code: int, capsy
 def test_a_user_mistake_is_one_line_and_code_2(kind: type[RfgsError], capsys) -> None:
     assert run_cli(raising(kind("a.json: expected 1, got 2"))) == 2
     assert capsys.readouterr() == ("", "error: a.json: expected 1, got 2\n")
+
+
+def test_a_place_that_cannot_be_written_is_one_line(tmp_path: Path, capsys) -> None:
+    (tmp_path / "file").write_text("")
+    (tmp_path / "folder").mkdir()
+    for place in (tmp_path / "folder", tmp_path / "file" / "below", tmp_path / ("n" * 300)):
+        assert run_cli(lambda place=place: write_text(place, "text")) == 2
+        out, err = capsys.readouterr()
+        assert out == "" and err.count("\n") == 1
+        assert err.startswith(f"error: {tmp_path}") and "; check the path and who may use it" in err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "folder"]
 
 
 def test_format_errors_are_value_errors_too() -> None:

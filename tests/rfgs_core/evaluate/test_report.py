@@ -10,7 +10,7 @@ import pytest
 
 from rfgs_core.cli.compare import CompareArgs
 from rfgs_core.cli.compare import run as compare
-from rfgs_core.errors import RfgsError
+from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.report import write_demo_report, write_run_report
 from rfgs_core.report.tables import metric_tables, show, text_table
 
@@ -110,6 +110,9 @@ def test_compare_prints_and_writes_both_kinds(evaluated_run, tmp_path: Path, cap
     assert "Not the same conditions: radio: wifi against mmwave" in text
     row = next(line for line in text.splitlines() if line.startswith("geometry.f10 "))
     assert row.endswith(evaluated_run.path.name)
+    (other / "metrics.json").write_text("[]")
+    with pytest.raises(RfgsFormatError, match=r"metrics\.json: expected schema rfgs-metrics/1"):
+        compare(CompareArgs(evaluated_run.path, other))
 
 
 @pytest.mark.parametrize("make", [False, True])

@@ -161,3 +161,18 @@ def test_gaussians_survive_the_file(cloud: GaussianCloud, tmp_path: Path) -> Non
     again = read_ply(tmp_path / "cloud.ply").to_gaussians(features.numpy())
     assert torch.equal(again.covariances, gaussians.covariances)
     assert torch.equal(again.features, features)
+
+
+def test_headers_that_promise_too_much_or_lists_are_refused(cloud, tmp_path: Path) -> None:
+    file = tmp_path / "hostile.ply"
+    write_ply(file, cloud)
+    header, _ = file.read_bytes().split(b"end_header\n")
+    text = header.decode().replace("binary_little_endian", "ascii")
+    file.write_text(text.replace("vertex 50", "vertex 1000000000000000") + "end_header\n")
+    with pytest.raises(RfgsFormatError, match=r"hostile\.ply: not a whole PLY"):
+        read_ply(file)
+    lists = text.replace("vertex 50", "vertex 1").replace("float x", "list uchar float x")
+    numbers = " ".join(["2 0 0", *["0"] * 17])
+    file.write_text(f"{lists}end_header\n{numbers}\n")
+    with pytest.raises(RfgsFormatError, match=r"vertex properties \['x'\] are lists"):
+        read_ply(file)

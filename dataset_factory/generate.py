@@ -13,13 +13,16 @@ from tqdm import tqdm
 from dataset_factory.bundle import Bundle, read_bundle
 from dataset_factory.devices import check_scene, choose_devices
 from dataset_factory.folder import locked, open_folder, sweep
+from dataset_factory.impair import impair_radio
 from dataset_factory.job import Job
 from dataset_factory.plan import missing_channels, versions
 from dataset_factory.progress import progress_bar
 from dataset_factory.render import render
 from dataset_factory.sequence import describe_sequence, write_geometry
 from dataset_factory.workers import Task, run_tasks
+from rfgs_core.dataset import Sequence
 from rfgs_core.dataset.csi_store import create_csi
+from rfgs_core.dataset.impaired_store import has_impaired, remove_impaired
 from rfgs_core.dataset.schema import DatasetInfo, SequenceInfo, device_pose
 from rfgs_core.dataset.writer import (
     finish_dataset,
@@ -30,6 +33,7 @@ from rfgs_core.dataset.writer import (
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json, write_json
 from rfgs_core.radio import DevicePose, frame_samples, layout, preset
+from rfgs_core.radio.impairments import impairments_from_json
 
 logger = logging.getLogger(__name__)
 
@@ -59,6 +63,9 @@ def generate(job: Job) -> bool:
         sequence = _prepare(job, bundle, devices, guesses)
         with job.stage("trace"):
             _trace(job, bundle, sequence)
+        if job.plan.impairments:
+            with job.stage("impair"):
+                _impair(job)
         if job.plan.images:
             with job.stage("render"):
                 render(job, sequence)
@@ -77,7 +84,17 @@ def generate(job: Job) -> bool:
 
 def _contents(job: Job) -> list[str]:
     pictures = ["images", "depth", "normal", "mask"] if job.plan.images else []
-    return ["csi", "csi_static", *pictures, "geometry"]
+    impaired = ["csi_impaired"] if job.plan.impairments else []
+    return ["csi", "csi_static", *impaired, *pictures, "geometry"]
+
+
+def _impair(job: Job) -> None:
+    settings = impairments_from_json(job.plan.impairments)
+    sequence = Sequence(job.files.root, job.name)
+    for radio in sequence.radios:
+        if not has_impaired(job.files.csi(radio)):
+            remove_impaired(job.files.csi(radio))
+            impair_radio(sequence, radio, settings, job.plan.seed)
 
 
 def _export(job: Job) -> Bundle:

@@ -16,6 +16,10 @@ from rfgs_core.radio.constants import SPEED_OF_LIGHT
 DIRECT_LIMITS = (0.4, 2.5)
 #: Power that may arrive before the direct path, relative to the strongest arrival.
 EARLY_LIMIT = 10 ** (-25 / 10)
+#: Energy of all links relative to free space; reflections that add in phase stay below it.
+ENERGY_LIMIT = 6.0
+#: Peak power gain of Sionna's antenna patterns.
+PEAK_GAINS = {"iso": 1.0, "dipole": 1.5, "hw_dipole": 1.64, "tr38901": 6.31}
 #: Main lobe of the Hann window used on the band, in units of c / bandwidth.
 HANN_LOBE = 2.5
 
@@ -117,3 +121,20 @@ def _direct_path(
     return float(np.abs(aligned.sum()) / np.hanning(spec.num_subcarriers).sum()), float(
         offset_m[scan.argmax()]
     )
+
+
+def energy_faults(sequence: Sequence, radio: str, value: np.ndarray, where: str) -> Iterator[str]:
+    """Passive scenes bring no more energy than free space, give or take what adds in phase.
+
+    The energy of all links is compared with that of straight lines of the same lengths, (λ/4πd)²,
+    times the antennas' peak gains.
+    """
+    layout, spec = sequence.layout(radio), sequence.radio_spec(radio)
+    distance_m = np.linalg.norm(layout.tx_xyz[:, None] - layout.rx_xyz[None], axis=-1)
+    wavenumber = 2 * np.pi * spec.freq_hz / SPEED_OF_LIGHT
+    free_space = (1.0 / (2 * wavenumber * distance_m[..., None])) ** 2
+    gain = PEAK_GAINS.get(spec.pattern, max(PEAK_GAINS.values())) ** 2
+    energy = (np.abs(value[layout.measured]) ** 2).sum()
+    ratio = float(energy / free_space[layout.measured].sum() / gain)
+    if ratio > ENERGY_LIMIT:
+        yield f"{where}: {ratio:.1f} times the energy of free space, more than a scene can give"

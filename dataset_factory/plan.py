@@ -45,6 +45,8 @@ class Plan:
     """Root seed."""
     images: bool
     """Whether pictures are rendered."""
+    impairments: dict[str, Any] | None = None
+    """Settings of the impaired channels beside the clean ones; none makes none."""
 
 
 def make_plan(scene: Scene, radios: tuple[str, ...], frames: str, **options: Any) -> Plan:

@@ -10,9 +10,11 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from dataset_factory.physics import channel_faults
+from dataset_factory.labels import label_faults, mask_faults
+from dataset_factory.physics import channel_faults, energy_faults
 from rfgs_core.dataset import Sequence
 from rfgs_core.dataset.csi_store import chunk_file
+from rfgs_core.dataset.impaired_store import has_impaired, impaired_chunk
 from rfgs_core.dataset.schema import read_dataset_info
 from rfgs_core.dataset.writer import MANIFEST, listed_files, own_digest
 from rfgs_core.errors import RfgsError
@@ -30,7 +32,7 @@ def checksum_faults(path: Path) -> list[str]:
 
 
 def validate(path: Path) -> list[str]:
-    """Checks schema, checksums, counts, numbers, markers and physics.
+    """Checks schema, checksums, counts, numbers, markers, physics and labels.
 
     Args:
         path: Folder of the dataset.
@@ -103,7 +105,7 @@ def _sequence_faults(sequence: Sequence, has: list[str]) -> Iterator[str]:
         yield from _caught(lambda: _geometry_faults(sequence))
     if "images" in has:
         for frame in tqdm(sequence.frames, desc="pictures", unit="frame"):
-            yield from _caught(lambda frame=frame: _picture_faults(sequence, frame))
+            yield from _caught(lambda frame=frame: _picture_faults(sequence, frame, has))
         for camera in sequence.cameras:
             yield from _caught(lambda name=camera["name"]: _empty_faults(sequence, name))
 
@@ -126,11 +128,14 @@ def _radio_faults(sequence: Sequence, radio: str) -> Iterator[str]:
             yield f"{store}: {name}: differs from the devices in sequence.json"
     static = sequence.csi_static_samples(radio)
     yield from channel_faults(sequence, radio, static[0], chunk_file(store, None))
+    yield from energy_faults(sequence, radio, static[0], f"{chunk_file(store, None)}: static")
     for index, frame in enumerate(sequence.frames):
         file = chunk_file(store, index)
         yield from _caught(
             lambda frame=frame, file=file: _frame_faults(sequence, radio, frame, file, static)
         )
+    if has_impaired(store):
+        yield from _caught(lambda: _impaired_faults(sequence, radio))
 
 
 def _frame_faults(
@@ -146,6 +151,26 @@ def _frame_faults(
         yield f"{file}: frame {frame}: silent channel"
     elif (value == static).all(axis=(1, 2, 3)).any():
         yield f"{file}: frame {frame}: equals the static channel, nobody is in it"
+    else:
+        yield from energy_faults(sequence, radio, value[0], f"{file}: frame {frame}")
+
+
+def _impaired_faults(sequence: Sequence, radio: str) -> Iterator[str]:
+    """Impaired channels are missing exactly where a packet is lost, and zero where no link is."""
+    layout, known = sequence.layout(radio), sequence.impairments(radio)
+    store = sequence.files.csi(radio)
+    lost = ~known.draw.packet_received[:, layout.tx_device[:, None], layout.rx_device]
+    count = len(lost) // len(sequence.frames)
+    if not np.isfinite(known.gain_db).all():
+        yield f"{store / 'gain_db'}: gains that are not finite"
+    for index, frame in enumerate(sequence.frames):
+        value = sequence.csi_samples(radio, frame, impaired=True)
+        file = impaired_chunk(store, index)
+        missing = lost[index * count : (index + 1) * count] & layout.measured
+        if not np.array_equal(np.isnan(value), np.broadcast_to(missing[..., None], value.shape)):
+            yield f"{file}: frame {frame}: missing values do not match the lost packets"
+        elif value[:, ~layout.measured].any():
+            yield f"{file}: frame {frame}: values on links that are not measured"
 
 
 def _geometry_faults(sequence: Sequence) -> Iterator[str]:
@@ -165,9 +190,10 @@ def _geometry_faults(sequence: Sequence) -> Iterator[str]:
             yield f"{file}: vertices outside the bounds of sequence.json"
         if not set(np.unique(instance).tolist()) <= ids:
             yield f"{sequence.files.topology}: instance ids missing in sequence.json"
+        yield from label_faults(sequence, frame)
 
 
-def _picture_faults(sequence: Sequence, frame: int) -> Iterator[str]:
+def _picture_faults(sequence: Sequence, frame: int, has: list[str]) -> Iterator[str]:
     files = sequence.files
     if not files.images_done(frame).is_file():
         yield f"{files.images_done(frame)}: no marker, these pictures were never finished"
@@ -191,6 +217,8 @@ def _picture_faults(sequence: Sequence, frame: int) -> Iterator[str]:
         unknown = set(np.unique(planes[files.mask(name, frame)]).tolist()) - ids
         if unknown:
             yield f"{files.mask(name, frame)}: ids {sorted(unknown)} missing in sequence.json"
+        elif "geometry" in has and depth.shape == planes[files.mask(name, frame)].shape == shape:
+            yield from mask_faults(sequence, frame, name)
 
 
 def _empty_faults(sequence: Sequence, camera: str) -> Iterator[str]:

@@ -38,3 +38,12 @@ def python() -> Callable[..., subprocess.CompletedProcess[str]]:
         return done
 
     return run
+
+
+@pytest.fixture(scope="session")
+def tiny_dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of a finished dataset of two frames; copy it before changing anything."""
+    # Loaded here: the hook above must come before the first module of rfgs_core.
+    from tiny_dataset import write_tiny_dataset
+
+    return write_tiny_dataset(tmp_path_factory.mktemp("tiny") / "dataset")

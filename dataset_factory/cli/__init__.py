@@ -12,6 +12,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "generate": ("generate", "GenerateArgs"),
     "validate": ("validate", "ValidateArgs"),
     "preview": ("preview", "PreviewArgs"),
+    "impair": ("impair", "ImpairArgs"),
 }
 
 _FIRST_STEPS = r"""A first dataset, about two minutes on two cores:

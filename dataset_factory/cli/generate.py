@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -43,6 +43,9 @@ class GenerateArgs:
     """Tracing processes; each keeps one core busy."""
     shadow: Literal["kirchhoff", "hard"] = "kirchhoff"
     """How bodies shadow paths: diffracted at the silhouette, or cut off sharply."""
+    impairments: str = ""
+    """Also store what imperfect radios would report: thermal, lab, commodity or a JSON file; see
+    `rfgs-factory impair --help`."""
     images: bool = True
     """Render pictures with Blender."""
     blender: Path | None = None
@@ -57,6 +60,7 @@ def run(args: GenerateArgs) -> int:
     from dataset_factory.plan import make_plan
     from dataset_factory.scenes import find_scene
     from rfgs_core.llvm import use_llvm
+    from rfgs_core.radio.impairments import read_impairments
 
     if not 1 <= args.workers <= 256:
         raise RfgsError(f"--workers {args.workers}: expected 1 to 256")
@@ -72,6 +76,7 @@ def run(args: GenerateArgs) -> int:
         seed=args.seed,
         shadow=args.shadow,
         images=args.images,
+        impairments=asdict(read_impairments(args.impairments)) if args.impairments else None,
     )
     use_llvm()
     made = generate(Job(args.out, plan, Blender(scene.blend, args.blender), args.workers))

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Complex64, Float32, Float64, Int32, UInt8, UInt16
 
-from rfgs_core.arrays import load_arrays
 from rfgs_core.dataset.csi_store import open_csi, read_csi
+from rfgs_core.dataset.impaired_store import Impaired, read_draw, read_impaired
 from rfgs_core.dataset.mesh_ply import read_mesh
 from rfgs_core.dataset.names import SequenceFiles
 from rfgs_core.dataset.pictures import read_exr, read_png_rgba, read_png_u16
@@ -29,8 +30,6 @@ from rfgs_core.radio import DevicePose, Layout, Radio, frame_samples, layout
 
 if TYPE_CHECKING:
     import xarray
-
-_NO_GEOMETRY = "the geometry of this dataset is missing or damaged, make the dataset again"
 
 
 def open_dataset(path: Path | str) -> Dataset:
@@ -72,7 +71,7 @@ class Dataset:
 
     @property
     def has(self) -> list[str]:
-        """What is present: csi, csi_static, images, depth, normal, mask, geometry."""
+        """What is present, some of `schema.CONTENTS`: for example csi, csi_static, images."""
         return list(self.info.has)
 
     @cached_property
@@ -190,27 +189,46 @@ class Sequence:
         """
         return open_csi(self.files.csi(self._radio(name)))
 
-    def csi(self, name: str, frame: int) -> Complex64[np.ndarray, "tx rx subcarrier"]:
-        """Channel at a frame's own time, checked against the digest in its marker.
+    def csi(
+        self, name: str, frame: int, *, impaired: bool = False
+    ) -> Complex64[np.ndarray, "tx rx subcarrier"]:
+        """Channel at a frame's own time, checked against the digest stored with it.
+
+        Args:
+            name: Which radio.
+            frame: Which frame.
+            impaired: What imperfect radios report, NaN where a packet is lost.
 
         Raises:
-            RfgsError: There is no such radio or frame.
+            RfgsError: There is no such radio or frame, or nothing was impaired.
             RfgsFormatError: The chunk is missing, truncated or altered.
         """
-        return self.csi_samples(name, frame)[0]
+        return self.csi_samples(name, frame, impaired=impaired)[0]
 
     def csi_samples(
-        self, name: str, frame: int
+        self, name: str, frame: int, *, impaired: bool = False
     ) -> Complex64[np.ndarray, "sample tx rx subcarrier"]:
         """Channels of all samples of a frame (packets, chirps, pulses), checked like `csi`.
 
         Raises:
-            RfgsError: There is no such radio or frame.
+            RfgsError: There is no such radio or frame, or nothing was impaired.
             RfgsFormatError: The chunk is missing, truncated or altered.
         """
-        index = self._index(frame)
-        value = read_csi(self.files.csi(self._radio(name)), index, self.files.csi_done(name, frame))
+        index, store = self._index(frame), self.files.csi(self._radio(name))
+        if impaired:
+            value = read_impaired(store, index)
+        else:
+            value = read_csi(store, index, self.files.csi_done(name, frame))
         return self._fitting(name, value, frame, (self.radio_spec(name).samples_per_frame,))
+
+    def impairments(self, name: str) -> Impaired:
+        """How the impaired channels came about: settings, draws and gains.
+
+        Raises:
+            RfgsError: There is no such radio, or nothing was impaired.
+            RfgsFormatError: What is stored is damaged.
+        """
+        return read_draw(self.files.csi(self._radio(name)))
 
     def csi_static(self, name: str) -> Complex64[np.ndarray, "tx rx subcarrier"]:
         """Channel without anything that moves, checked against its digest.
@@ -239,13 +257,9 @@ class Sequence:
         Int32[np.ndarray, "face"],
     ]:
         """Vertices [m], triangles and instance id per triangle of what moves."""
-        shapes = {"faces": ("face", 3), "instance": ("face",)}
-        topology = load_arrays(self.files.topology, _NO_GEOMETRY, shapes)
         vertices = self._geometry(frame)["vertices"]
-        faces = topology["faces"]
-        if faces.size and not 0 <= faces.min() <= faces.max() < len(vertices):
-            raise RfgsFormatError(f"{self.files.topology}: expected triangles of existing vertices")
-        return vertices, faces, topology["instance"]
+        topology = _arrays(self.files.topology)
+        return vertices, topology["faces"], topology["instance"]
 
     def static_mesh(self) -> tuple[Float32[np.ndarray, "vertex 3"], Int32[np.ndarray, "face 3"]]:
         """Vertices [m] and triangles of what stands still."""
@@ -254,6 +268,14 @@ class Sequence:
     def joints(self, frame: int) -> Float32[np.ndarray, "person 17 3"]:
         """Joint positions of each person [m], in the order of `rfgs_core.skeleton`."""
         return self._geometry(frame)["joints"]
+
+    def people(self, frame: int) -> Int32[np.ndarray, "person"]:
+        """Instance id of each person, in the order of `joints`."""
+        return self._geometry(frame)["person_instance"]
+
+    def actions(self, frame: int) -> list[str]:
+        """What each person does, in the order of `joints`; empty where that is not known."""
+        return [str(action) for action in self._geometry(frame)["action"]]
 
     def image(self, camera: str, frame: int) -> UInt8[np.ndarray, "h w 4"]:
         """Colour picture, sRGB with alpha."""
@@ -314,8 +336,17 @@ class Sequence:
 
     def _geometry(self, frame: int) -> dict[str, np.ndarray]:
         self._index(frame)
-        shapes = {"vertices": ("vertex", 3), "joints": ("person", 17, 3)}
-        return load_arrays(self.files.geometry(frame), _NO_GEOMETRY, shapes)
+        return _arrays(self.files.geometry(frame))
+
+
+def _arrays(path: Path) -> dict[str, np.ndarray]:
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            return {name: stored[name] for name in stored.files}
+    except FileNotFoundError as error:
+        raise RfgsFormatError(f"{path}: no such file; this dataset holds no geometry") from error
+    except (ValueError, EOFError, OSError, zipfile.BadZipFile) as error:
+        raise RfgsFormatError(f"{path}: damaged array file ({error})") from error
 
 
 def _plane(path: Path, channel: str) -> Float32[np.ndarray, "h w"]:

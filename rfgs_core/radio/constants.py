@@ -7,3 +7,5 @@ from __future__ import annotations
 SPEED_OF_LIGHT = 299_792_458.0
 #: Vacuum permittivity [F/m].
 VACUUM_PERMITTIVITY = 8.854_187_8128e-12
+#: Boltzmann constant [J/K].
+BOLTZMANN = 1.380_649e-23

@@ -3,12 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from rfgs_core.dataset.csi_store import create_csi, write_csi
 from rfgs_core.dataset.mesh_ply import write_mesh
@@ -195,7 +193,11 @@ def sequence_info(cameras: list[dict]) -> SequenceInfo:
 
 
 def write_tiny_dataset(root: Path) -> Path:
-    """Writes the dataset below `root` and returns its folder."""
+    """Writes the dataset below `root` and returns its folder.
+
+    One sphere (instance 1, radius 0.3 m) moves 0.2 m along x in a 3 x 3 x 2.5 m box, seen by
+    four cameras of 24 x 24 px and four Wi-Fi devices of 1 TX and 2 x 4 RX elements.
+    """
     files = SequenceFiles(root / "tiny")
     cameras = camera_rows()
     info = sequence_info(cameras)
@@ -227,13 +229,3 @@ def write_tiny_dataset(root: Path) -> Path:
     has = ["csi", "csi_static", "images", "depth", "normal", "mask", "geometry"]
     finish_dataset(root, DatasetInfo({"rfgs": "test"}, {"scene": "tiny"}, 0, has, ["tiny"]))
     return root
-
-
-@pytest.fixture(scope="session")
-def tiny_dataset(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """Folder of a finished dataset of two frames; copy it before changing anything.
-
-    One sphere (instance 1, radius 0.3 m) moves 0.2 m along x in a 3 x 3 x 2.5 m box, seen by
-    four cameras of 24 x 24 px and four Wi-Fi devices of 1 TX and 2 x 4 RX elements.
-    """
-    yield write_tiny_dataset(tmp_path_factory.mktemp("tiny") / "dataset")

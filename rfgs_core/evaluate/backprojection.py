@@ -18,7 +18,7 @@ COARSE_RANGE_M = 0.15
 
 
 @dataclass(frozen=True)
-class PairMaps:
+class ThinnedMaps:
     """Matched-filter power per device pair on a thinned grid."""
 
     power: Float[np.ndarray, "pair i j k"]
@@ -55,13 +55,13 @@ def _interpolation(
     return np.stack([np.interp(wanted, known, row) for row in np.eye(len(known))], axis=1)
 
 
-def pair_maps(
+def thinned_maps(
     delta: Complex[np.ndarray, "tx rx subcarrier"],
     link_visible: Bool[np.ndarray, "tx rx"],
     layout: Layout,
     freq_hz: Float[np.ndarray, "subcarrier"],
     grid: Grid,
-) -> PairMaps:
+) -> ThinnedMaps:
     """Matched-filter power of every device pair with a visible link.
 
     Args:
@@ -79,4 +79,4 @@ def pair_maps(
     power = matched_filter_map(
         delta, layout.tx_xyz, layout.rx_xyz, pair, freq_hz, points.reshape(-1, 3)
     )
-    return PairMaps(power.reshape(len(pairs), *points.shape[:3]), pairs, grid, stride)
+    return ThinnedMaps(power.reshape(len(pairs), *points.shape[:3]), pairs, grid, stride)

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Complex, Float
 
-from rfgs_core.evaluate.backprojection import PairMaps, pair_maps
+from rfgs_core.evaluate.backprojection import ThinnedMaps, thinned_maps
 from rfgs_core.evaluate.grid import Grid
 from rfgs_core.evaluate.rf import HeldOut
 from rfgs_core.radio import Layout
@@ -68,9 +68,9 @@ class Evidence:
         return replace(self, method_centroid_m=centroid_m)
 
     @cached_property
-    def maps(self) -> PairMaps:
+    def maps(self) -> ThinnedMaps:
         """Matched-filter maps of the visible entries, computed once."""
-        return pair_maps(
+        return thinned_maps(
             self.delta_or_zero, self.link_visible, self.layout, self.freq_hz, self.grid
         )
 

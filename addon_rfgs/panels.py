@@ -33,6 +33,7 @@ class RFGS_PT_object(_Tab, bpy.types.Panel):
         if item.type in {"MESH", "CURVE", "SURFACE", "FONT", "META", "EMPTY"}:
             layout.prop(item.rfgs, "object_class")
             layout.prop(item.rfgs, "instance")
+            layout.prop(item.rfgs, "surface_m2")
         material = item.active_material
         if material is not None:
             box = layout.box()

@@ -29,6 +29,8 @@ class Instance:
     surfaces: list[Surface] = field(default_factory=list)
     armature: bpy.types.Object | None = None
     rig: Rig | None = None
+    surface_m2: float = 0.0
+    """Nominal outer surface [m²]; 0 leaves it to the reader."""
 
     def row(self) -> dict[str, Any]:
         """Row of `bundle.json`."""
@@ -37,6 +39,7 @@ class Instance:
             "name": self.name,
             "class": self.kind,
             "person": self.kind == "person",
+            "nominal_surface_m2": self.surface_m2 or None,
         }
 
 
@@ -60,6 +63,7 @@ def find_instances(surfaces: list[Surface]) -> tuple[list[Instance], list[dict[s
     for instance in instances.values():
         _classify(instance, rigs, guesses)
         _check_size(instance)
+        _size_up(instance, guesses)
     return list(instances.values()), guesses
 
 
@@ -107,12 +111,13 @@ def joints(scene: bpy.types.Scene, people: list[Instance]) -> np.ndarray:
 
 
 def action_label(person: Instance, frame: int) -> str:
-    """Name of the action that drives the person's armature at `frame`."""
+    """What the person does at `frame`: the last pose marker there, else the action's name."""
     data = person.armature.animation_data if person.armature else None
     if data is None:
         return ""
     if data.action is not None:
-        return data.action.name
+        passed = [marker for marker in data.action.pose_markers if marker.frame <= frame]
+        return max(passed, key=lambda m: m.frame).name if passed else data.action.name
     for track in reversed(data.nla_tracks):
         for strip in track.strips:
             if not track.mute and strip.frame_start <= frame <= strip.frame_end and strip.action:
@@ -156,6 +161,19 @@ def _classify(
     elif instance.rig is None:
         why = "no armature with known names of human bones"
         guesses.append({"what": "joints", "object": instance.name, "value": "none", "why": why})
+
+
+def _size_up(instance: Instance, guesses: list[dict[str, Any]]) -> None:
+    """Takes the user's nominal surface; a vehicle without one gets that of its box."""
+    owners = [item.rfgs for surface in instance.surfaces for item in (surface.root, surface.source)]
+    instance.surface_m2 = round(max(owner.surface_m2 for owner in owners), 3)
+    if instance.surface_m2 == 0.0 and instance.kind == "vehicle":
+        points = np.concatenate([surface.vertices for surface in instance.surfaces])
+        x, y, z = np.ptp(points, axis=0)
+        instance.surface_m2 = round(2.0 * float(x * y + y * z + z * x), 3)
+        note = {"what": "nominal_surface_m2", "object": instance.name}
+        why = "a vehicle without a nominal surface: that of the box around it in the first frame"
+        guesses.append({**note, "value": f"{instance.surface_m2:g}", "why": why})
 
 
 def _check_size(instance: Instance) -> None:

@@ -69,6 +69,15 @@ class RFGS_PG_object(bpy.types.PropertyGroup):
         description="Objects of one name form one instance in masks; empty: the object itself",
         default="",
     )
+    surface_m2: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="Nominal surface",
+        description="Outer surface of its whole instance [m²], by which evaluation sizes "
+        "predictions; 0: the standard body for people, the box around it for vehicles",
+        default=0.0,
+        min=0.0,
+        soft_max=100.0,
+        precision=1,
+    )
 
 
 class RFGS_PG_material(bpy.types.PropertyGroup):

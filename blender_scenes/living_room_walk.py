@@ -10,16 +10,19 @@ import bpy
 import numpy as np
 
 from blender_scenes.assemble import Folders, save_scene, watch
-from blender_scenes.body import load_body
-from blender_scenes.character import build_character
-from blender_scenes.clothes import dress
-from blender_scenes.gait import Gait
+from blender_scenes.motion.footsteps import EndlessSteps
+from blender_scenes.motion.gait import Gait
+from blender_scenes.motion.path import ArcPath
+from blender_scenes.motion.skeleton import skeleton_of
+from blender_scenes.motion.walking import walking_pose
+from blender_scenes.people.action import key_poses
+from blender_scenes.people.body import load_body
+from blender_scenes.people.character import build_character
+from blender_scenes.people.clothes import dress
 from blender_scenes.sets.decoration import light_room
 from blender_scenes.sets.furniture import build_furniture
 from blender_scenes.sets.living_room import SHELL, build_room
 from blender_scenes.stage import add_access_points, corners
-from blender_scenes.walk import key_walk, legs_of, walking_pose
-from blender_scenes.walk_path import ArcPath
 
 FRAMES, FPS = 60, 10
 #: Through the middle of the room, between the rug and the television, past the dining table.
@@ -53,10 +56,11 @@ def _fill(scene: bpy.types.Scene, folders: Folders) -> None:
     build_furniture(folders["Furniture"])
     body = dress(load_body())
     person = build_character("person", body, folders["Person"])
-    gait, legs = Gait(), legs_of(body)
-    times = START_S + np.arange(FRAMES) / FPS
-    poses = [walking_pose(gait, body, legs, PATH, float(time_s)) for time_s in times]
-    key_walk(person, poses, 1, "walk")
+    gait, skeleton = Gait(), skeleton_of(body)
+    steps = EndlessSteps(PATH, gait.step_m, gait.stance, gait.width_m, gait.toe_out_rad)
+    phases = (START_S + np.arange(FRAMES) / FPS) / gait.step_s
+    poses = [walking_pose(gait, skeleton, steps, float(phase)) for phase in phases]
+    key_poses(person, poses, ["walk"] * FRAMES, first_frame=1, hold=False)
     add_access_points(corners(SHELL.half_m), (0.0, 0.0), folders["Stage"])
     watch(scene, CAMERAS, [person], folders["Stage"])
     light_room(folders["Stage"])

@@ -120,9 +120,11 @@ SURFACES: dict[str, Surface] = {
 def material(name: str) -> bpy.types.Material:
     """The Blender material of surface `name`, made at first use."""
     made = bpy.data.materials.get(name)
-    if made is not None:
-        return made
-    surface = SURFACES[name]
+    return made if made is not None else new_material(name, SURFACES[name])
+
+
+def new_material(name: str, surface: Surface) -> bpy.types.Material:
+    """Makes a Blender material that looks and reflects like `surface`."""
     made = bpy.data.materials.new(name)
     made.use_nodes = True
     # Solid view shows the colour too, so that the scene reads well before the first render.

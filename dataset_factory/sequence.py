@@ -51,7 +51,7 @@ def describe_sequence(
             "images": images,
         },
         materials=bundle.materials,
-        instances=[_instance(row) for row in bundle.instances],
+        instances=[instance_row(row) for row in bundle.instances],
         guesses=[*(read_json(file) if file.is_file() else []), *guesses],
         trace_depth=plan.depth,
         shadow=plan.shadow,
@@ -94,7 +94,11 @@ def write_geometry(files: SequenceFiles, bundle: Bundle) -> None:
         )
 
 
-def _instance(row: dict[str, Any]) -> dict[str, Any]:
-    # The nominal surface sizes predictions and never comes from the frame's own mesh.
-    nominal = PERSON_SURFACE_M2 if row["person"] else None
-    return {**row, "nominal_surface_m2": nominal}
+def instance_row(row: dict[str, Any]) -> dict[str, Any]:
+    """A bundle's row with the nominal surface [m²] that evaluation goes by.
+
+    It comes from the scene's configuration, for people from the standard body, and never from
+    the mesh of a frame, since it sizes predictions.
+    """
+    standard = PERSON_SURFACE_M2 if row["person"] else None
+    return {**row, "nominal_surface_m2": row.get("nominal_surface_m2") or standard}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Paths of the scene without anything that moves, traced once per sequence."""
+"""Paths by way of everything but people, traced again only where a vehicle has moved."""
 
 from __future__ import annotations
 
@@ -7,8 +7,15 @@ import numpy as np
 import sionna.rt as rt
 
 from dataset_factory.bundle import Bundle
+from dataset_factory.trace.movers import Movers
 from dataset_factory.trace.paths import PathSet, empty, merged, path_set
-from dataset_factory.trace.scene import add_devices, centres, static_scene
+from dataset_factory.trace.scene import (
+    add_devices,
+    centres,
+    environment_scene,
+    move_vehicles,
+    set_frequency,
+)
 from dataset_factory.trace.steering import steer
 from rfgs_core.radio import Layout, Radio
 from rfgs_core.radio.layout import DevicePose
@@ -34,28 +41,71 @@ def node_frequencies(radio: Radio) -> np.ndarray:
     return np.linspace(radio.freq_min_hz, radio.freq_max_hz, count)
 
 
-def environment_paths(
-    bundle: Bundle, radio: Radio, layout: Layout, devices: list[DevicePose], seed: int
-) -> PathSet:
-    """Traces the empty scene between device centres.
+class Environment:
+    """The scene without people, between device centres, ready to be traced."""
 
-    Args:
-        bundle: Scene bundle.
-        radio: Radio; wide bands are traced at each node frequency.
-        layout: Antenna elements; device pairs without a measured link are left out.
-        devices: Poses of the devices.
-        seed: Seed of the rays, the same for a whole sequence.
+    def __init__(
+        self,
+        bundle: Bundle,
+        radio: Radio,
+        layout: Layout,
+        devices: list[DevicePose],
+        seed: int,
+        vehicles: Movers | None = None,
+    ) -> None:
+        """Builds the scene.
 
-    Returns:
-        Paths with one amplitude per node frequency, times frequency over the band's centre: an
-        antenna's aperture goes with the wavelength, so what is left is smooth in frequency.
-    """
-    nodes = node_frequencies(radio)
-    if len(nodes) == NARROW_BAND_NODES:
-        traced = _traced(bundle, radio, layout, devices, seed, radio.centre_hz)
-        # Walls hardly change over a narrow band.
-        return _with_amplitude(traced, np.repeat(traced.amplitude, len(nodes), axis=1))
-    return _joined([_traced(bundle, radio, layout, devices, seed, float(f)) for f in nodes])
+        Args:
+            bundle: Scene bundle.
+            radio: Radio; wide bands are traced at each node frequency.
+            layout: Antenna elements; device pairs without a measured link are left out.
+            devices: Poses of the devices.
+            seed: Seed of the rays, the same for a whole sequence.
+            vehicles: Rigid metal that `paths` moves; None leaves everything that moves out.
+        """
+        self._radio, self._layout, self._seed = radio, layout, seed
+        self._vehicles = vehicles
+        self._scatters = any(row["scattering_coefficient"] > 0.0 for row in bundle.materials)
+        self._scene = environment_scene(bundle, radio, vehicles)
+        self._solver = rt.PathSolver(deterministic=True)
+        add_devices(self._scene, layout, devices)
+
+    def paths(self, vertices: np.ndarray | None = None) -> PathSet:
+        """Traces the scene; the result does not depend on what was traced before.
+
+        Args:
+            vertices: Where the vehicles' vertices are [m], shape (V, 3).
+
+        Returns:
+            Paths with one amplitude per node frequency, times frequency over the band's centre:
+            an antenna's aperture goes with the wavelength, so what is left is smooth in
+            frequency.
+        """
+        if self._vehicles is not None and vertices is not None:
+            move_vehicles(self._scene, self._vehicles, vertices)
+        nodes = node_frequencies(self._radio)
+        if len(nodes) == NARROW_BAND_NODES:
+            traced = self._traced(self._radio.centre_hz)
+            # Walls hardly change over a narrow band.
+            return _with_amplitude(traced, np.repeat(traced.amplitude, len(nodes), axis=1))
+        return _joined([self._traced(float(f)) for f in nodes])
+
+    def _traced(self, freq_hz: float) -> PathSet:
+        """Paths at one frequency, one amplitude each."""
+        set_frequency(self._scene, freq_hz)
+        paths = self._solver(
+            self._scene,
+            max_depth=MAX_DEPTH,
+            samples_per_src=NUM_SAMPLES,
+            max_num_paths_per_src=MAX_PATHS,
+            synthetic_array=True,
+            diffuse_reflection=self._scatters,
+            refraction=True,
+            seed=self._seed,
+        )
+        found = path_set(paths, *centres(self._layout))
+        found = _with_amplitude(found, found.amplitude * (freq_hz / self._radio.centre_hz))
+        return found.select(measured_pairs(self._layout)[found.tx, found.rx])
 
 
 def environment_channel(
@@ -64,7 +114,7 @@ def environment_channel(
     """Channel of the environment, complex128, shape (tx, rx, subcarrier).
 
     Args:
-        paths: Paths of `environment_paths`.
+        paths: Paths of `Environment`.
         radio: The radio they were traced for.
         layout: Antenna elements.
         transmission: Shadow factors as `steer` takes them; None for none.
@@ -80,35 +130,6 @@ def measured_pairs(layout: Layout) -> np.ndarray:
     links = np.argwhere(layout.measured)
     wanted[layout.tx_device[links[:, 0]], layout.rx_device[links[:, 1]]] = True
     return wanted
-
-
-def _traced(
-    bundle: Bundle,
-    radio: Radio,
-    layout: Layout,
-    devices: list[DevicePose],
-    seed: int,
-    freq_hz: float,
-) -> PathSet:
-    """Paths at one frequency, one amplitude each."""
-    scatters = any(row["scattering_coefficient"] > 0.0 for row in bundle.materials)
-    scene = static_scene(bundle, radio, freq_hz)
-    tx_centres, rx_centres = centres(layout)
-    solver = rt.PathSolver(deterministic=True)
-    add_devices(scene, layout, devices)
-    paths = solver(
-        scene,
-        max_depth=MAX_DEPTH,
-        samples_per_src=NUM_SAMPLES,
-        max_num_paths_per_src=MAX_PATHS,
-        synthetic_array=True,
-        diffuse_reflection=scatters,
-        refraction=True,
-        seed=seed,
-    )
-    found = path_set(paths, tx_centres, rx_centres)
-    found = _with_amplitude(found, found.amplitude * (freq_hz / radio.centre_hz))
-    return found.select(measured_pairs(layout)[found.tx, found.rx])
 
 
 def _with_amplitude(paths: PathSet, amplitude: np.ndarray) -> PathSet:

@@ -12,6 +12,7 @@ import sionna.rt as rt
 from sionna.rt.radio_materials.itu import itu_material
 
 from dataset_factory.bundle import Bundle
+from dataset_factory.trace.movers import Movers
 from rfgs_core.errors import RfgsError
 from rfgs_core.radio import Layout, Radio
 from rfgs_core.radio.constants import VACUUM_PERMITTIVITY
@@ -19,7 +20,7 @@ from rfgs_core.radio.layout import DevicePose, rotation
 from rfgs_core.radio.materials import MATERIALS
 from rfgs_core.radio.tissue import normal_reflection, skin_conductivity, skin_permittivity
 
-#: Name of the one object that holds everything that moves.
+#: Name of the one object that holds everything that moves and scatters from points.
 BODY = "moving"
 
 
@@ -91,36 +92,73 @@ def mesh(name: str, vertices: np.ndarray, faces: np.ndarray) -> mi.Mesh:
     return result
 
 
-def static_scene(bundle: Bundle, radio: Radio, freq_hz: float | None = None) -> rt.Scene:
-    """Builds the scene without anything that moves, shapes kept apart.
+def environment_scene(bundle: Bundle, radio: Radio, vehicles: Movers | None = None) -> rt.Scene:
+    """Builds the scene without people, shapes kept apart.
 
     Args:
         bundle: Scene bundle.
-        radio: Gives antenna pattern, polarisation and the default frequency.
-        freq_hz: Frequency of material properties [Hz]; None takes the band's centre.
+        radio: Gives antenna pattern, polarisation and the frequency, its band's centre.
+        vehicles: Rigid metal, put in its rest pose until `move_vehicles`; None for none.
     """
     scene = rt.load_scene(None)
-    set_frequency(scene, radio.centre_hz if freq_hz is None else freq_hz)
+    set_frequency(scene, radio.centre_hz)
     antenna = rt.PlanarArray(
         num_rows=1, num_cols=1, pattern=radio.pattern, polarization=radio.polarization
     )
     scene.tx_array = scene.rx_array = antenna
+    parts = [
+        (f"static-{index}", part.material_index, part.vertices, part.faces)
+        for index, part in enumerate(bundle.static_meshes())
+    ]
+    if vehicles is not None:
+        parts += [
+            (_vehicle_name(int(material)), int(material), vehicles.rest_vertices, faces)
+            for material, faces in _by_material(vehicles)
+        ]
     materials: dict[int, rt.RadioMaterial] = {}
     objects = []
-    for index, part in enumerate(bundle.static_meshes()):
-        if part.material_index not in materials:
-            row = bundle.materials[part.material_index]
-            materials[part.material_index] = radio_material(row, part.material_index)
+    for name, index, vertices, faces in parts:
+        if index not in materials:
+            materials[index] = radio_material(bundle.materials[index], index)
         objects.append(
             rt.SceneObject(
-                mi_mesh=mesh(f"static-{index}", part.vertices, part.faces),
-                name=f"static-{index}",
-                radio_material=materials[part.material_index],
+                mi_mesh=mesh(name, vertices, faces), name=name, radio_material=materials[index]
             )
         )
     if objects:
         scene.edit(add=objects)
     return scene
+
+
+def move_vehicles(scene: rt.Scene, vehicles: Movers, vertices: np.ndarray) -> None:
+    """Puts vehicles where they are at a frame, in place.
+
+    Args:
+        scene: From `environment_scene` with these vehicles.
+        vehicles: The vehicles.
+        vertices: Their vertices [m], shape (V, 3).
+    """
+    names = [_vehicle_name(int(material)) for material, _ in _by_material(vehicles)]
+    move_meshes(scene, dict.fromkeys(names, vertices))
+
+
+def move_meshes(scene: rt.Scene, places: dict[str, np.ndarray]) -> None:
+    """Sets the vertices [m], shape (V, 3), of meshes by name, in place."""
+    params = scene.mi_scene_params
+    for name, vertices in places.items():
+        flat = np.ascontiguousarray(vertices, dtype=np.float32).ravel()
+        params[f"{name}.vertex_positions"] = mi.Float(flat)
+    params.update()
+
+
+def _by_material(vehicles: Movers) -> list[tuple[int, np.ndarray]]:
+    """Triangles of each material; all meshes share the vertices of all vehicles."""
+    found = np.unique(vehicles.material)
+    return [(int(index), vehicles.faces[vehicles.material == index]) for index in found]
+
+
+def _vehicle_name(material: int) -> str:
+    return f"vehicle-{material}"
 
 
 def set_frequency(scene: rt.Scene, freq_hz: float) -> None:

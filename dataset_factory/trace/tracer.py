@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import drjit as dr
-import mitsuba as mi
 import numpy as np
 import sionna.rt as rt
 
@@ -16,17 +15,21 @@ from dataset_factory.bundle import Bundle, BundleFrame
 from dataset_factory.trace.bounces import BUFFER, Bounces, with_facets
 from dataset_factory.trace.direct import PosedPoints, direct_channel
 from dataset_factory.trace.environment import (
+    Environment,
     environment_channel,
-    environment_paths,
     node_frequencies,
 )
+from dataset_factory.trace.movers import split_movers
+from dataset_factory.trace.paths import PathSet
 from dataset_factory.trace.points import SurfacePoints, surface_points
 from dataset_factory.trace.scene import (
     BODY,
     check_materials,
+    environment_scene,
     half_space_reflection,
     mesh,
-    static_scene,
+    move_meshes,
+    move_vehicles,
 )
 from dataset_factory.trace.shadow import Shadow, coarse_mesh, transmission
 from dataset_factory.trace.steering import steer
@@ -42,6 +45,8 @@ FLUSH_EVERY = 10
 
 class Tracer:
     """Traces one radio through one bundle: H = H_environment · shadow + H_people.
+
+    Vehicles are part of the environment, which is traced again for every frame if there are any.
 
     Example:
         tracer = Tracer(bundle, preset("wifi"), devices)
@@ -69,13 +74,12 @@ class Tracer:
             seed: Root seed; rays and points depend on it, frames do not.
 
         Raises:
-            RfgsError: A material does not hold in the radio's band, something moves that
-                cannot be traced, or the depth is not 1, 2 or 3.
+            RfgsError: A material does not hold in the radio's band, or the depth is not 1, 2
+                or 3.
         """
         if depth != 1 and depth not in BUFFER:
             raise RfgsError(f"trace depth {depth}: expected 1, 2 or 3")
         check_materials(bundle, radio)
-        _check_movers(bundle)
         self._bundle, self._radio, self._devices = bundle, radio, devices
         self._shadow: Shadow = shadow
         self._seed = seed
@@ -84,14 +88,20 @@ class Tracer:
         self.timings: dict[str, float] = dict.fromkeys(
             ("environment", "shadow", "people_direct", "people_bounces"), 0.0
         )
+        self._people, self._vehicles = split_movers(bundle)
+        rays = sub_seed(seed, "environment")
         with self._timed("environment"):
-            self._environment = environment_paths(
-                bundle, radio, self._layout, devices, sub_seed(seed, "environment")
-            )
+            environment = Environment(bundle, radio, self._layout, devices, rays)
+            self._static_paths = environment.paths()
+            if len(self._vehicles):
+                environment = Environment(
+                    bundle, radio, self._layout, devices, rays, self._vehicles
+                )
+        self._environment = environment
         self._frames_done = 0
         self._points = self._make_points()
         self._outlines = self._make_outlines()
-        self._scene = static_scene(bundle, radio)
+        self._scene = environment_scene(bundle, radio, self._vehicles)
         self._bounces: Bounces | None = None
         if self._points is not None:
             self._add_body()
@@ -102,7 +112,7 @@ class Tracer:
 
     def static(self) -> np.ndarray:
         """Channel without anything that moves, complex64, shape (tx, rx, subcarrier)."""
-        channel = environment_channel(self._environment, self._radio, self._layout)
+        channel = environment_channel(self._static_paths, self._radio, self._layout)
         return channel.astype(np.complex64)
 
     def samples(self, frame: BundleFrame) -> np.ndarray:
@@ -122,14 +132,15 @@ class Tracer:
         Returns:
             Complex64, shape (tx, rx, subcarrier), zero where a link is not measured.
         """
+        paths = self._paths_at(frame)
         if self._points is None:
-            return self.static()
+            self._flush()
+            return environment_channel(paths, self._radio, self._layout).astype(np.complex64)
+        vertices = self._people.posed(frame)
         with self._timed("shadow"):
-            bodies = [(frame.vertices[kept], faces) for kept, faces in self._outlines]
-            passed = transmission(
-                self._environment, self._layout, bodies, self._nodes, self._shadow
-            )
-            channel = environment_channel(self._environment, self._radio, self._layout, passed)
+            bodies = [(vertices[kept], faces) for kept, faces in self._outlines]
+            passed = transmission(paths, self._layout, bodies, self._nodes, self._shadow)
+            channel = environment_channel(paths, self._radio, self._layout, passed)
         self._move(frame)
         points = self._posed(frame)
         with self._timed("people_direct"):
@@ -148,6 +159,13 @@ class Tracer:
         self._flush()
         return channel.astype(np.complex64)
 
+    def _paths_at(self, frame: BundleFrame) -> PathSet:
+        """Paths without people at a frame."""
+        if not len(self._vehicles):
+            return self._static_paths
+        with self._timed("environment"):
+            return self._environment.paths(self._vehicles.posed(frame))
+
     def _bounced(self, points: PosedPoints, bounces: Bounces) -> np.ndarray:
         """People's paths by way of walls, shape (tx, rx, subcarrier)."""
         paths = with_facets(
@@ -162,7 +180,7 @@ class Tracer:
     def _posed(self, frame: BundleFrame) -> PosedPoints:
         """Scattering points at a frame."""
         assert self._points is not None
-        positions, normals = self._points.at(frame.vertices)
+        positions, normals = self._points.at(self._people.posed(frame))
         return PosedPoints(positions, normals, self._points.areas, self._points.material)
 
     def _gamma(self, freq_hz: np.ndarray) -> dict[int, np.ndarray]:
@@ -176,43 +194,41 @@ class Tracer:
         }
 
     def _make_points(self) -> SurfacePoints | None:
-        """Points on everything that moves; None if nothing does."""
-        topology = self._bundle.topology
-        if not len(topology.faces):
+        """Points on everything that scatters from points; None if nothing does."""
+        people = self._people
+        if not len(people):
             return None
         return surface_points(
-            topology.rest_vertices,
-            topology.faces,
-            topology.material,
-            topology.instance,
+            people.rest_vertices,
+            people.faces,
+            people.material,
+            people.instance,
             SPEED_OF_LIGHT / self._radio.freq_max_hz,
             sub_seed(self._seed, "points"),
         )
 
     def _make_outlines(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """Vertices kept and triangles of the coarse mesh of each instance."""
-        topology = self._bundle.topology
+        people = self._people
         return [
-            coarse_mesh(topology.rest_vertices, topology.faces[topology.instance == instance])
-            for instance in np.unique(topology.instance)
+            coarse_mesh(people.rest_vertices, people.faces[people.instance == instance])
+            for instance in np.unique(people.instance)
         ]
 
     def _add_body(self) -> None:
-        """Adds everything that moves as one absorber, in its rest pose."""
-        topology = self._bundle.topology
+        """Adds everything that scatters from points as one absorber, in its rest pose."""
         body = rt.SceneObject(
-            mi_mesh=mesh(BODY, topology.rest_vertices, topology.faces),
+            mi_mesh=mesh(BODY, self._people.rest_vertices, self._people.faces),
             name=BODY,
             radio_material=rt.AbsorberRadioMaterial(name="absorber"),
         )
         self._scene.edit(add=body)
 
     def _move(self, frame: BundleFrame) -> None:
-        """Puts the body where it is at a frame, in place."""
-        params = self._scene.mi_scene_params
-        vertices = np.ascontiguousarray(frame.vertices, dtype=np.float32)
-        params[f"{BODY}.vertex_positions"] = mi.Float(vertices.ravel())
-        params.update()
+        """Puts people and vehicles where they are at a frame, in place."""
+        move_meshes(self._scene, {BODY: self._people.posed(frame)})
+        if len(self._vehicles):
+            move_vehicles(self._scene, self._vehicles, self._vehicles.posed(frame))
 
     def _flush(self) -> None:
         """Drops what Dr.Jit keeps of past frames, every few frames."""
@@ -229,17 +245,3 @@ class Tracer:
             yield
         finally:
             self.timings[stage] += time.perf_counter() - start
-
-
-def _check_movers(bundle: Bundle) -> None:
-    """Refuses moving objects that the people's model does not fit.
-
-    Raises:
-        RfgsError: Naming the object.
-    """
-    for row in bundle.objects:
-        if row["moving"] and row["class"] == "vehicle":
-            raise RfgsError(
-                f"{bundle.path}: object {row['name']!r} is a moving vehicle; moving metal is not "
-                "traced yet, so mark it `ignore` or `static` in its radio properties"
-            )

@@ -52,8 +52,8 @@ def run(args: TrainArgs) -> int:
     from rfgs_core.frames import chosen_frames
     from rfgs_core.render.shader import ShaderConfig
     from rfgs_core.render.view import fit_run_shader
+    from rfgs_core.run.training import train_sequence
     from rfgs_core.seeds import sub_seed
-    from rfgs_core.train.sequence import train_sequence
 
     config = TrainConfig.of_recipe(args.recipe, args.objective, args.seed)
     if args.iterations is not None:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Complex64, Float32, Float64, Int32, UInt8, UInt16
 
+from rfgs_core.arrays import load_arrays
 from rfgs_core.dataset.csi_store import open_csi, read_csi
 from rfgs_core.dataset.impaired_store import Impaired, read_draw, read_impaired
 from rfgs_core.dataset.mesh_ply import read_mesh
@@ -30,6 +30,8 @@ from rfgs_core.radio import DevicePose, Layout, Radio, frame_samples, layout
 
 if TYPE_CHECKING:
     import xarray
+
+_NO_GEOMETRY = "the geometry of this dataset is missing or damaged, make the dataset again"
 
 
 def open_dataset(path: Path | str) -> Dataset:
@@ -257,9 +259,13 @@ class Sequence:
         Int32[np.ndarray, "face"],
     ]:
         """Vertices [m], triangles and instance id per triangle of what moves."""
+        shapes = {"faces": ("face", 3), "instance": ("face",)}
+        topology = load_arrays(self.files.topology, _NO_GEOMETRY, shapes)
         vertices = self._geometry(frame)["vertices"]
-        topology = _arrays(self.files.topology)
-        return vertices, topology["faces"], topology["instance"]
+        faces = topology["faces"]
+        if faces.size and not 0 <= faces.min() <= faces.max() < len(vertices):
+            raise RfgsFormatError(f"{self.files.topology}: expected triangles of existing vertices")
+        return vertices, faces, topology["instance"]
 
     def static_mesh(self) -> tuple[Float32[np.ndarray, "vertex 3"], Int32[np.ndarray, "face 3"]]:
         """Vertices [m] and triangles of what stands still."""
@@ -336,17 +342,8 @@ class Sequence:
 
     def _geometry(self, frame: int) -> dict[str, np.ndarray]:
         self._index(frame)
-        return _arrays(self.files.geometry(frame))
-
-
-def _arrays(path: Path) -> dict[str, np.ndarray]:
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            return {name: stored[name] for name in stored.files}
-    except FileNotFoundError as error:
-        raise RfgsFormatError(f"{path}: no such file; this dataset holds no geometry") from error
-    except (ValueError, EOFError, OSError, zipfile.BadZipFile) as error:
-        raise RfgsFormatError(f"{path}: damaged array file ({error})") from error
+        shapes = {"vertices": ("vertex", 3), "joints": ("person", 17, 3)}
+        return load_arrays(self.files.geometry(frame), _NO_GEOMETRY, shapes)
 
 
 def _plane(path: Path, channel: str) -> Float32[np.ndarray, "h w"]:

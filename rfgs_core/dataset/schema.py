@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 from dataclasses import MISSING, asdict, dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from jaxtyping import Float64
@@ -14,6 +14,7 @@ from jaxtyping import Float64
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.files import read_json
 from rfgs_core.radio import DevicePose, Radio
+from rfgs_core.radio.presets import OwnLinks
 
 DATASET_SCHEMA = "rfgs-dataset/1"
 SEQUENCE_SCHEMA = "rfgs-sequence/1"
@@ -128,15 +129,27 @@ def read_sequence_info(path: Path) -> SequenceInfo:
         RfgsFormatError: The file does not keep to its schema.
     """
     info = SequenceInfo(**_fields(path, SequenceInfo, SEQUENCE_SCHEMA))
+    if not all(isinstance(row, dict) for row in (*info.cameras, *info.radios.values())):
+        raise RfgsFormatError(f"{path}: cameras and radios: expected JSON objects")
     for name in [*info.radios, *(row.get("name") for row in info.cameras)]:
         check_name(path, name)
-    if not info.frames or sorted(set(info.frames)) != info.frames or info.fps <= 0:
+    whole = all(type(frame) is int for frame in info.frames)
+    if not whole or not info.frames or sorted(set(info.frames)) != info.frames or info.fps <= 0:
         raise RfgsFormatError(f"{path}: expected ascending frame numbers and fps > 0")
-    if np.shape(info.bounds_m) != (2, 3):
+    if not _are_bounds(info.bounds_m):
         raise RfgsFormatError(f"{path}: bounds_m: expected [[min xyz], [max xyz]]")
     if set(info.radios) != set(info.devices):
         raise RfgsFormatError(f"{path}: radios and devices name different radios")
     return info
+
+
+def _are_bounds(rows: list[Any]) -> bool:
+    """Whether a JSON list is minimum and maximum of a box."""
+    try:
+        low, high = np.asarray(rows, dtype=np.float64).reshape(2, 3)
+    except (TypeError, ValueError):
+        return False
+    return bool(np.isfinite([low, high]).all() and (low < high).all())
 
 
 def check_name(path: Path, name: Any) -> None:
@@ -156,22 +169,44 @@ def radio_from_json(path: Path, values: dict[str, Any]) -> Radio:
     """Builds a radio from the fields stored in a sequence.
 
     Raises:
-        RfgsFormatError: A field is missing or unknown.
+        RfgsFormatError: A field is missing, unknown or of another type.
     """
+    fixed: dict[str, Any] = {
+        key: tuple(v) if isinstance(v, list) else v for key, v in values.items()
+    }
+    links = get_args(OwnLinks)
+    for spec in fields(Radio):
+        kind = str(spec.type).partition("[")[0]
+        value = fixed.get(spec.name, spec.default)
+        fits = value in links if kind == "OwnLinks" else isinstance(value, _TYPES.get(kind, object))
+        if spec.name in fixed and not fits:
+            raise RfgsFormatError(
+                f"{path}: radio {fixed.get('name')!r}: {spec.name}: expected "
+                f"{' or '.join(links) if kind == 'OwnLinks' else spec.type}, got {value!r}"
+            )
     try:
-        fixed: dict[str, Any] = {
-            key: tuple(v) if isinstance(v, list) else v for key, v in values.items()
-        }
         return Radio(**fixed)
     except TypeError as error:
         raise RfgsFormatError(f"{path}: radios: {error}") from error
 
 
 def device_pose(values: dict[str, Any]) -> DevicePose:
-    """Builds a device's pose from the fields stored in a sequence or bundle."""
-    x, y, z = (float(value) for value in values["position_m"])
-    w, i, j, k = (float(value) for value in values["quat_wxyz"])
-    return DevicePose(values["name"], (x, y, z), (w, i, j, k))
+    """Builds a device's pose from the fields stored in a sequence or bundle.
+
+    Raises:
+        RfgsFormatError: A field is missing, or the numbers are no position and rotation.
+    """
+    try:
+        x, y, z = (float(value) for value in values["position_m"])
+        w, i, j, k = (float(value) for value in values["quat_wxyz"])
+        name = str(values["name"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise RfgsFormatError(
+            f"device {values!r}: expected name, position_m [m] and quat_wxyz ({error})"
+        ) from error
+    if not np.isfinite([x, y, z, w, i, j, k]).all() or not np.any([w, i, j, k]):
+        raise RfgsFormatError(f"device {name!r}: expected finite numbers and a rotation")
+    return DevicePose(name, (x, y, z), (w, i, j, k))
 
 
 def bounds_array(info: SequenceInfo) -> Float64[np.ndarray, "2 3"]:

@@ -8,7 +8,6 @@ finished `SplatPlan` and features without gradient, so pictures cannot reach the
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,8 +17,8 @@ import torch
 from jaxtyping import Bool, Float, Float32
 from torch import Tensor
 
+from rfgs_core.arrays import load_arrays, save_arrays
 from rfgs_core.errors import RfgsError, RfgsFormatError
-from rfgs_core.files import replacing
 from rfgs_core.gaussians.model import FEATURE_DIM
 from rfgs_core.render.rasterizer import SplatPlan
 from rfgs_core.seeds import sub_seed
@@ -55,9 +54,7 @@ class Shader:
 
     def save(self, path: Path) -> None:
         """Writes `shader.npz` in one step."""
-        arrays = {name: getattr(self, name).detach().numpy() for name in _SHAPES}
-        with replacing(path) as temporary:
-            np.savez(temporary, **arrays)
+        save_arrays(path, {name: getattr(self, name).detach().numpy() for name in _SHAPES})
 
     @staticmethod
     def load(path: Path) -> Shader:
@@ -67,19 +64,10 @@ class Shader:
             RfgsError: The file does not exist.
             RfgsFormatError: It is damaged, or its matrices have other shapes or are not finite.
         """
-        try:
-            with np.load(path, allow_pickle=False) as stored:
-                arrays = {name: np.asarray(stored[name], np.float32) for name in _SHAPES}
-        except FileNotFoundError as error:
-            raise RfgsError(f"{path}: no such file; no shader has been fitted") from error
-        except (KeyError, ValueError, EOFError, OSError, zipfile.BadZipFile) as error:
-            raise RfgsFormatError(f"{path}: not a whole shader file ({error})") from error
-        for name, shape in _SHAPES.items():
-            if arrays[name].shape != shape or not np.isfinite(arrays[name]).all():
-                raise RfgsFormatError(
-                    f"{path}: {name} has shape {arrays[name].shape}, expected finite {shape}"
-                )
-        return Shader(**{name: torch.from_numpy(value) for name, value in arrays.items()})
+        arrays = load_arrays(path, "fit the shader again with `rfgs train`", _SHAPES)
+        return Shader(
+            **{name: torch.from_numpy(arrays[name].astype(np.float32)) for name in _SHAPES}
+        )
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ into the features changes them by the smallest amount that does it.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,7 @@ import torch
 from jaxtyping import Complex, Float
 from torch import Tensor
 
+from rfgs_core.arrays import Shape
 from rfgs_core.gaussians import FEATURE_DIM, Gaussians
 from rfgs_core.propagation import RadioGaussians
 
@@ -24,6 +26,14 @@ from rfgs_core.propagation import RadioGaussians
 SHARPNESS = 6.0
 #: ρ starts where k · 2 · s · ρ has this value: larger ones let nothing reflect.
 START_PHASE_SPREAD = 0.5
+
+
+#: Shapes of the arrays of a head in a file.
+HEAD_SHAPES: dict[str, Shape] = {
+    "directions": (3, FEATURE_DIM),
+    "gamma_scale_m": (),
+    "rho_logit": (),
+}
 
 
 @dataclass(frozen=True)
@@ -44,6 +54,23 @@ class RadioHead:
         directions = torch.from_numpy(np.linalg.qr(matrix)[0].T.copy()).float()
         rho = min(START_PHASE_SPREAD * wavelength_m / (4 * math.pi * scale_m), 0.99)
         return RadioHead(directions, gamma_scale_m, math.log(rho / (1 - rho)))
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """The head as arrays for a file, named as its fields."""
+        return {
+            "directions": self.directions.numpy(),
+            "gamma_scale_m": np.array(self.gamma_scale_m),
+            "rho_logit": np.array(self.rho_logit),
+        }
+
+    @staticmethod
+    def of_arrays(arrays: Mapping[str, np.ndarray], prefix: str = "") -> RadioHead:
+        """The head that `arrays` wrote; `prefix` stands before each name."""
+        return RadioHead(
+            torch.from_numpy(arrays[f"{prefix}directions"]),
+            float(arrays[f"{prefix}gamma_scale_m"]),
+            float(arrays[f"{prefix}rho_logit"]),
+        )
 
     def gamma(self, features: Float[Tensor, "M 32"]) -> Complex[Tensor, "M"]:
         """Complex reflectivity [m]."""

@@ -10,8 +10,14 @@ import torch
 from jaxtyping import Bool
 from torch import Tensor
 
+from rfgs_core.arrays import Shape
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.gaussians import Gaussians
+
+#: Shapes of the arrays of Gaussians in a file.
+GAUSSIAN_SHAPES: dict[str, Shape] = {
+    name: ("M", *value.shape[1:]) for name, value in Gaussians.none().items()
+}
 
 _STATE = ("exp_avg", "exp_avg_sq")
 
@@ -99,21 +105,23 @@ class TrainableGaussians:
         """Rebuilds what `state` returned, bit for bit.
 
         Raises:
-            RfgsFormatError: An array is missing.
+            RfgsFormatError: An array is missing, or a moment does not fit its parameter.
         """
         try:
-            fields = {
-                name: torch.from_numpy(arrays[name].copy()) for name, _ in Gaussians.none().items()
-            }
-            edited = bool(arrays["edited"])
+            fields = {name: torch.from_numpy(arrays[name].copy()) for name in GAUSSIAN_SHAPES}
+            result = TrainableGaussians(Gaussians(**fields), rates)
+            result.edited = bool(arrays["edited"])
+            for name, leaf in result.leaves.items():
+                if f"{name}.step" in arrays:
+                    result.optimiser.state[leaf] = {
+                        key: torch.from_numpy(arrays[f"{name}.{key}"].copy())
+                        for key in (*_STATE, "step")
+                    }
+                    if any(result.optimiser.state[leaf][key].shape != leaf.shape for key in _STATE):
+                        raise RfgsFormatError(
+                            f"checkpoint whose moments of {name} have another shape than "
+                            f"{tuple(leaf.shape)}; delete it to start over"
+                        )
         except KeyError as error:
             raise RfgsFormatError(f"checkpoint without {error}; delete it to start over") from error
-        result = TrainableGaussians(Gaussians(**fields), rates)
-        result.edited = edited
-        for name, leaf in result.leaves.items():
-            if f"{name}.step" in arrays:
-                result.optimiser.state[leaf] = {
-                    key: torch.from_numpy(arrays[f"{name}.{key}"].copy())
-                    for key in (*_STATE, "step")
-                }
         return result

@@ -12,17 +12,17 @@ import torch
 from jaxtyping import Complex, Float
 from torch import Tensor
 
+from rfgs_core.arrays import load_arrays, save_arrays
 from rfgs_core.errors import RfgsError
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.seeds import sub_seed
-from rfgs_core.train.arrays import load_arrays, save_arrays
 from rfgs_core.train.channel import Channel
 from rfgs_core.train.config import TrainConfig
 from rfgs_core.train.density import DensityRule, PaperDensity
 from rfgs_core.train.frame import FrameState, noise_per_link, target_of
 from rfgs_core.train.losses import SamplePoints, channel_loss, paper_loss
 from rfgs_core.train.observations import Observations
-from rfgs_core.train.parameters import LearningRates, TrainableGaussians
+from rfgs_core.train.parameters import GAUSSIAN_SHAPES, LearningRates, TrainableGaussians
 from rfgs_core.train.sampling import sample_points
 
 #: Our rates for the channel loss: positions move by fractions of a wavelength.
@@ -142,7 +142,11 @@ def _resume(
 ) -> tuple[TrainableGaussians, int]:
     if checkpoint is None or not checkpoint.exists():
         return TrainableGaussians(start, rates), 0
-    arrays = load_arrays(checkpoint, "delete it to start this frame over")
+    arrays = load_arrays(
+        checkpoint,
+        "delete it to start this frame over",
+        {**GAUSSIAN_SHAPES, "edited": (), "finished_steps": ()},
+    )
     return TrainableGaussians.restore(arrays, rates), int(arrays["finished_steps"])
 
 

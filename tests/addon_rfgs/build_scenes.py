@@ -237,6 +237,22 @@ def driver() -> None:
     text.use_module = True
 
 
+def vehicles() -> None:
+    """A cart of two meshes with a nominal surface, and a trolley without one."""
+    room()
+    for name, y, surface_m2 in (("cart", 1.0, 7.5), ("trolley", 1.6, 0.0)):
+        root = bpy.data.objects.new(name, None)
+        bpy.context.scene.collection.objects.link(root)
+        body = box(f"{name}_body", (0, 0, 0.1), (0.6, 0.4, 0.5), "Steel")
+        wheel = box(f"{name}_wheel", (0.1, 0, 0), (0.2, 0.05, 0.1), "rubber")
+        for item in (body, wheel):
+            item.parent, item.rfgs.object_class, item.rfgs.instance = root, "VEHICLE", name
+        wheel.rfgs.surface_m2 = surface_m2
+        for frame in (1, 5):
+            root.location = (-1.5 + 0.2 * frame, y, 0)
+            root.keyframe_insert("location", frame=frame)
+
+
 def big() -> None:
     """A person of 20,000 vertices over 60 frames."""
     room()
@@ -247,7 +263,7 @@ def big() -> None:
 
 SCENES: tuple[Callable[[], None], ...] = (
     room, unit_scale, mirrored, instanced, instanced_moving, topology, still, static_moves,
-    no_range, no_mesh, driver, big,
+    no_range, no_mesh, driver, vehicles, big,
 )  # fmt: skip
 
 

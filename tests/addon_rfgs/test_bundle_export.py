@@ -60,7 +60,8 @@ def test_golden_bundle(room: Bundle) -> None:
     assert (room.frames, room.fps) == ([1, 2, 3, 4, 5], 10.0)
     assert [row["name"] for row in room.objects] == ["body", "crate", "floor"]
     assert [row["moving"] for row in room.objects] == [True, False, False]
-    assert room.instances == [{"id": 1, "name": "body", "class": "person", "person": True}]
+    person = {"id": 1, "name": "body", "class": "person", "person": True}
+    assert room.instances == [{**person, "nominal_surface_m2": None}]
     assert room.topology.rest_vertices.shape == (19 * 8, 3)
     assert room.topology.faces.shape == (19 * 12, 3)
     device = room.devices[0]
@@ -123,6 +124,25 @@ def test_instances_of_a_collection_are_exported(scenes: Path) -> None:
         boxes["stools1_stool"], [[-0.5, -1.5, 0], [-0.2, -1.2, 0.4]], atol=1e-6
     )
     assert "stools0_stool" in boxes
+
+
+def test_vehicles_are_one_instance_each_with_a_surface(scenes: Path) -> None:
+    bundle = read_bundle(scenes / "vehicles")
+    rows = {row["name"]: row for row in bundle.instances}
+    assert {row["class"] for row in rows.values()} == {"person", "vehicle"}
+    assert rows["cart"]["nominal_surface_m2"] == 7.5
+    # 0.6 × 0.4 × 0.5 m: nobody said how large it is, so it counts as its box.
+    assert rows["trolley"]["nominal_surface_m2"] == pytest.approx(1.48)
+    guesses = json.loads((scenes / "vehicles" / "guesses.json").read_text())
+    guessed = [g["object"] for g in guesses if g["what"] == "nominal_surface_m2"]
+    assert guessed == ["trolley"]
+    parts = [row for row in bundle.objects if row["instance"] == rows["cart"]["id"]]
+    assert [row["name"] for row in parts] == ["cart_body", "cart_wheel"]
+    assert all(row["moving"] and row["class"] == "vehicle" for row in parts)
+    kinds = {row["name"]: row["radio_material"] for row in bundle.materials}
+    of_cart = bundle.topology.instance == rows["cart"]["id"]
+    names = {bundle.materials[i]["name"] for i in set(bundle.topology.material[of_cart].tolist())}
+    assert {kinds[name] for name in names} == {"metal", "wood"}
 
 
 @pytest.mark.parametrize(

@@ -52,7 +52,7 @@ def write_bundle(
     *,
     material: str = "plasterboard",
     scattering: float = 0.0,
-    mover_class: str = "person",
+    vehicle: Mesh | None = None,
 ) -> Bundle:
     (folder / "static").mkdir(parents=True)
     (folder / "frames").mkdir()
@@ -61,13 +61,17 @@ def write_bundle(
         files.append(f"static/wall{index}__wall.ply")
         data = trimesh.Trimesh(vertices, faces, process=False).export(file_type="ply")
         (folder / files[-1]).write_bytes(data)
-    vertices, faces = mover or (np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32))
+    nothing = np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32)
+    (body, body_faces), (metal, metal_faces) = mover or nothing, vehicle or nothing
+    vertices = np.concatenate([body, metal])
+    # Instance and material of the same number: 1 a person of skin, 2 a vehicle of metal.
+    kind = np.repeat(np.array([1, 2], np.int32), [len(body_faces), len(metal_faces)])
     np.savez(
         folder / "topology.npz",
-        faces=faces,
-        material=np.full(len(faces), 1, np.int32),
-        instance=np.full(len(faces), 1, np.int32),
-        segment=np.full(len(faces), -1, np.int32),
+        faces=np.concatenate([body_faces, metal_faces + len(body)]).astype(np.int32),
+        material=kind,
+        instance=kind,
+        segment=np.full(len(kind), -1, np.int32),
         rest_vertices=vertices,
     )
     for frame, place in enumerate([(1.7, 2.1, 0.0), (2.2, 1.8, 0.0)], start=1):
@@ -79,9 +83,11 @@ def write_bundle(
             action=np.array(["walk"]),
         )
     row = {"id": 1, "name": "room", "class": "static", "instance": 0, "moving": False}
-    moving = {"id": 2, "name": "mover", "class": mover_class, "instance": 1, "moving": True}
+    moving = {"id": 2, "name": "mover", "class": "person", "instance": 1, "moving": True}
+    driven = {"id": 3, "name": "car", "class": "vehicle", "instance": 2, "moving": True}
     wall = {"name": "wall", "radio_material": material, "thickness_m": 0.0125}
     skin = {"name": "skin", "radio_material": "skin", "thickness_m": 0.3}
+    steel = {"name": "steel", "radio_material": "metal", "thickness_m": 0.002}
     common = {"color": [0.5, 0.5, 0.5], "guessed": False}
     info = {
         "schema": "rfgs-bundle/1",
@@ -99,9 +105,13 @@ def write_bundle(
         "materials": [
             {**wall, **common, "scattering_coefficient": scattering},
             {**skin, **common, "scattering_coefficient": 0.0},
+            {**steel, **common, "scattering_coefficient": 0.0},
         ],
-        "objects": [{**row, "files": files}, {**moving, "files": []}],
-        "instances": [{"id": 1, "name": "mover", "class": mover_class, "person": True}],
+        "objects": [{**row, "files": files}, {**moving, "files": []}, {**driven, "files": []}],
+        "instances": [
+            {"id": 1, "name": "mover", "class": "person", "person": True},
+            {"id": 2, "name": "car", "class": "vehicle", "person": False},
+        ],
     }
     write_json(folder / "bundle.json", info)
     return read_bundle(folder)
@@ -127,6 +137,12 @@ def person_bundle(make_bundle: MakeBundle) -> Bundle:
 def coarse_capsule() -> Mesh:
     """A person-sized ellipsoid of few faces."""
     return capsule(3)
+
+
+@pytest.fixture
+def steel_sheet() -> Mesh:
+    """An upright square of steel, 3 m wide, that faces along y."""
+    return sheet((-1.5, 0, 0.2), (3, 0, 0), (0, 0, 2.4))
 
 
 @pytest.fixture

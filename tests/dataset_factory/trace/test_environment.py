@@ -49,15 +49,15 @@ def test_elements_match_tracing_each_of_them(
 ) -> None:
     import sionna.rt as rt
 
-    from dataset_factory.trace.environment import environment_channel, environment_paths
-    from dataset_factory.trace.scene import centres, static_scene
+    from dataset_factory.trace.environment import Environment, environment_channel
+    from dataset_factory.trace.scene import centres, environment_scene
 
     radio = replace(preset("wifi"), rx_rows=4, rx_cols=4, own_device_links="excluded")
     upright = [replace(device, quat_wxyz=(1.0, 0.0, 0.0, 0.0)) for device in two_devices]
     bundle, elements = make_bundle(), layout(radio, upright)
-    paths = environment_paths(bundle, radio, elements, upright, seed=1)
+    paths = Environment(bundle, radio, elements, upright, seed=1).paths()
     ours = environment_channel(paths, radio, elements)[0, 16:]
-    scene = static_scene(bundle, radio)
+    scene = environment_scene(bundle, radio)
     scene.rx_array = rt.PlanarArray(
         num_rows=4,
         num_cols=4,
@@ -95,9 +95,9 @@ def test_empty_room_is_reciprocal(
 
 
 def test_bounding_boxes_agree_with_sionna(person_bundle: Bundle, small_radio: Radio) -> None:
-    from dataset_factory.trace.scene import static_scene
+    from dataset_factory.trace.scene import environment_scene
 
-    scene = static_scene(person_bundle, small_radio)
+    scene = environment_scene(person_bundle, small_radio)
     meshes = person_bundle.static_meshes()
     assert len(scene.objects) == len(meshes)
     for index, mesh in enumerate(meshes):
@@ -113,15 +113,6 @@ def test_material_outside_its_band_is_refused(
 
     with pytest.raises(RfgsError, match=r"'brick'.*40 GHz.*'mmwave'"):
         Tracer(make_bundle(material="brick"), preset("mmwave"), two_devices)
-
-
-def test_moving_vehicle_is_refused(
-    make_bundle: MakeBundle, small_radio: Radio, two_devices: list[DevicePose]
-) -> None:
-    from dataset_factory.trace import Tracer
-
-    with pytest.raises(RfgsError, match="moving vehicle"):
-        Tracer(make_bundle(mover_class="vehicle"), small_radio, two_devices)
 
 
 def test_unknown_depth_is_refused(

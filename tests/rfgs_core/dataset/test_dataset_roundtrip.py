@@ -146,6 +146,60 @@ def test_camera_names_from_files_stay_inside(copy: Path) -> None:
         open_dataset(copy).sequence()
 
 
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"frames": ["1", "2"]},
+        {"frames": [1.5]},
+        {"frames": [[1]]},
+        {"cameras": ["cam00"]},
+        {"radios": {"wifi": []}},
+        {"bounds_m": [["a", 0, 0], [1, 1, 1]]},
+        {"bounds_m": [[0, 0], [1, 1, 1]]},
+        {"bounds_m": [[0, 0, 0], [1, float("nan"), 1]]},
+    ],
+)
+def test_numbers_that_are_none_are_refused(copy: Path, change: dict) -> None:
+    edit(copy / "tiny/sequence.json", **change)
+    with pytest.raises(RfgsFormatError, match=r"sequence\.json"):
+        open_dataset(copy).sequence()
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("num_subcarriers", "many"), ("own_device_links", "sometimes"), ("tx_rows", None)],
+)
+def test_radios_of_another_type_are_refused(copy: Path, field: str, value: object) -> None:
+    radios = json.loads((copy / "tiny/sequence.json").read_text())["radios"]
+    radios["wifi"][field] = value
+    edit(copy / "tiny/sequence.json", radios=radios)
+    with pytest.raises(RfgsFormatError, match=f"radio 'wifi': {field}: expected .*{value}"):
+        open_dataset(copy).sequence().layout("wifi")
+
+
+@pytest.mark.parametrize(
+    "row",
+    [
+        {"name": "a", "position_m": [0, 0, 0]},
+        {"name": "a", "position_m": [0, 0], "quat_wxyz": [1, 0, 0, 0]},
+        {"name": "a", "position_m": [0, 0, 0], "quat_wxyz": [0, 0, 0, 0]},
+        {"name": "a", "position_m": [0, 0, "x"], "quat_wxyz": [1, 0, 0, 0]},
+        7,
+    ],
+)
+def test_devices_without_a_pose_are_refused(copy: Path, row: object) -> None:
+    edit(copy / "tiny/sequence.json", devices={"wifi": [row]})
+    with pytest.raises(RfgsFormatError, match="device"):
+        open_dataset(copy).sequence().devices("wifi")
+
+
+def test_triangles_of_missing_vertices_are_refused(copy: Path) -> None:
+    file = copy / "tiny/geometry/topology.npz"
+    np.savez(file, faces=np.array([[0, 1, 10**6]]), instance=np.array([1]))
+    with pytest.raises(RfgsFormatError, match="existing vertices"):
+        open_dataset(copy).sequence().moving_mesh(1)
+
+
 def test_pickled_geometry_is_refused(copy: Path) -> None:
     file = copy / "tiny/geometry/000001.npz"
     np.savez(file, vertices=np.array([{"a": 1}], dtype=object))

@@ -17,9 +17,9 @@ from rfgs_core.gaussians import FEATURE_DIM, Gaussians
 from rfgs_core.radio import Radio, layout, place_devices
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.run import Run
+from rfgs_core.run.training import train_sequence
 from rfgs_core.train.config import TrainConfig
 from rfgs_core.train.observations import Observations
-from rfgs_core.train.sequence import train_sequence
 
 BOUNDS_M = np.array([[0.0, 0.0, 0.0], [4.0, 3.5, 2.5]])
 

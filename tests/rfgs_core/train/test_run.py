@@ -12,6 +12,7 @@ import pytest
 import torch
 import zarr
 
+from rfgs_core.arrays import load_arrays, save_arrays
 from rfgs_core.dataset.names import SequenceFiles
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.files import read_json, write_json
@@ -130,6 +131,43 @@ def test_settings_without_a_needed_entry_are_refused(own_run: Path) -> None:
     write_json(own_run / "config.json", config)
     with pytest.raises(RfgsFormatError, match=r"config\.json: .*frames"):
         open_run(own_run)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("frames", []),
+        ("frames", ["../../elsewhere"]),
+        ("frames", 7),
+        ("frames", [1.5]),
+        ("radio", 3),
+        ("dataset", None),
+    ],
+)
+def test_settings_of_another_type_are_refused(own_run: Path, name: str, value: object) -> None:
+    write_json(own_run / "config.json", {**read_json(own_run / "config.json"), name: value})
+    with pytest.raises(RfgsFormatError, match=rf"config\.json: {name}: expected"):
+        open_run(own_run)
+
+
+def test_features_of_other_gaussians_are_refused(own_run: Path) -> None:
+    file = own_run / "gaussians" / "000001.features.npz"
+    arrays = load_arrays(file, "")
+    save_arrays(file, {name: value[:-1] for name, value in arrays.items()})
+    with pytest.raises(RfgsFormatError, match=r"000001\.ply: holds \d+ Gaussians, but .* of \d+"):
+        open_run(own_run).moving(1)
+    save_arrays(file, {**arrays, "features": arrays["features"][:, :5]})
+    with pytest.raises(RfgsFormatError, match=r"features has shape .*; train this run again"):
+        open_run(own_run).moving(1)
+
+
+def test_a_head_without_an_array_is_refused(own_run: Path) -> None:
+    file = own_run / "radio_head.npz"
+    arrays = load_arrays(file, "")
+    del arrays["rho_logit"]
+    save_arrays(file, arrays)
+    with pytest.raises(RfgsFormatError, match=r"radio_head\.npz: .*missing rho_logit; train"):
+        _ = open_run(own_run).head
 
 
 def test_a_changed_dataset_is_refused(own_run: Path) -> None:

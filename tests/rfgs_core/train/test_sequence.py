@@ -21,8 +21,8 @@ from rfgs_core.gaussians.ply import read_ply
 from rfgs_core.render.shader import ShaderConfig
 from rfgs_core.render.view import fit_run_shader
 from rfgs_core.run import Run, open_run
+from rfgs_core.run import training as training_module
 from rfgs_core.train import refine as refine_module
-from rfgs_core.train import sequence as sequence_module
 from rfgs_core.train.observations import observe
 
 RESULTS = [
@@ -134,14 +134,14 @@ def test_a_stopped_run_ends_where_an_undisturbed_one_does(
     out = tmp_path / "run"
     with monkeypatch.context() as patch:
         if when == "before frame 2":
-            real = sequence_module.observe
+            real = training_module.observe
 
             def stop(sequence, radio, frame):
                 if frame == 2:
                     raise KeyboardInterrupt
                 return real(sequence, radio, frame)
 
-            patch.setattr(sequence_module, "observe", stop)
+            patch.setattr(training_module, "observe", stop)
         else:
             patch.setattr(refine_module, "CHECKPOINT_EVERY", 2)
             real_loss, calls = refine_module.channel_loss, []

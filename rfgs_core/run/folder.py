@@ -13,19 +13,21 @@ import numpy as np
 import torch
 from jaxtyping import Complex64
 
+from rfgs_core.arrays import Shape, load_arrays
 from rfgs_core.dataset import Sequence, open_dataset
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.files import read_json
-from rfgs_core.gaussians import Gaussians
+from rfgs_core.gaussians import FEATURE_DIM, Gaussians
 from rfgs_core.gaussians.ply import read_ply
-from rfgs_core.train.arrays import load_arrays
 from rfgs_core.train.channel import Channel
-from rfgs_core.train.head import RadioHead
+from rfgs_core.train.head import HEAD_SHAPES, RadioHead
 from rfgs_core.train.observations import observe
 
 #: Schema of `config.json`.
 SCHEMA = "rfgs-run/1"
 _NEEDED = ("dataset", "dataset_fingerprint", "sequence", "radio", "frames")
+_REMEDY = "train this run again"
+_ATTRIBUTES: dict[str, Shape] = {"features": ("M", FEATURE_DIM), "rf_power_db": ("M",)}
 
 
 @dataclass(frozen=True)
@@ -68,7 +70,7 @@ class Run:
         path = self.path / "gaussians" / f"{frame:06d}.features.npz"
         if not path.exists():
             raise RfgsError(f"{self.path} holds no frame {frame}; it has {self.frames}")
-        return load_arrays(path, "train this run again")
+        return load_arrays(path, _REMEDY, _ATTRIBUTES)
 
     def gaussians(self, frame: int) -> Gaussians:
         """Static Gaussians, then the moving ones of a frame."""
@@ -83,17 +85,19 @@ class Run:
     def moving(self, frame: int) -> Gaussians:
         """Moving Gaussians of a frame with their features."""
         features = self.attributes(frame)["features"]
-        return read_ply(self.ply_path(frame)).to_gaussians(features)
+        cloud = read_ply(self.ply_path(frame))
+        if len(cloud) != len(features):
+            raise RfgsFormatError(
+                f"{self.ply_path(frame)}: holds {len(cloud)} Gaussians, but there are features of "
+                f"{len(features)}; {_REMEDY}"
+            )
+        return cloud.to_gaussians(features)
 
     @property
     def head(self) -> RadioHead:
         """Decodes reflectivities from features."""
-        stored = load_arrays(self.path / "radio_head.npz", "train this run again")
-        return RadioHead(
-            torch.from_numpy(stored["directions"]),
-            float(stored["gamma_scale_m"]),
-            float(stored["rho_logit"]),
-        )
+        stored = load_arrays(self.path / "radio_head.npz", _REMEDY, HEAD_SHAPES)
+        return RadioHead.of_arrays(stored)
 
     def predict(self, frame: int) -> Complex64[np.ndarray, "tx rx subcarrier"]:
         """Predicted csi − csi_static on every measured link, held-out ones included."""
@@ -146,4 +150,20 @@ def open_run(path: Path) -> Run:
             f"{path / 'config.json'}: expected entries {', '.join(missing)}, which are missing; "
             "train again"
         )
+    frames = config["frames"]
+    if (
+        not isinstance(frames, list)
+        or not frames
+        or not all(type(number) is int for number in frames)
+    ):
+        raise RfgsFormatError(
+            f"{path / 'config.json'}: frames: expected a list of numbers, found {frames!r}; "
+            "train again"
+        )
+    for name in _NEEDED[:-1]:
+        if not isinstance(config[name], str):
+            raise RfgsFormatError(
+                f"{path / 'config.json'}: {name}: expected a text, found {config[name]!r}; "
+                "train again"
+            )
     return Run(path, config)

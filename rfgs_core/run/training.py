@@ -12,20 +12,29 @@ import numpy as np
 import torch
 from tqdm import tqdm
 
+from rfgs_core.arrays import Shape, load_arrays, save_arrays
 from rfgs_core.dataset import Dataset, Sequence
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json, write_json
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.gaussians.ply import cloud_of, read_ply, write_ply
-from rfgs_core.run import SCHEMA, Run, open_run, relative_dataset
+from rfgs_core.run.folder import SCHEMA, Run, open_run, relative_dataset
 from rfgs_core.seeds import sub_seed
 from rfgs_core.threads import one_torch_thread
-from rfgs_core.train.arrays import load_arrays, save_arrays
 from rfgs_core.train.config import TrainConfig
 from rfgs_core.train.frame import FrameState, solve_reflectivity, start_frame
-from rfgs_core.train.head import RadioHead
+from rfgs_core.train.head import HEAD_SHAPES, RadioHead
 from rfgs_core.train.observations import observe
+from rfgs_core.train.parameters import GAUSSIAN_SHAPES
 from rfgs_core.train.refine import refine
+
+_CHECKPOINT: dict[str, Shape] = {
+    **GAUSSIAN_SHAPES,
+    "power": ("M",),
+    "axes_xy": ("body", 2),
+    "track_id": ("M",),
+    **{f"head.{name}": shape for name, shape in HEAD_SHAPES.items()},
+}
 
 
 def train_sequence(
@@ -135,11 +144,7 @@ def _store(run: Run, frame: int, state: FrameState) -> None:
     static = run.path / "gaussians" / "static.ply"
     if not static.exists():
         write_ply(static, cloud_of(Gaussians.none()))
-    head = {
-        "directions": state.head.directions.numpy(),
-        "gamma_scale_m": np.array(state.head.gamma_scale_m),
-        "rho_logit": np.array(state.head.rho_logit),
-    }
+    head = state.head.arrays()
     save_arrays(run.path / "radio_head.npz", head)
     arrays = {name: value.numpy() for name, value in state.gaussians.items()}
     arrays |= {"power": state.power.numpy(), "axes_xy": state.axes_xy, "track_id": state.track_id}
@@ -152,17 +157,12 @@ def _finished(run: Run, frame: int) -> FrameState | None:
     path = _state_path(run, frame)
     if not path.exists():
         return None
-    arrays = load_arrays(path, "delete it to fit this frame again")
-    fields = {name: torch.from_numpy(arrays[name]) for name, _ in Gaussians.none().items()}
-    head = RadioHead(
-        torch.from_numpy(arrays["head.directions"]),
-        float(arrays["head.gamma_scale_m"]),
-        float(arrays["head.rho_logit"]),
-    )
+    arrays = load_arrays(path, "delete it to fit this frame again", _CHECKPOINT)
+    fields = {name: torch.from_numpy(arrays[name]) for name in GAUSSIAN_SHAPES}
     return FrameState(
         gaussians=Gaussians(**fields),
         power=torch.from_numpy(arrays["power"]),
-        head=head,
+        head=RadioHead.of_arrays(arrays, "head."),
         axes_xy=arrays["axes_xy"],
         track_id=arrays["track_id"],
     )

@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import bmesh
 import bpy
 import numpy as np
 
-from blender_scenes.body import Body
-from blender_scenes.clothes import Cut, cuts, limb_weights, surface_of
-from blender_scenes.surfaces import material
+from blender_scenes.people.body import Body
+from blender_scenes.people.clothes import Cut, Look, cuts, limb_weights, surface_of
+from blender_scenes.surfaces import SURFACES, material, new_material
 
 #: Share of the body's triangles that is kept.
 DETAIL = 0.30
@@ -26,24 +28,55 @@ _NEXT = {
 }
 
 
-def build_character(name: str, body: Body, collection: bpy.types.Collection) -> bpy.types.Object:
-    """Builds the armature `name` and its skinned mesh; returns the armature object."""
+def build_character(
+    name: str, body: Body, collection: bpy.types.Collection, look: Look | None = None
+) -> bpy.types.Object:
+    """Builds the armature `name` and its skinned mesh.
+
+    Args:
+        name: Name of the armature and of the instance in masks.
+        body: The dressed body.
+        collection: Where the objects go.
+        look: Clothes and colours, in materials of this person's own; without it the ordinary
+            ones, shared by all who wear them.
+
+    Returns:
+        The armature object; the mesh `<name>_body` is its child.
+    """
     armature = _armature(name, body, collection)
     mesh = bpy.data.meshes.new(f"{name}_body")
     mesh.from_pydata(body.vertices.tolist(), [], body.faces.tolist())
     for slot in SLOTS:
-        mesh.materials.append(material(slot))
+        mesh.materials.append(material(slot) if look is None else _own_material(name, slot, look))
     skinned = bpy.data.objects.new(f"{name}_body", mesh)
     skinned.rfgs.object_class, skinned.rfgs.instance = "PERSON", name
     collection.objects.link(skinned)
     _add_weights(skinned, body.bones, body.weights)
     _reduce(skinned)
-    _paint(skinned, body)
+    _paint(skinned, body, look or Look())
     skinned.data.shade_smooth()
     skinned.parent = armature
     modifier = skinned.modifiers.new("Armature", "ARMATURE")
     modifier.object = armature
     return armature
+
+
+def add_breath(skinned: bpy.types.Object, body: Body, depth_m: float) -> None:
+    """Adds the shape key `breath`: at 1 the breast bone has moved out by `depth_m` [m].
+
+    The belly follows with two thirds of that, flanks with a third, the back hardly.
+    """
+    mesh = skinned.data
+    points = np.array([vertex.co[:] for vertex in mesh.vertices])
+    normals = np.array([vertex.normal[:] for vertex in mesh.vertices])
+    trunk = _weights(skinned)[:, [n for n, b in enumerate(body.bones) if b.startswith("spine")]]
+    chest, belly = (points[:, 2] - body.head(name)[2] for name in ("spine01", "spine04"))
+    amount = np.exp(-((chest / 0.12) ** 2)) + 0.66 * np.exp(-((belly / 0.09) ** 2))
+    front = np.clip(0.35 - 0.65 * normals[:, 1], 0.0, 1.0)
+    moved = points + (depth_m * amount * front * trunk.sum(axis=1))[:, None] * normals
+    skinned.shape_key_add(name="basis", from_mix=False)
+    block = skinned.shape_key_add(name="breath", from_mix=False)
+    block.data.foreach_set("co", moved.astype(np.float32).ravel())
 
 
 def _armature(name: str, body: Body, collection: bpy.types.Collection) -> bpy.types.Object:
@@ -117,9 +150,19 @@ def _reduce(skinned: bpy.types.Object) -> None:
     reduced.name = name
 
 
-def _paint(skinned: bpy.types.Object, body: Body) -> None:
+def _own_material(name: str, slot: str, look: Look) -> bpy.types.Material:
+    """The material of one person's slot, in the colour of her or his look."""
+    surface, colour = SURFACES[slot], getattr(look, slot, None)
+    if colour is not None:
+        # Cloth keeps its blotches: the second colour is a little darker.
+        second = (0.85 * colour[0], 0.85 * colour[1], 0.85 * colour[2])
+        surface = replace(surface, colour=colour, second=second)
+    return new_material(f"{name}_{slot}", surface)
+
+
+def _paint(skinned: bpy.types.Object, body: Body, look: Look) -> None:
     """Cuts the mesh along the borders of clothes and gives each face its material."""
-    borders = cuts(body)
+    borders = cuts(body, look)
     for cut in borders.values():
         _bisect(skinned, body, cut)
     mesh = skinned.data

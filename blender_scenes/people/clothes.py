@@ -12,7 +12,34 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from blender_scenes.body import Body
+from blender_scenes.people.body import Body
+
+Colour = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Look:
+    """Clothes and colours of one person; colours are linear RGB, None the ordinary ones."""
+
+    skin: Colour | None = None
+    """Skin."""
+    hair: Colour | None = None
+    """Hair."""
+    shirt: Colour | None = None
+    """Shirt."""
+    trousers: Colour | None = None
+    """Trousers."""
+    shoes: Colour | None = None
+    """Shoes."""
+    sleeve: float = 0.72
+    """Length of the sleeves, as a share of the upper arm; 1.9 reaches the wrists."""
+    shorts: bool = False
+    """Trousers end above the knees."""
+    hair_m: float = 0.0
+    """How much lower than short hair the hair falls [m]."""
+    loose: float = 1.0
+    """How far clothes stand off the skin, as a share of the ordinary."""
+
 
 LIMBS = ("head", "torso", "arm", "hand", "leg", "foot")
 
@@ -52,7 +79,7 @@ def limb_weights(body: Body) -> np.ndarray:
     return np.stack([body.share(*_BONES_OF_LIMB[limb]) for limb in LIMBS], axis=1)
 
 
-def cuts(body: Body) -> dict[str, Cut]:
+def cuts(body: Body, look: Look) -> dict[str, Cut]:
     """The borders between skin, hair and clothes, by name."""
     up = np.array([0.0, 0.0, 1.0])
     head, neck = body.head("head"), body.head("neck01")
@@ -64,7 +91,10 @@ def cuts(body: Body) -> dict[str, Cut]:
             ("head",), 0, head + np.array([0.0, 0.024, 0.0]), np.array([0.0, 1.0, 0.0])
         ),
         "nape": Cut(
-            ("head",), 0, head + np.array([0.0, 0.05, -0.005]), np.array([0.0, -0.2, 0.98])
+            ("head",),
+            0,
+            head + np.array([0.0, 0.05, -0.005 - look.hair_m]),
+            np.array([0.0, -0.2, 0.98]),
         ),
         "collar": Cut(
             ("torso", "head"), 0, neck + np.array([0.0, -0.01, 0.002]), np.array([0.0, -0.42, 0.91])
@@ -73,12 +103,22 @@ def cuts(body: Body) -> dict[str, Cut]:
         "sole": Cut(("foot",), 0, np.array([0.0, 0.0, 0.024]), -up),
     }
     for name, side in (("L", 1), ("R", -1)):
-        shoulder, elbow = body.head(f"upperarm01.{name}"), body.head(f"lowerarm01.{name}")
-        axis = (elbow - shoulder) / np.linalg.norm(elbow - shoulder)
-        made[f"sleeve.{name}"] = Cut(("arm",), side, shoulder + 0.72 * (elbow - shoulder), axis)
+        made[f"sleeve.{name}"] = _sleeve(body, name, side, look.sleeve)
+        if look.shorts:
+            hip, knee = body.head(f"upperleg01.{name}"), body.head(f"lowerleg01.{name}")
+            made[f"hem.{name}"] = Cut(("leg",), side, hip + 0.84 * (knee - hip), -up)
         ankle = body.head(f"foot.{name}")
         made[f"shoe.{name}"] = Cut(("leg", "foot"), side, ankle + np.array([0.0, 0.0, 0.018]), -up)
     return made
+
+
+def _sleeve(body: Body, name: str, side: int, length: float) -> Cut:
+    """Border of a sleeve that is `length` upper arms long."""
+    joints = [body.head(f"{bone}.{name}") for bone in ("upperarm01", "lowerarm01", "wrist")]
+    start, end = joints[:2] if length <= 1 else joints[1:]
+    along = end - start
+    share = length if length <= 1 else length - 1
+    return Cut(("arm",), side, start + share * along, along / np.linalg.norm(along))
 
 
 def surface_of(points: np.ndarray, limbs: np.ndarray, borders: dict[str, Cut]) -> np.ndarray:
@@ -100,15 +140,18 @@ def surface_of(points: np.ndarray, limbs: np.ndarray, borders: dict[str, Cut]) -
     names[hair] = "hair"
     names[arm & ~bare] = "shirt"
     names[((torso & beyond["waist"]) | leg | foot) & ~shoe] = "trousers"
+    if "hem.L" in beyond:
+        names[leg & ~shoe & (beyond["hem.L"] | beyond["hem.R"])] = "skin"
     names[shoe] = "shoes"
     names[shoe & beyond["sole"]] = "soles"
     return names.astype(str)
 
 
-def dress(body: Body) -> Body:
+def dress(body: Body, look: Look | None = None) -> Body:
     """Smooths the skin under clothes and pushes it outwards by the cloth's thickness."""
+    look = look or Look()
     limbs = limb_weights(body)
-    surface = surface_of(body.vertices, limbs.argmax(axis=1), cuts(body))
+    surface = surface_of(body.vertices, limbs.argmax(axis=1), cuts(body, look))
     neighbours = _neighbours(body.faces, len(body.vertices))
     vertices = body.vertices
     for name, rounds, push, hem in (
@@ -125,6 +168,8 @@ def dress(body: Body) -> Body:
         for _ in range(rounds):
             vertices = vertices + 0.6 * mask[:, None] * (neighbours(vertices) - vertices)
         thickness = push * np.where(inside, hem + (1 - hem) * mask, 0.0)
+        if name in ("shirt", "trousers"):
+            thickness = thickness * look.loose
         if name == "trousers":
             thickness = thickness * _flare(body)
         vertices = vertices + thickness[:, None] * _normals(vertices, body.faces)

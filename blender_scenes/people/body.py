@@ -3,19 +3,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import functools
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
-#: Phenotype of anny, each from 0 to 1: a man of about thirty-five and 1.72 m.
-PHENOTYPE = {
-    "gender": 0.0,
-    "age": 0.62,
-    "muscle": 0.56,
-    "weight": 0.46,
-    "height": 0.38,
-    "proportions": 0.7,
-}
+
+@dataclass(frozen=True)
+class Phenotype:
+    """What a body is like, in anny's own parameters from 0 to 1; the default is a man of 1.7 m."""
+
+    gender: float = 0.0
+    """0 male, 1 female."""
+    age: float = 0.62
+    """0 newborn, 1/3 child, 2/3 young adult, 1 old."""
+    muscle: float = 0.56
+    """0 none, 1 a body builder's."""
+    weight: float = 0.46
+    """0 thin, 1 heavy, at the same height."""
+    height: float = 0.38
+    """0 short, 1 tall, for the age and gender."""
+    proportions: float = 0.7
+    """0 uncommon, 1 ideal."""
 
 
 @dataclass(frozen=True)
@@ -57,17 +67,21 @@ def _heir(bone: str, parent: str) -> str:
     return f"toe1-1{bone[-2:]}" if bone.startswith("toe") else parent
 
 
-def load_body() -> Body:
-    """Builds the body; the first call on a machine takes over a minute, later ones seconds."""
+@functools.cache
+def _model() -> Any:
     import anny
-    import torch
     from anny.models.model_data import TopologyConfig
 
-    topology = TopologyConfig(base_mesh="notoes", eyes=False, tongue=False)
-    model = anny.Anny(topology=topology)
-    output = model(
-        phenotype_kwargs={name: torch.tensor([value]) for name, value in PHENOTYPE.items()}
-    )
+    return anny.Anny(topology=TopologyConfig(base_mesh="notoes", eyes=False, tongue=False))
+
+
+def load_body(phenotype: Phenotype | None = None) -> Body:
+    """Builds a body; the first call on a machine takes over a minute, later ones seconds."""
+    import torch
+
+    wanted = asdict(phenotype or Phenotype())
+    model = _model()
+    output = model(phenotype_kwargs={name: torch.tensor([wanted[name]]) for name in wanted})
     vertices = output["rest_vertices"][0].double().numpy()
     heads = output["rest_bone_heads"][0].double().numpy()
     weights = np.zeros((len(vertices), len(model.bone_labels)))

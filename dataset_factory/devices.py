@@ -19,16 +19,24 @@ LARGEST_EXTENT_M = 15.0
 PERSON_HEIGHT_M = (0.3, 5.0)
 
 
+#: Placement rules in words.
+_WHERE = {"corners": "in the corners of the scene", "walls": "along the walls of the scene"}
+
+
 def choose_devices(bundle: Bundle, radio: Radio) -> tuple[list[DevicePose], dict[str, Any] | None]:
     """The scene's own access points for a radio, else the preset's placement.
+
+    An Empty for any radio is a place for a box in a corner, not for an array along a wall: such
+    radios take only Empties with their own name.
 
     Returns:
         The devices, and the guess that was made, None if the scene brought them.
     """
+    names = {"any", radio.name} if radio.placement == "corners" else {radio.name}
     own = [
         device_pose(row)
         for row in bundle.devices
-        if row["role"] == "ACCESS_POINT" and row["radio"] in ("any", radio.name)
+        if row["role"] == "ACCESS_POINT" and row["radio"] in names
     ]
     if own:
         return own, None
@@ -36,8 +44,9 @@ def choose_devices(bundle: Bundle, radio: Radio) -> tuple[list[DevicePose], dict
     guess = {
         "what": "devices",
         "object": radio.name,
-        "value": f"{len(placed)} in the corners of the scene",
-        "why": f"no Empty has the role access point with radio 'any' or {radio.name!r}",
+        "value": f"{len(placed)} {_WHERE[radio.placement]}",
+        "why": "no Empty has the role access point with radio "
+        + " or ".join(repr(name) for name in sorted(names)),
     }
     return placed, guess
 

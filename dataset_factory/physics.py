@@ -9,7 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from rfgs_core.dataset import Sequence
+from rfgs_core.radio import Layout
+from rfgs_core.radio.antennas import field
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.radio.layout import rotation
 
 #: Median amplitude of clear direct paths relative to free space; one path alone may add to a
 #: grazing reflection that nothing resolves, the median over links may not.
@@ -20,6 +23,10 @@ EARLY_LIMIT = 10 ** (-25 / 10)
 ENERGY_LIMIT = 6.0
 #: Peak power gain of Sionna's antenna patterns.
 PEAK_GAINS = {"iso": 1.0, "dipole": 1.5, "hw_dipole": 1.64, "tr38901": 6.31}
+#: Weaker antenna responses are left out: reflections outshine a direct path in a null.
+WEAK_RESPONSE = 0.3
+#: Sine of the angle to a device's own axis within which polarisation has no defined direction.
+AXIS_SINE = 0.02
 #: Main lobe of the Hann window used on the band, in units of c / bandwidth.
 HANN_LOBE = 2.5
 
@@ -28,7 +35,7 @@ def channel_faults(sequence: Sequence, radio: str, static: np.ndarray, file: Pat
     """Compares the static channel with straight lines between the antennas.
 
     Two laws: nothing arrives before light can, and where nothing blocks the line of sight the
-    direct path has Friis' amplitude λ/(4πd) and delay d/c.
+    direct path has Friis' amplitude λ/(4πd), times both antennas' responses, and delay d/c.
     """
     layout = sequence.layout(radio)
     if not np.isfinite(static).all():
@@ -50,8 +57,11 @@ def channel_faults(sequence: Sequence, radio: str, static: np.ndarray, file: Pat
                 f"{file}: devices {a} to {b}: {10 * np.log10(early):.0f} dB arrive before the "
                 "direct path can"
             )
-        start, end = layout.tx_xyz[tx].mean(axis=0), layout.rx_xyz[rx].mean(axis=0)
-        if not blocked(start, end, triangles):
+    for tx, rx in _clear_links(layout, triangles):
+        response = _response(sequence, radio, tx[0], rx[0])
+        if abs(response) > WEAK_RESPONSE:
+            links = static[np.ix_(tx, rx)] / response
+            distance_m = np.linalg.norm(layout.tx_xyz[tx][:, None] - layout.rx_xyz[rx], axis=-1)
             clear.append(_direct_path(sequence, radio, links, distance_m))
     if clear:
         yield from _direct_faults(sequence, radio, file, np.array(clear))
@@ -67,6 +77,50 @@ def _direct_faults(sequence: Sequence, radio: str, file: Path, clear: np.ndarray
             f"{file}: clear direct paths are {late_m:.2f} m from where the geometry puts them, "
             f"more than half a delay cell ({cell_m:.2f} m)"
         )
+
+
+def _clear_links(layout: Layout, triangles: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Indices of TX and RX elements of one site and port each, where nothing stands between."""
+    tx, rx = np.nonzero(layout.measured)
+    keys = np.stack(
+        [layout.tx_site[tx], layout.rx_site[rx], layout.tx_port[tx], layout.rx_port[rx]], axis=1
+    )
+    free: dict[tuple[int, int], bool] = {}
+    for a, b, i, j in np.unique(keys, axis=0):
+        tx = np.flatnonzero((layout.tx_site == a) & (layout.tx_port == i))
+        rx = np.flatnonzero((layout.rx_site == b) & (layout.rx_port == j))
+        if (a, b) not in free:
+            start, end = layout.tx_xyz[tx].mean(axis=0), layout.rx_xyz[rx].mean(axis=0)
+            free[a, b] = not blocked(start, end, triangles)
+        if free[a, b]:
+            yield tx, rx
+
+
+def _response(sequence: Sequence, radio: str, tx: int, rx: int) -> float:
+    """What both antennas make of the direct path between two elements' sites.
+
+    Patterns, slants and turned devices; 1 for upright isotropic antennas, 0 where a device has
+    the other straight above or below it.
+    """
+    layout, spec, devices = (
+        sequence.layout(radio),
+        sequence.radio_spec(radio),
+        sequence.devices(radio),
+    )
+    a, b = int(layout.tx_device[tx]), int(layout.rx_device[rx])
+    start = layout.tx_xyz[layout.tx_site == layout.tx_site[tx]].mean(axis=0)
+    end = layout.rx_xyz[layout.rx_site == layout.rx_site[rx]].mean(axis=0)
+    way = (end - start)[None] / np.linalg.norm(end - start)
+    axes = rotation(devices[a].quat_wxyz), rotation(devices[b].quat_wxyz)
+    if any(np.linalg.norm((way @ turn)[0, :2]) < AXIS_SINE for turn in axes):
+        return 0.0
+    slants = spec.slants_deg[layout.tx_port[tx]], spec.slants_deg[layout.rx_port[rx]]
+    sent, heard = (
+        field(spec.pattern, slant, sign * way, turn)
+        for slant, sign, turn in zip(slants, (1.0, -1.0), axes, strict=True)
+    )
+    isolation = 10.0 ** (-spec.isolation_db / 20.0) if a == b else 1.0
+    return float((sent * heard).sum()) * isolation
 
 
 def blocked(start: np.ndarray, end: np.ndarray, triangles: np.ndarray) -> bool:
@@ -130,11 +184,12 @@ def energy_faults(sequence: Sequence, radio: str, value: np.ndarray, where: str)
     times the antennas' peak gains.
     """
     layout, spec = sequence.layout(radio), sequence.radio_spec(radio)
-    distance_m = np.linalg.norm(layout.tx_xyz[:, None] - layout.rx_xyz[None], axis=-1)
+    tx, rx = np.nonzero(layout.measured)
+    distance_m = np.linalg.norm(layout.tx_xyz[tx] - layout.rx_xyz[rx], axis=-1)
     wavenumber = 2 * np.pi * spec.freq_hz / SPEED_OF_LIGHT
-    free_space = (1.0 / (2 * wavenumber * distance_m[..., None])) ** 2
+    free_space = (1.0 / (2 * wavenumber * distance_m[:, None])) ** 2
     gain = PEAK_GAINS.get(spec.pattern, max(PEAK_GAINS.values())) ** 2
     energy = (np.abs(value[layout.measured]) ** 2).sum()
-    ratio = float(energy / free_space[layout.measured].sum() / gain)
+    ratio = float(energy / free_space.sum() / gain)
     if ratio > ENERGY_LIMIT:
         yield f"{where}: {ratio:.1f} times the energy of free space, more than a scene can give"

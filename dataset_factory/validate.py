@@ -20,6 +20,12 @@ from rfgs_core.dataset.writer import MANIFEST, listed_files, own_digest
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json, sha256
 
+#: Coordinates of a store that follow from the devices in `sequence.json`.
+LAYOUT_COORDINATES = (
+    *("tx_xyz", "rx_xyz", "measured", "tx_device", "rx_device", "rx_column"),
+    *("tx_quat_wxyz", "rx_quat_wxyz"),
+)
+
 
 def checksum_faults(path: Path) -> list[str]:
     """Faults of `dataset.json` and the manifest; finds any change of any byte."""
@@ -120,7 +126,10 @@ def _radio_faults(sequence: Sequence, radio: str) -> Iterator[str]:
         yield f"{store}: time_s: differs from frames and samples in sequence.json"
     if not np.allclose(data["freq_hz"].values, sequence.radio_spec(radio).freq_hz, rtol=1e-12):
         yield f"{store}: freq_hz: differs from the radio in sequence.json"
-    for name in ("tx_xyz", "rx_xyz", "measured", "tx_device", "rx_device", "rx_column"):
+    for name in LAYOUT_COORDINATES:
+        if name not in data:
+            yield f"{store}: {name}: missing; the dataset was made by an older version"
+            continue
         values = data[name].values
         # Antennas that move stand at the first sample where the layout puts them.
         first = values[0] if "time" in data[name].dims else values

@@ -9,6 +9,7 @@ and at every frequency, which the solver could not do. Wall coefficients stay at
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import mitsuba as mi
@@ -20,7 +21,7 @@ from sionna.rt.rcs import ConstantCPM, ConstantRCS, RCSSolver, ScatteringModel, 
 from dataset_factory.trace.direct import PosedPoints
 from dataset_factory.trace.environment import measured_pairs
 from dataset_factory.trace.paths import SENSING, PathSet, empty, merged, path_set
-from dataset_factory.trace.scene import add_devices, centres
+from dataset_factory.trace.scene import add_antennas, centres
 from rfgs_core.radio import Layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.layout import DevicePose
@@ -42,12 +43,12 @@ class JoiningSolver(RCSSolver):
     """`RCSSolver` that finds legs of the same point by sorting.
 
     The original compares every leg with every other, which grows with the square of the
-    number of points and forces chunks of 500; the pairs are the same, less those of devices
+    number of points and forces chunks of 500; the pairs are the same, less those of sites
     without a measured link.
     """
 
     def __init__(self, measured: np.ndarray) -> None:
-        """Takes which pairs of devices are measured, bool, shape (tx, rx)."""
+        """Takes which pairs of sites are measured, bool, shape (tx, rx)."""
         super().__init__(deterministic=True)
         self._measured = measured
 
@@ -106,7 +107,7 @@ class Bounces:
             position=place,
         )
         scene.edit(add=self._carrier)
-        add_devices(scene, layout, devices)
+        add_antennas(scene, layout, devices)
 
     def paths(self, points: PosedPoints) -> PathSet:
         """Paths by way of each point and one or more walls, one amplitude each.
@@ -134,7 +135,7 @@ class Bounces:
             return empty(self._depth)
         found = found.select((found.kinds != 0).sum(axis=1) > 1)
         primitives = np.where(found.kinds == SENSING, found.primitives + first, found.primitives)
-        return PathSet(found.tx, found.rx, found.amplitude, found.vertices, found.kinds, primitives)
+        return replace(found, primitives=primitives)
 
     def _hang(self, places: np.ndarray) -> None:
         """Moves the carrier's points to world places [m], shape (point, 3)."""
@@ -185,11 +186,10 @@ def with_facets(
     table = np.zeros((max(gamma) + 1, len(nodes_hz)), dtype=np.complex128)
     for material, coefficient in gamma.items():
         table[material] = coefficient
-    amplitude = paths.amplitude * (1j * size[:, None] * damping * table[points.material[point]])
-    strength = np.abs(amplitude).max(axis=1) * lit
-    return PathSet(
-        paths.tx, paths.rx, amplitude, paths.vertices, paths.kinds, paths.primitives
-    ).select(strength > NEGLIGIBLE * strength.max())
+    facet = 1j * size[:, None] * damping * table[points.material[point]]
+    amplitude = paths.amplitude * facet[:, None, :]
+    strength = np.abs(amplitude).max(axis=(1, 2)) * lit
+    return replace(paths, amplitude=amplitude).select(strength > NEGLIGIBLE * strength.max())
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:

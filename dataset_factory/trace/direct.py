@@ -4,14 +4,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
 
 from dataset_factory.trace.facets import facet_sum
 from dataset_factory.trace.points import LIFT_M
-from dataset_factory.trace.scene import centres, visible
-from rfgs_core.radio import Layout
+from dataset_factory.trace.scene import centres, owners, ports, visible
+from rfgs_core.radio import Layout, Radio
+from rfgs_core.radio.antennas import field, passed_on
 from rfgs_core.radio.layout import DevicePose, rotation
 
 
@@ -40,20 +42,21 @@ def direct_channel(
     layout: Layout,
     devices: list[DevicePose],
     gamma: dict[int, np.ndarray],
-    freq_hz: np.ndarray,
+    radio: Radio,
 ) -> np.ndarray:
     """Single-bounce channel of the moving points, for every measured link.
 
-    Visibility is Sionna's own ray test from each point to the centre of each array, in the
-    scene with the body in it; distances and facets are exact per element and tone.
+    Visibility is Sionna's own ray test from each point to the centre of each site, in the
+    scene with the body in it, and antenna patterns are taken in that direction; distances and
+    facets are exact per element and tone.
 
     Args:
         mi_scene: Mitsuba scene with everything that moves in place.
         points: Scattering points.
         layout: Antenna elements.
-        devices: Poses of the devices, for polarisation.
+        devices: Poses of the devices, for pattern and polarisation.
         gamma: Reflection coefficient by material index, each of shape (subcarrier,).
-        freq_hz: Tones [Hz].
+        radio: Gives tones, antenna pattern and polarisation.
 
     Returns:
         Complex128, shape (tx, rx, subcarrier), zero where a link is not measured.
@@ -62,16 +65,20 @@ def direct_channel(
     tx_centres, rx_centres = centres(layout)
     sees_tx = [visible(mi_scene, lifted, centre) for centre in tx_centres]
     sees_rx = [visible(mi_scene, lifted, centre) for centre in rx_centres]
-    out = np.zeros((len(layout.tx_xyz), len(layout.rx_xyz), len(freq_hz)), dtype=np.complex128)
-    for a, b in layout.device_pairs:
+    tx_owner, rx_owner = owners(layout)
+    shape = (len(layout.tx_xyz), len(layout.rx_xyz), radio.num_subcarriers)
+    out = np.zeros(shape, dtype=np.complex128)
+    for (a, b), (i, j) in product(site_pairs(layout), ports(layout)):
         both = sees_tx[a] & sees_rx[b]
-        factor = copolar(
-            lifted - tx_centres[a],
-            rx_centres[b] - lifted,
-            rotation(devices[a].quat_wxyz),
-            rotation(devices[b].quat_wxyz),
+        into, out_of = lifted - tx_centres[a], rx_centres[b] - lifted
+        tx_axes, rx_axes = (
+            rotation(devices[owner].quat_wxyz) for owner in (tx_owner[a], rx_owner[b])
         )
-        tx, rx = np.flatnonzero(layout.tx_device == a), np.flatnonzero(layout.rx_device == b)
+        sent = field(radio.pattern, radio.slants_deg[i], into, tx_axes)
+        heard = field(radio.pattern, radio.slants_deg[j], -out_of, rx_axes)
+        factor = passed_on(into, out_of, sent, heard)
+        tx = np.flatnonzero((layout.tx_site == a) & (layout.tx_port == i))
+        rx = np.flatnonzero((layout.rx_site == b) & (layout.rx_port == j))
         for material, coefficient in gamma.items():
             weights = np.where(both & (points.material == material), factor, 0.0)
             part = facet_sum(
@@ -81,44 +88,14 @@ def direct_channel(
                 layout.tx_xyz[tx],
                 layout.rx_xyz[rx],
                 weights,
-                freq_hz,
+                radio.freq_hz,
             )
             out[np.ix_(tx, rx)] += part * coefficient
     return out
 
 
-def copolar(
-    into: np.ndarray, out_of: np.ndarray, tx_axes: np.ndarray, rx_axes: np.ndarray
-) -> np.ndarray:
-    """Share of the field that vertical antennas pass by way of points that keep polarisation.
-
-    A point hands the θ and φ components of the field on unchanged, as Sionna's scattering
-    points do; it is 1 for devices that stand upright.
-
-    Args:
-        into: Vectors from the transmitter to the points, shape (point, 3).
-        out_of: Vectors from the points to the receiver, shape (point, 3).
-        tx_axes: Rotation world_from_device of the transmitter.
-        rx_axes: Rotation world_from_device of the receiver.
-
-    Returns:
-        Factor in [-1, 1], shape (point,).
-    """
-    theta_i, phi_i = spherical_basis(into)
-    theta_s, phi_s = spherical_basis(out_of)
-    sent = spherical_basis(into @ tx_axes)[0] @ tx_axes.T
-    heard = spherical_basis(-out_of @ rx_axes)[0] @ rx_axes.T
-    along = np.sum(sent * theta_i, axis=1) * np.sum(heard * theta_s, axis=1)
-    return along + np.sum(sent * phi_i, axis=1) * np.sum(heard * phi_s, axis=1)
-
-
-def spherical_basis(directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Unit vectors θ̂ and φ̂ of directions of any length, each of shape (point, 3)."""
-    x, y, z = directions.T
-    length = np.maximum(np.linalg.norm(directions, axis=1), 1e-12)
-    azimuth = np.arctan2(y, x)
-    cos_theta = np.clip(z / length, -1.0, 1.0)
-    sin_theta = np.sqrt(1.0 - cos_theta**2)
-    theta = np.stack([cos_theta * np.cos(azimuth), cos_theta * np.sin(azimuth), -sin_theta], axis=1)
-    phi = np.stack([-np.sin(azimuth), np.cos(azimuth), np.zeros_like(azimuth)], axis=1)
-    return theta, phi
+def site_pairs(layout: Layout) -> list[tuple[int, int]]:
+    """Pairs of a transmitting and a receiving site that have a measured link."""
+    links = np.argwhere(layout.measured)
+    pairs = np.stack([layout.tx_site[links[:, 0]], layout.rx_site[links[:, 1]]], axis=1)
+    return [(int(a), int(b)) for a, b in np.unique(pairs, axis=0)]

@@ -3,17 +3,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import sionna.rt as rt
 
 from dataset_factory.bundle import Bundle
 from dataset_factory.trace.movers import Movers
-from dataset_factory.trace.paths import PathSet, empty, merged, path_set
+from dataset_factory.trace.paths import PathSet, joined, path_set
 from dataset_factory.trace.scene import (
-    add_devices,
+    add_antennas,
     centres,
     environment_scene,
     move_vehicles,
+    owners,
     set_frequency,
 )
 from dataset_factory.trace.steering import steer
@@ -42,7 +45,7 @@ def node_frequencies(radio: Radio) -> np.ndarray:
 
 
 class Environment:
-    """The scene without people, between device centres, ready to be traced."""
+    """The scene without people, between centres of sites, ready to be traced."""
 
     def __init__(
         self,
@@ -58,7 +61,7 @@ class Environment:
         Args:
             bundle: Scene bundle.
             radio: Radio; wide bands are traced at each node frequency.
-            layout: Antenna elements; device pairs without a measured link are left out.
+            layout: Antenna elements; pairs of sites without a measured link are left out.
             devices: Poses of the devices.
             seed: Seed of the rays, the same for a whole sequence.
             vehicles: Rigid metal that `paths` moves; None leaves everything that moves out.
@@ -68,7 +71,7 @@ class Environment:
         self._scatters = any(row["scattering_coefficient"] > 0.0 for row in bundle.materials)
         self._scene = environment_scene(bundle, radio, vehicles)
         self._solver = rt.PathSolver(deterministic=True)
-        add_devices(self._scene, layout, devices)
+        add_antennas(self._scene, layout, devices)
 
     def paths(self, vertices: np.ndarray | None = None) -> PathSet:
         """Traces the scene; the result does not depend on what was traced before.
@@ -87,8 +90,8 @@ class Environment:
         if len(nodes) == NARROW_BAND_NODES:
             traced = self._traced(self._radio.centre_hz)
             # Walls hardly change over a narrow band.
-            return _with_amplitude(traced, np.repeat(traced.amplitude, len(nodes), axis=1))
-        return _joined([self._traced(float(f)) for f in nodes])
+            return replace(traced, amplitude=np.repeat(traced.amplitude, len(nodes), axis=2))
+        return joined([self._traced(float(f)) for f in nodes])
 
     def _traced(self, freq_hz: float) -> PathSet:
         """Paths at one frequency, one amplitude each."""
@@ -104,7 +107,10 @@ class Environment:
             seed=self._seed,
         )
         found = path_set(paths, *centres(self._layout))
-        found = _with_amplitude(found, found.amplitude * (freq_hz / self._radio.centre_hz))
+        found = replace(found, amplitude=found.amplitude * (freq_hz / self._radio.centre_hz))
+        tx_owner, rx_owner = owners(self._layout)
+        straight = (found.kinds == 0).all(axis=1) & (tx_owner[found.tx] == rx_owner[found.rx])
+        found.amplitude[straight] *= 10.0 ** (-self._radio.isolation_db / 20.0)
         return found.select(measured_pairs(self._layout)[found.tx, found.rx])
 
 
@@ -124,40 +130,8 @@ def environment_channel(
 
 
 def measured_pairs(layout: Layout) -> np.ndarray:
-    """Which pairs of a transmitting and a receiving device have a measured link, bool."""
-    count = int(layout.tx_device.max()) + 1
-    wanted = np.zeros((count, count), dtype=bool)
+    """Which pairs of a transmitting and a receiving site have a measured link, bool."""
+    wanted = np.zeros((layout.tx_site.max() + 1, layout.rx_site.max() + 1), dtype=bool)
     links = np.argwhere(layout.measured)
-    wanted[layout.tx_device[links[:, 0]], layout.rx_device[links[:, 1]]] = True
+    wanted[layout.tx_site[links[:, 0]], layout.rx_site[links[:, 1]]] = True
     return wanted
-
-
-def _with_amplitude(paths: PathSet, amplitude: np.ndarray) -> PathSet:
-    """The same paths with other amplitudes, shape (path, node)."""
-    return PathSet(paths.tx, paths.rx, amplitude, paths.vertices, paths.kinds, paths.primitives)
-
-
-def _joined(sets: list[PathSet]) -> PathSet:
-    """One set of paths over several frequencies; a path missing at one is zero there.
-
-    Rays choose between reflection and refraction by the material, so a weak path may be found
-    at some frequencies only. Paths are the same when their interactions and corners are.
-    """
-    rows: dict[bytes, int] = {}
-    picked: list[PathSet] = []
-    values: list[np.ndarray] = []
-    for node, paths in enumerate(sets):
-        corners = np.round(paths.vertices * 1e3).astype(np.int64)
-        for i in range(len(paths)):
-            key = b"".join(part[i].tobytes() for part in (paths.tx, paths.rx, paths.kinds, corners))
-            if key not in rows:
-                rows[key] = len(rows)
-                picked.append(paths.select(np.array([i])))
-                values.append(np.zeros(len(sets), dtype=np.complex128))
-            values[rows[key]][node] += paths.amplitude[i, 0]
-    if not picked:
-        return empty(MAX_DEPTH, len(sets))
-    with_all = [
-        _with_amplitude(path, value[None, :]) for path, value in zip(picked, values, strict=True)
-    ]
-    return merged(with_all)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Propagation paths between device centres, in an order that does not depend on threads."""
+"""Propagation paths between sites of antennas, in an order that does not depend on threads."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import sionna.rt as rt
@@ -16,14 +16,14 @@ _REFRACTION = 4
 
 @dataclass(frozen=True)
 class PathSet:
-    """Paths between pairs of devices, sorted by pair, length and vertices."""
+    """Paths between pairs of sites, sorted by pair, length and vertices."""
 
     tx: np.ndarray
-    """Transmitting device of each path, int64, shape (path,)."""
+    """Transmitting site of each path, int64, shape (path,)."""
     rx: np.ndarray
-    """Receiving device of each path, int64, shape (path,)."""
+    """Receiving site of each path, int64, shape (path,)."""
     amplitude: np.ndarray
-    """Amplitude without the phase of the delay, complex128, shape (path, node)."""
+    """Amplitude without the phase of the delay, complex128, shape (path, port pair, node)."""
     vertices: np.ndarray
     """Corners from transmitter to receiver [m], padded with the receiver, (path, depth + 2, 3)."""
     kinds: np.ndarray
@@ -36,7 +36,7 @@ class PathSet:
 
     @property
     def length_m(self) -> np.ndarray:
-        """Length of each path between device centres [m], shape (path,)."""
+        """Length of each path between centres of sites [m], shape (path,)."""
         return np.linalg.norm(np.diff(self.vertices, axis=1), axis=2).sum(axis=1)
 
     def select(self, keep: np.ndarray) -> PathSet:
@@ -52,7 +52,7 @@ class PathSet:
 
     def sorted(self) -> PathSet:
         """The same paths ordered by pair, length, interactions and amplitude."""
-        amplitude = self.amplitude[:, 0]
+        amplitude = self.amplitude[:, 0, 0]
         keys = [amplitude.imag, amplitude.real]
         keys += [
             self.vertices[:, i, axis]
@@ -72,12 +72,12 @@ class PathSet:
 
 
 def path_set(paths: rt.Paths, tx_centres: np.ndarray, rx_centres: np.ndarray) -> PathSet:
-    """Reads Sionna's paths between one-element devices, all of them in the scene.
+    """Reads Sionna's paths between one-element sites, all of them in the scene.
 
     Args:
         paths: Result of a solver, traced with `synthetic_array=True`.
-        tx_centres: Transmitter of every device [m], shape (device, 3).
-        rx_centres: Receiver of every device [m], shape (device, 3).
+        tx_centres: Transmitter of every site [m], shape (site, 3).
+        rx_centres: Receiver of every site [m], shape (site, 3).
 
     Returns:
         The valid paths, sorted, with one amplitude node.
@@ -86,7 +86,8 @@ def path_set(paths: rt.Paths, tx_centres: np.ndarray, rx_centres: np.ndarray) ->
     if valid.size == 0 or not valid.any():
         return empty(0)
     rx, tx, _ = np.nonzero(valid)
-    real, imag = (np.array(part)[:, 0, :, 0][valid] for part in paths.a)
+    # Sionna's axes: (rx, rx port, tx, tx port, path); ours count transmitting ports first.
+    real, imag = (np.array(part).transpose(0, 2, 4, 3, 1)[valid] for part in paths.a)
     kinds = np.array(paths.interactions)[:, valid].T.astype(np.int64)
     primitives = np.array(paths.primitives)[:, valid].T.astype(np.int64)
     corners = np.moveaxis(np.array(paths.vertices)[:, valid], 0, 1).astype(np.float64)
@@ -94,7 +95,7 @@ def path_set(paths: rt.Paths, tx_centres: np.ndarray, rx_centres: np.ndarray) ->
     vertices = np.concatenate(
         [tx_centres[tx][:, None, :], corners, rx_centres[rx][:, None, :]], axis=1
     )
-    amplitude = (real.astype(np.float64) + 1j * imag.astype(np.float64))[:, None]
+    amplitude = (real.astype(np.float64) + 1j * imag.astype(np.float64)).reshape(len(tx), -1, 1)
     primitives = np.where(kinds == 0, 0, primitives)
     return PathSet(tx, rx, amplitude, vertices, kinds, primitives).sorted()
 
@@ -103,9 +104,8 @@ def empty(depth: int, nodes: int = 1) -> PathSet:
     """A set without paths."""
     index = np.zeros(0, dtype=np.int64)
     table = np.zeros((0, depth), dtype=np.int64)
-    return PathSet(
-        index, index, np.zeros((0, nodes), np.complex128), np.zeros((0, depth + 2, 3)), table, table
-    )
+    amplitude = np.zeros((0, 1, nodes), np.complex128)
+    return PathSet(index, index, amplitude, np.zeros((0, depth + 2, 3)), table, table)
 
 
 def merged(parts: list[PathSet]) -> PathSet:
@@ -120,6 +120,37 @@ def merged(parts: list[PathSet]) -> PathSet:
         strict=True,
     )
     return PathSet(*(np.concatenate(column) for column in columns)).sorted()
+
+
+def joined(sets: list[PathSet]) -> PathSet:
+    """One set of paths over several frequencies; a path missing at one is zero there.
+
+    Rays choose between reflection and refraction by the material, so a weak path may be found
+    at some frequencies only. Paths are the same when their interactions and corners are.
+
+    Args:
+        sets: Paths at each frequency, of equal depth, one amplitude node each.
+
+    Returns:
+        Paths with one amplitude per frequency.
+    """
+    filled = [(node, paths) for node, paths in enumerate(sets) if len(paths)]
+    if not filled:
+        return empty(0, len(sets))
+    node = np.concatenate([np.full(len(paths), node) for node, paths in filled])
+    every = PathSet(
+        *(
+            np.concatenate([getattr(paths, column.name) for _, paths in filled])
+            for column in fields(PathSet)
+        )
+    )
+    corners = np.round(every.vertices * 1e3).astype(np.int64).reshape(len(every), -1)
+    keys = np.concatenate([every.tx[:, None], every.rx[:, None], every.kinds, corners], axis=1)
+    _, first, row = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    amplitude = np.zeros((len(first), every.amplitude.shape[1], len(sets)), dtype=np.complex128)
+    # Zipped axes first, so that each row of a path adds to its own frequency.
+    np.add.at(amplitude.transpose(0, 2, 1), (row.ravel(), node), every.amplitude[:, :, 0])
+    return replace(every.select(first), amplitude=amplitude).sorted()
 
 
 def _padded(part: PathSet, depth: int) -> PathSet:

@@ -166,22 +166,38 @@ def set_frequency(scene: rt.Scene, freq_hz: float) -> None:
     scene.frequency = dr.opaque(mi.Float, freq_hz)
 
 
-def add_devices(scene: rt.Scene, layout: Layout, devices: list[DevicePose]) -> None:
-    """Adds every device as a one-element transmitter and a one-element receiver, in order."""
+def add_antennas(scene: rt.Scene, layout: Layout, devices: list[DevicePose]) -> None:
+    """Adds every site as a one-element transmitter or a one-element receiver, in order."""
     tx_centres, rx_centres = centres(layout)
-    for index, device in enumerate(devices):
-        orientation = mi.Point3f(*euler_angles(device.quat_wxyz))
-        tx, rx = tx_centres[index].tolist(), rx_centres[index].tolist()
-        scene.add(rt.Transmitter(f"tx-{index}", position=tx, orientation=orientation))
-        scene.add(rt.Receiver(f"rx-{index}", position=rx, orientation=orientation))
+    tx_owner, rx_owner = owners(layout)
+    for index, device in enumerate(tx_owner):
+        orientation = mi.Point3f(*euler_angles(devices[device].quat_wxyz))
+        position = tx_centres[index].tolist()
+        scene.add(rt.Transmitter(f"tx-{index}", position=position, orientation=orientation))
+    for index, device in enumerate(rx_owner):
+        orientation = mi.Point3f(*euler_angles(devices[device].quat_wxyz))
+        position = rx_centres[index].tolist()
+        scene.add(rt.Receiver(f"rx-{index}", position=position, orientation=orientation))
 
 
 def centres(layout: Layout) -> tuple[np.ndarray, np.ndarray]:
-    """Centres of each device's TX and RX arrays [m], each of shape (device, 3)."""
-    count = int(layout.tx_device.max()) + 1
-    tx = [layout.tx_xyz[layout.tx_device == i].mean(axis=0) for i in range(count)]
-    rx = [layout.rx_xyz[layout.rx_device == i].mean(axis=0) for i in range(count)]
+    """Centres of the TX and RX sites [m], each of shape (site, 3)."""
+    tx = [layout.tx_xyz[layout.tx_site == i].mean(axis=0) for i in range(layout.tx_site.max() + 1)]
+    rx = [layout.rx_xyz[layout.rx_site == i].mean(axis=0) for i in range(layout.rx_site.max() + 1)]
     return np.stack(tx), np.stack(rx)
+
+
+def owners(layout: Layout) -> tuple[np.ndarray, np.ndarray]:
+    """Device of each TX and of each RX site."""
+    _, tx = np.unique(layout.tx_site, return_index=True)
+    _, rx = np.unique(layout.rx_site, return_index=True)
+    return layout.tx_device[tx], layout.rx_device[rx]
+
+
+def ports(layout: Layout) -> list[tuple[int, int]]:
+    """Pairs of a transmitting and a receiving polarisation port, transmitting first."""
+    tx, rx = np.unique(layout.tx_port), np.unique(layout.rx_port)
+    return [(int(i), int(j)) for i in tx for j in rx]
 
 
 def euler_angles(quat_wxyz: tuple[float, float, float, float]) -> tuple[float, float, float]:

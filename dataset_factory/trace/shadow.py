@@ -4,7 +4,7 @@
 Sionna's absorber casts a shadow without diffraction. Here each path is multiplied by the
 Kirchhoff factor of the body's silhouette, T = 1 − (j s/λ) ∬ e^{−jπsρ²/λ} dA with
 s = 1/d_1 + 1/d_2 along the unfolded path: one factor per segment and body, their product per
-path. The silhouette is cut once per segment, from the device centres; antenna elements shift
+path. The silhouette is cut once per segment, from the centres of sites; antenna elements shift
 it by where their own line crosses the plane.
 """
 
@@ -61,7 +61,7 @@ def _reach(paths: PathSet) -> np.ndarray:
 
     At ν from its edge a screen changes a path by about 1/(√2 π ν) of its amplitude.
     """
-    strength = np.abs(paths.amplitude).max(axis=1)
+    strength = np.abs(paths.amplitude).max(axis=(1, 2))
     pair = paths.tx * (int(paths.rx.max()) + 1) + paths.rx
     strongest = np.zeros(int(pair.max()) + 1)
     np.maximum.at(strongest, pair, strength)
@@ -80,22 +80,24 @@ def transmission(
 
     Args:
         paths: Environment paths.
-        layout: Antenna elements; every device has equally many.
+        layout: Antenna elements; every site has equally many.
         bodies: Vertices [m] and triangles of each body.
         nodes_hz: Frequencies of the factors [Hz], shape (node,).
         mode: "kirchhoff", or "hard" for all or nothing.
 
     Returns:
-        Complex128, shape (path, tx element of the device, rx element of the device, node).
+        Complex128, shape (path, tx place of the site, rx place of the site, node); ports of one
+        element share a place.
     """
-    n_tx = int(np.count_nonzero(layout.tx_device == 0))
-    n_rx = int(np.count_nonzero(layout.rx_device == 0))
-    out = np.ones((len(paths), n_tx, n_rx, len(nodes_hz)), dtype=np.complex128)
+    tx_places = _places(layout.tx_xyz, layout.tx_site, layout.tx_port)
+    rx_places = _places(layout.rx_xyz, layout.rx_site, layout.rx_port)
+    shape = (len(paths), tx_places.shape[1], rx_places.shape[1], len(nodes_hz))
+    out = np.ones(shape, dtype=np.complex128)
     if not len(paths):
         return out
     unfolded = _unfold(paths)
-    tx = layout.tx_xyz.reshape(-1, n_tx, 3)[paths.tx] - paths.vertices[:, :1]
-    rx = layout.rx_xyz.reshape(-1, n_rx, 3)[paths.rx] - paths.vertices[:, -1:]
+    tx = tx_places[paths.tx] - paths.vertices[:, :1]
+    rx = rx_places[paths.rx] - paths.vertices[:, -1:]
     for vertices, faces in bodies:
         _shade(
             paths.vertices,
@@ -110,6 +112,13 @@ def transmission(
             out,
         )
     return out
+
+
+def _places(xyz: np.ndarray, site: np.ndarray, port: np.ndarray) -> np.ndarray:
+    """Positions of each site's elements [m], shape (site, place, 3)."""
+    first = port == port.min()
+    order = np.argsort(site[first], kind="stable")
+    return xyz[first][order].reshape(site.max() + 1, -1, 3)
 
 
 def _unfold(paths: PathSet) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From paths between device centres to every antenna element and tone.
+"""From paths between centres of sites to every antenna element and tone.
 
 A path of specular reflections and refractions has one mirror image of its transmitter: the
 element-to-element distance is |r − I(t)|, exact for plane surfaces, which is the design's
@@ -16,6 +16,7 @@ import numba
 import numpy as np
 
 from dataset_factory.trace.paths import PathSet
+from dataset_factory.trace.scene import ports
 from rfgs_core.radio import Layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
@@ -96,8 +97,8 @@ def steer(
         layout: Antenna elements.
         freq_hz: Equally spaced tones [Hz].
         nodes_hz: Frequencies of the amplitudes, ascending; linear in between.
-        transmission: Shadow factors, shape (path, tx element of the device, rx element of the
-            device, node); None for none.
+        transmission: Shadow factors, shape (path, tx place of the site, rx place of the site,
+            node); None for none.
 
     Returns:
         Complex128, shape (tx, rx, subcarrier).
@@ -111,22 +112,24 @@ def steer(
     step = float(wavenumber[1] - wavenumber[0]) if len(wavenumber) > 1 else 0.0
     for a, b in np.unique(np.stack([paths.tx, paths.rx], axis=1), axis=0):
         of_pair = np.flatnonzero((paths.tx == a) & (paths.rx == b))
-        tx, rx = np.flatnonzero(layout.tx_device == a), np.flatnonzero(layout.rx_device == b)
         passed = np.ones((0, 0, 0, 0), dtype=np.complex128)
         if transmission is not None:
             passed = transmission[of_pair]
         ends = np.stack([paths.vertices[of_pair[0], 0], paths.vertices[of_pair[0], -1]])
-        offsets = np.einsum("pij,ej->pei", seen.mirror[of_pair], layout.tx_xyz[tx] - ends[0])
-        out[np.ix_(tx, rx)] = _steer(
-            (paths.amplitude[of_pair], passed),
-            seen.one_sided[of_pair],
-            (seen.seen_from_tx[of_pair], seen.seen_from_rx[of_pair], seen.middle_m[of_pair]),
-            np.ascontiguousarray(offsets),
-            ends,
-            np.ascontiguousarray(layout.tx_xyz[tx]),
-            np.ascontiguousarray(layout.rx_xyz[rx]),
-            (left, share, float(wavenumber[0]), step),
-        )
+        for port, (i, j) in enumerate(ports(layout)):
+            tx = np.flatnonzero((layout.tx_site == a) & (layout.tx_port == i))
+            rx = np.flatnonzero((layout.rx_site == b) & (layout.rx_port == j))
+            offsets = np.einsum("pij,ej->pei", seen.mirror[of_pair], layout.tx_xyz[tx] - ends[0])
+            out[np.ix_(tx, rx)] = _steer(
+                (np.ascontiguousarray(paths.amplitude[of_pair, port]), passed),
+                seen.one_sided[of_pair],
+                (seen.seen_from_tx[of_pair], seen.seen_from_rx[of_pair], seen.middle_m[of_pair]),
+                np.ascontiguousarray(offsets),
+                ends,
+                np.ascontiguousarray(layout.tx_xyz[tx]),
+                np.ascontiguousarray(layout.rx_xyz[rx]),
+                (left, share, float(wavenumber[0]), step),
+            )
     out[~layout.measured] = 0.0
     return out
 
@@ -207,7 +210,7 @@ def _steer(
     rx_xyz: np.ndarray,
     tones: tuple[np.ndarray, np.ndarray, float, float],
 ) -> np.ndarray:
-    """Channel of one device pair, shape (tx, rx, subcarrier)."""
+    """Channel of one pair of sites and ports, shape (tx, rx, subcarrier)."""
     amplitude, passed = gain
     left, share, k_0, k_step = tones
     n_paths, n_nodes = amplitude.shape

@@ -150,7 +150,7 @@ class Tracer:
                 self._layout,
                 self._devices,
                 self._gamma(self._radio.freq_hz),
-                self._radio.freq_hz,
+                self._radio,
             )
         if self._bounces is not None:
             with self._timed("people_bounces"):

@@ -32,6 +32,8 @@ _UNITS = {
     "time_s": "s",
     "tx_xyz": "m",
     "rx_xyz": "m",
+    "tx_slant_deg": "degree",
+    "rx_slant_deg": "degree",
 }
 
 
@@ -205,6 +207,7 @@ def _create(
         if name in dataset:
             dataset[name].attrs["units"] = unit
     dataset.attrs["radio"] = radio.name
+    dataset.attrs["pattern"], dataset.attrs["polarization"] = radio.pattern, radio.polarization
     dataset.to_zarr(path, mode="w", zarr_format=3, consolidated=False)
     group = zarr.open_group(str(path), mode="r+")
     links = (*layout.measured.shape, radio.num_subcarriers)
@@ -237,6 +240,10 @@ def _coordinates(
         "tx_device": ("tx", layout.tx_device),
         "rx_device": ("rx", layout.rx_device),
         "rx_column": ("rx", layout.rx_column),
+        "tx_slant_deg": ("tx", np.asarray(radio.slants_deg)[layout.tx_port]),
+        "rx_slant_deg": ("rx", np.asarray(radio.slants_deg)[layout.rx_port]),
+        "tx_quat_wxyz": (("tx", "wxyz"), layout.tx_quat_wxyz),
+        "rx_quat_wxyz": (("rx", "wxyz"), layout.rx_quat_wxyz),
         "tx_xyz": (("tx", "xyz"), layout.tx_xyz),
         "rx_xyz": (("rx", "xyz"), layout.rx_xyz),
         "freq_hz": ("subcarrier", radio.freq_hz),

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from rfgs_core.radio.layout import DevicePose, Layout, layout, place_devices
+from rfgs_core.radio.layout import DevicePose, Layout, layout
+from rfgs_core.radio.placement import place_devices
 from rfgs_core.radio.presets import PRESETS, Radio, preset
 from rfgs_core.radio.samples import FrameSamples, frame_samples
 

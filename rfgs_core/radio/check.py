@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Float64, Int
 
-from rfgs_core.radio.layout import DevicePose
+from rfgs_core.radio.layout import DevicePose, layout
 from rfgs_core.radio.materials import MATERIALS
 from rfgs_core.radio.presets import Radio
 
@@ -75,6 +75,16 @@ def check_devices(
                 f"device {device.name!r} of radio {radio.name!r} at {np.round(point, 2).tolist()} "
                 "m is outside the scene; move it inside or enlarge the scene"
             )
+        else:
+            antennas = layout(radio, [device])
+            for xyz in (antennas.tx_xyz, antennas.rx_xyz):
+                outside = ((xyz < bounds_m[0]) | (xyz > bounds_m[1])).any(axis=1)
+                if outside.any():
+                    problems.append(
+                        f"{np.count_nonzero(outside)} of {len(xyz)} antennas of device "
+                        f"{device.name!r} of radio {radio.name!r} are outside the scene; move or "
+                        "turn the device, or use a radio with a shorter array"
+                    )
     volume = float(np.prod(np.maximum(bounds_m[1] - bounds_m[0], 1e-6)))
     for name, vertices, faces in meshes:
         if not len(faces):

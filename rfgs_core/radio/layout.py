@@ -26,7 +26,7 @@ class DevicePose:
 
 @dataclass(frozen=True)
 class Layout:
-    """Antenna elements of all devices, flattened device by device."""
+    """Antenna elements of all devices, flattened device by device, port by port."""
 
     tx_xyz: Float64[np.ndarray, "tx 3"]
     """Positions of transmitting elements [m]."""
@@ -40,6 +40,18 @@ class Layout:
     """Column of each receiving element within its own array."""
     measured: Bool[np.ndarray, "tx rx"]
     """Links that the radio measures."""
+    tx_port: Int64[np.ndarray, "tx"]
+    """Polarisation port of each transmitting element; ports of one element share its place."""
+    rx_port: Int64[np.ndarray, "rx"]
+    """Polarisation port of each receiving element."""
+    tx_site: Int64[np.ndarray, "tx"]
+    """Group of each transmitting element; elements of a group are near enough to share rays."""
+    rx_site: Int64[np.ndarray, "rx"]
+    """Group of each receiving element."""
+    tx_quat_wxyz: Float64[np.ndarray, "tx 4"]
+    """Rotation world_from_antenna of each transmitting element, w first."""
+    rx_quat_wxyz: Float64[np.ndarray, "rx 4"]
+    """Rotation world_from_antenna of each receiving element, w first."""
 
     @property
     def device_pairs(self) -> list[tuple[int, int]]:
@@ -73,47 +85,52 @@ def element_offsets(
 
 def layout(radio: Radio, devices: list[DevicePose]) -> Layout:
     """Lays out the antennas of `devices`, all of the same kind `radio`."""
-    spacing_m = 0.5 * radio.wavelength_m
-    tx_local, _ = element_offsets(radio.tx_rows, radio.tx_cols, spacing_m)
+    tx_local, _ = element_offsets(
+        radio.tx_rows, radio.tx_cols, _spacing_m(radio.tx_spacing_m, radio)
+    )
     tx_local = tx_local + np.asarray(radio.tx_offset_m)
-    rx_local, column = element_offsets(radio.rx_rows, radio.rx_cols, spacing_m)
-    tx_xyz, rx_xyz = [], []
-    for device in devices:
-        world = rotation(device.quat_wxyz)
-        tx_xyz.append(tx_local @ world.T + np.asarray(device.position_m))
-        rx_xyz.append(rx_local @ world.T + np.asarray(device.position_m))
-    count = np.arange(len(devices), dtype=np.int64)
-    tx_device, rx_device = np.repeat(count, len(tx_local)), np.repeat(count, len(rx_local))
+    rx_local, column = element_offsets(
+        radio.rx_rows, radio.rx_cols, _spacing_m(radio.rx_spacing_m, radio)
+    )
+    tx_xyz, tx_device, tx_port, tx_site = _spread(radio, devices, tx_local, radio.tx_spacing_m)
+    rx_xyz, rx_device, rx_port, rx_site = _spread(radio, devices, rx_local, radio.rx_spacing_m)
     own = tx_device[:, None] == rx_device[None, :]
     measured = {"included": np.ones_like(own), "only": own, "excluded": ~own}
+    quats = np.array([device.quat_wxyz for device in devices], dtype=np.float64)
     return Layout(
-        tx_xyz=np.concatenate(tx_xyz),
-        rx_xyz=np.concatenate(rx_xyz),
+        tx_quat_wxyz=quats[tx_device],
+        rx_quat_wxyz=quats[rx_device],
+        tx_xyz=tx_xyz,
+        rx_xyz=rx_xyz,
         tx_device=tx_device,
         rx_device=rx_device,
-        rx_column=np.tile(column, len(devices)),
+        rx_column=np.tile(column, len(rx_xyz) // len(column)),
         measured=measured[radio.own_device_links],
+        tx_port=tx_port,
+        rx_port=rx_port,
+        tx_site=tx_site,
+        rx_site=rx_site,
     )
 
 
-def place_devices(radio: Radio, bounds_m: Float64[np.ndarray, "2 3"]) -> list[DevicePose]:
-    """Places devices in the corners of the scene, facing its centre.
+def _spacing_m(given_m: float, radio: Radio) -> float:
+    """Distance of neighbouring elements [m]."""
+    return given_m or 0.5 * radio.wavelength_m
 
-    Args:
-        radio: Which radio; gives count, heights and inset.
-        bounds_m: Scene bounds [m], rows minimum and maximum.
 
-    Returns:
-        One pose per device, counter-clockwise from the corner of smallest x and y.
-    """
-    low, high = bounds_m[0] + radio.inset_m, bounds_m[1] - radio.inset_m
-    corners = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])]
-    centre = bounds_m.mean(axis=0)
-    devices = []
-    for index in range(radio.num_devices):
-        x, y = corners[index % 4]
-        z = bounds_m[0, 2] + radio.heights_m[index % len(radio.heights_m)]
-        yaw = float(np.arctan2(centre[1] - y, centre[0] - x))
-        quat = (float(np.cos(yaw / 2)), 0.0, 0.0, float(np.sin(yaw / 2)))
-        devices.append(DevicePose(f"{radio.name}_{index}", (float(x), float(y), float(z)), quat))
-    return devices
+def _spread(
+    radio: Radio, devices: list[DevicePose], local: Float64[np.ndarray, "element 3"], given_m: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Position [m], device, port and site of one array's elements in every device."""
+    ports = len(radio.slants_deg)
+    xyz = [
+        np.tile(local @ rotation(device.quat_wxyz).T + np.asarray(device.position_m), (ports, 1))
+        for device in devices
+    ]
+    index = np.arange(len(devices), dtype=np.int64)
+    port = np.tile(np.repeat(np.arange(ports), len(local)), len(devices))
+    site = device = np.repeat(index, ports * len(local))
+    if given_m > radio.wavelength_m:
+        # Too far apart to see the same: rays are traced to each element.
+        site = device * len(local) + np.tile(np.arange(len(local)), ports * len(devices))
+    return np.concatenate(xyz), device, port.astype(np.int64), site

@@ -10,9 +10,11 @@ import numpy as np
 from jaxtyping import Float64
 
 from rfgs_core.errors import RfgsError
+from rfgs_core.radio.antennas import POLARIZATIONS
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
 OwnLinks = Literal["included", "only", "excluded"]
+Placement = Literal["corners", "walls"]
 
 
 @dataclass(frozen=True)
@@ -37,8 +39,16 @@ class Radio:
     """Receiving elements of a device along its local y."""
     tx_offset_m: tuple[float, float, float]
     """Centre of the TX array in the device's own axes [m]; the RX array is at the origin."""
+    tx_spacing_m: float = 0.0
+    """Distance of neighbouring TX elements [m]; 0 takes half a wavelength at the centre."""
+    rx_spacing_m: float = 0.0
+    """Distance of neighbouring RX elements [m]; 0 takes half a wavelength at the centre."""
     own_device_links: OwnLinks = "included"
     """Whether a device hears its own transmitter: included, only (a radar) or excluded."""
+    isolation_db: float = 0.0
+    """Attenuation of the straight way from a device's transmitter to its own receiver [dB]."""
+    placement: Placement = "corners"
+    """Where devices are placed when the scene brings none."""
     num_devices: int = 4
     """Devices placed by the preset's own rule when the scene brings none."""
     heights_m: tuple[float, ...] = (1.2, 2.2)
@@ -50,9 +60,9 @@ class Radio:
     noise_figure_db: float = 7.0
     """Receiver noise figure [dB]."""
     pattern: str = "iso"
-    """Antenna pattern, one of Sionna's names."""
+    """Antenna pattern: iso, dipole, hw_dipole or tr38901."""
     polarization: str = "V"
-    """Antenna polarisation, one of Sionna's names."""
+    """Polarisation: V, H, or two ports per element, VH or cross (±45°)."""
     samples_per_frame: int = 1
     """Packets, chirps or pulses of every frame; the first is taken at the frame's own time."""
     sample_interval_s: float = 0.0
@@ -77,6 +87,11 @@ class Radio:
     def wavelength_m(self) -> float:
         """Wavelength at the band's centre [m]."""
         return SPEED_OF_LIGHT / self.centre_hz
+
+    @property
+    def slants_deg(self) -> tuple[float, ...]:
+        """Slant of each port of an antenna [°]; 0 is vertical."""
+        return POLARIZATIONS[self.polarization]
 
     @property
     def freq_hz(self) -> Float64[np.ndarray, "subcarrier"]:
@@ -112,6 +127,29 @@ PRESETS: dict[str, Radio] = {
             tx_offset_m=(0.0, 0.0, -0.3),
         ),
         Radio(
+            name="wifi_commodity",
+            freq_min_hz=5.72e9,
+            freq_max_hz=5.88e9,
+            num_subcarriers=64,
+            tx_rows=1,
+            tx_cols=2,
+            rx_rows=1,
+            rx_cols=2,
+            tx_offset_m=(0.0, 0.0, 0.0),
+            own_device_links="excluded",
+        ),
+        Radio(
+            name="wifi24",
+            freq_min_hz=2.417e9,
+            freq_max_hz=2.457e9,
+            num_subcarriers=64,
+            tx_rows=1,
+            tx_cols=1,
+            rx_rows=4,
+            rx_cols=4,
+            tx_offset_m=(0.0, 0.0, -0.3),
+        ),
+        Radio(
             name="mmwave",
             freq_min_hz=60e9,
             freq_max_hz=64e9,
@@ -125,6 +163,21 @@ PRESETS: dict[str, Radio] = {
             noise_figure_db=12.0,
             power_dbm=12.0,
             sample_interval_s=0.25e-3,
+        ),
+        Radio(
+            name="uwb",
+            freq_min_hz=3.1e9,
+            freq_max_hz=10.6e9,
+            num_subcarriers=608,
+            tx_rows=1,
+            tx_cols=1,
+            rx_rows=1,
+            rx_cols=16,
+            rx_spacing_m=0.2,
+            tx_offset_m=(0.0, 0.0, -0.3),
+            placement="walls",
+            # The regulatory −41.3 dBm/MHz over the band.
+            power_dbm=-2.5,
         ),
     )
 }

@@ -14,8 +14,6 @@ from rfgs_core.errors import RfgsError
 from rfgs_core.radio import Layout
 
 if TYPE_CHECKING:
-    import xarray
-
     from rfgs_core.dataset import Sequence
 
 
@@ -59,18 +57,6 @@ class Observations:
         return replace(self, delta=delta.astype(np.complex64))
 
 
-def _stored_layout(data: xarray.Dataset) -> Layout:
-    """Antenna elements as the channel itself names them."""
-    return Layout(
-        tx_xyz=np.asarray(data["tx_xyz"].values, dtype=np.float64),
-        rx_xyz=np.asarray(data["rx_xyz"].values, dtype=np.float64),
-        tx_device=np.asarray(data["tx_device"].values, dtype=np.int64),
-        rx_device=np.asarray(data["rx_device"].values, dtype=np.int64),
-        rx_column=np.asarray(data["rx_column"].values, dtype=np.int64),
-        measured=np.asarray(data["measured"].values, dtype=bool),
-    )
-
-
 def _visible(
     split: dict[str, Any], elements: Layout, num_subcarriers: int
 ) -> tuple[Bool[np.ndarray, "tx rx"], Bool[np.ndarray, "subcarrier"]]:
@@ -98,7 +84,7 @@ def observe(sequence: Sequence, radio: str, frame: int) -> Observations:
             f"{sequence.name}, {radio}: the antennas move within a frame, and training takes one "
             "sample per frame; choose a radio whose antennas stand still"
         )
-    elements = _stored_layout(data)
+    elements = sequence.layout(radio)
     links, tones = _visible(sequence.splits["rf"][radio], elements, data.sizes["subcarrier"])
     csi, static = sequence.csi(radio, frame), sequence.csi_static(radio)
     seen = links[:, :, None] & tones

@@ -59,7 +59,7 @@ def test_direct_term_matches_the_solver(
     paths = with_facets(paths, points, tracer._gamma(nodes), nodes, radio.centre_hz)
     solver = steer(paths, elements, radio.freq_hz, nodes)
     ours = direct_channel(
-        tracer._scene.mi_scene, points, elements, devices, tracer._gamma(nodes), nodes
+        tracer._scene.mi_scene, points, elements, devices, tracer._gamma(nodes), radio
     )
     assert error_db(ours, solver) < -80.0
 

@@ -31,16 +31,19 @@ def test_elements_go_down_each_column_from_minus_y_plus_z() -> None:
 
 
 @pytest.mark.parametrize("name", PRESETS)
-def test_neighbours_are_half_a_wavelength_apart(name: str) -> None:
+def test_neighbours_are_half_a_wavelength_apart_unless_told(name: str) -> None:
     radio = preset(name)
     half = 299_792_458.0 / (0.5 * (radio.freq_min_hz + radio.freq_max_hz)) / 2
     elements = layout(radio, [UPRIGHT])
-    for xyz in (elements.tx_xyz, elements.rx_xyz):
+    for xyz, given in (
+        (elements.tx_xyz, radio.tx_spacing_m),
+        (elements.rx_xyz, radio.rx_spacing_m),
+    ):
         if len(xyz) == 1:
             continue
         apart = np.linalg.norm(xyz[:, None] - xyz, axis=-1)
         apart[np.diag_indices(len(xyz))] = np.inf
-        np.testing.assert_allclose(apart.min(axis=1), half, rtol=1e-9)
+        np.testing.assert_allclose(apart.min(axis=1), given or half, rtol=1e-9)
     np.testing.assert_allclose(elements.rx_xyz.mean(axis=0), 0, atol=1e-12)
     np.testing.assert_allclose(elements.tx_xyz.mean(axis=0), radio.tx_offset_m, atol=1e-12)
 
@@ -93,28 +96,25 @@ def test_measured_links(own: str, expected: list[list[int]]) -> None:
     np.testing.assert_array_equal(elements.measured, by_device)
 
 
-@pytest.mark.parametrize("count", [1, 4, 6])
-def test_placed_devices_stand_inside_and_face_the_centre(count: int) -> None:
-    radio = replace(preset("wifi"), num_devices=count)
-    devices = place_devices(radio, BOUNDS_M)
-    assert len({device.name for device in devices}) == len(devices) == count
-    centre = BOUNDS_M.mean(axis=0)
-    for index, device in enumerate(devices):
-        position = np.array(device.position_m)
-        assert (position >= BOUNDS_M[0] + [0.2, 0.2, 0]).all()
-        assert (position <= BOUNDS_M[1] - [0.2, 0.2, 0]).all()
-        # Above the floor, which is not at z = 0 here.
-        assert position[2] == pytest.approx(0.25 + (1.2, 2.2)[index % 2])
-        boresight, up = rotation(device.quat_wxyz)[:, [0, 2]].T
-        towards = (centre - position)[:2]
-        np.testing.assert_allclose(boresight[:2], towards / np.linalg.norm(towards), atol=1e-12)
-        np.testing.assert_allclose(up, [0, 0, 1], atol=1e-12)
+def test_ports_of_an_element_share_its_place_and_site() -> None:
+    radio = replace(preset("wifi_commodity"), polarization="VH")
+    elements = layout(radio, place_devices(radio, BOUNDS_M))
+    assert elements.measured.shape == (16, 16)
+    assert elements.rx_port.tolist() == [0, 0, 1, 1] * 4
+    assert elements.rx_column.tolist() == [0, 1, 0, 1] * 4
+    assert elements.rx_site.tolist() == elements.rx_device.tolist()
+    np.testing.assert_array_equal(elements.rx_xyz[[0, 1, 4]], elements.rx_xyz[[2, 3, 6]])
 
 
-def test_four_devices_go_round_counter_clockwise() -> None:
-    devices = place_devices(preset("wifi"), BOUNDS_M)
-    corners = [tuple(round(x, 6) for x in device.position_m[:2]) for device in devices]
-    assert corners == [(-0.8, 0.7), (4.8, 0.7), (4.8, 4.3), (-0.8, 4.3)]
+def test_elements_far_apart_are_sites_of_their_own() -> None:
+    radio = replace(preset("uwb"), polarization="VH")
+    elements = layout(radio, place_devices(radio, np.array([[0, 0, 0], [6.0, 5.0, 2.7]])))
+    assert elements.tx_site.tolist() == [0, 0, 1, 1, 2, 2, 3, 3]
+    for site in range(64):
+        of_site = np.flatnonzero(elements.rx_site == site)
+        assert elements.rx_port[of_site].tolist() == [0, 1]
+        assert np.ptp(elements.rx_xyz[of_site], axis=0).max() == 0.0
+    assert np.unique(elements.rx_site).tolist() == list(range(64))
 
 
 def test_elements_of_a_radio_without_devices_in_the_scene_are_its_own() -> None:

@@ -46,7 +46,7 @@ def test_tones_fill_the_band_evenly(name: str) -> None:
 
 
 def test_an_unknown_preset_lists_the_known_ones() -> None:
-    with pytest.raises(RfgsError, match="unknown radio 'lidar'; expected one of mmwave, wifi"):
+    with pytest.raises(RfgsError, match=r"unknown radio 'lidar'; expected one of mmwave, .*wifi"):
         preset("lidar")
 
 

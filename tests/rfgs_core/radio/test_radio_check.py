@@ -66,3 +66,10 @@ def test_devices_in_furniture_or_outside_are_named() -> None:
     assert len(inside) == 1 and "'Cupboard'" in inside[0] and "'ap'" in inside[0]
     outside = check_devices(radio, BOUNDS_M, [at(-1.0, 1.5, 1.0)], meshes)
     assert len(outside) == 1 and "outside the scene" in outside[0]
+
+
+def test_arrays_that_reach_through_a_wall_are_named() -> None:
+    # 16 elements 0.2 m apart reach 1.5 m to both sides of the device.
+    problems = check_devices(preset("uwb"), BOUNDS_M, [at(0.2, 1.05, 1.2)], [])
+    assert len(problems) == 1 and "3 of 16 antennas of device 'ap'" in problems[0]
+    assert check_devices(preset("uwb"), BOUNDS_M, [at(0.2, 2.5, 1.2)], []) == []

@@ -8,22 +8,20 @@ import shutil
 from dataclasses import asdict
 from typing import Any
 
-from tqdm import tqdm
-
 from dataset_factory.bundle import Bundle, read_bundle
 from dataset_factory.devices import check_scene, choose_devices
 from dataset_factory.folder import locked, open_folder, sweep
 from dataset_factory.impair import impair_radio
 from dataset_factory.job import Job
-from dataset_factory.plan import missing_channels, versions
+from dataset_factory.plan import versions
 from dataset_factory.progress import progress_bar
 from dataset_factory.render import render
 from dataset_factory.sequence import describe_sequence, write_geometry
-from dataset_factory.workers import Task, run_tasks
+from dataset_factory.tracing import trace
 from rfgs_core.dataset import Sequence
 from rfgs_core.dataset.csi_store import create_csi
 from rfgs_core.dataset.impaired_store import has_impaired, remove_impaired
-from rfgs_core.dataset.schema import DatasetInfo, SequenceInfo, device_pose
+from rfgs_core.dataset.schema import DatasetInfo, SequenceInfo
 from rfgs_core.dataset.writer import (
     finish_dataset,
     write_dataset_info,
@@ -62,7 +60,7 @@ def generate(job: Job) -> bool:
             write_dataset_info(job.out, info)
         sequence = _prepare(job, bundle, devices, guesses)
         with job.stage("trace"):
-            _trace(job, bundle, sequence)
+            trace(job, bundle, sequence)
         if job.plan.impairments:
             with job.stage("impair"):
                 _impair(job)
@@ -148,34 +146,3 @@ def _prepare(
             job.files.csi(name), radio, layout(radio, poses), sequence.frames, times, samples
         )
     return sequence
-
-
-def _trace(job: Job, bundle: Bundle, sequence: SequenceInfo) -> None:
-    tasks = [
-        Task(radio, frame)
-        for radio in job.plan.radios
-        for frame in missing_channels(job.files, radio, sequence.frames)
-    ]
-    if not tasks:
-        return
-    request = {
-        "bundle": str(bundle.path),
-        "sequence": str(job.files.root),
-        "devices": {
-            radio: [asdict(device_pose(row)) for row in rows]
-            for radio, rows in sequence.devices.items()
-        },
-        "depth": job.plan.depth,
-        "shadow": job.plan.shadow,
-        "seed": job.plan.seed,
-    }
-    with tqdm(total=len(tasks), desc="trace", unit="frame") as bar:
-        seconds = run_tasks(
-            request, tasks, job.workers, job.out / "log", lambda task: _step(bar, task)
-        )
-    job.seconds.update({f"trace.{name}": value for name, value in seconds.items()})
-
-
-def _step(bar: tqdm, task: Task) -> None:
-    bar.set_postfix_str(f"{task.radio} {task.frame or 'static'}", refresh=False)
-    bar.update()

@@ -28,6 +28,10 @@ class Job:
     """Opens the scene."""
     workers: int
     """Tracing processes."""
+    worker_memory_gb: float = 0.0
+    """Memory that each of them may take [GB]; 0 shares the machine's."""
+    scheduler: str = ""
+    """Address of a Dask scheduler that traces instead; empty for this machine."""
     seconds: dict[str, float] = field(default_factory=dict)
     """Wall time per stage of this run [s]."""
 

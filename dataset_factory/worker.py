@@ -11,9 +11,12 @@ import json
 import os
 import signal
 import sys
+import time
 import traceback
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
+
+import numpy as np
 
 from dataset_factory.bundle import Bundle, read_bundle
 from rfgs_core.dataset.csi_store import write_csi
@@ -30,26 +33,43 @@ class Worker:
     """Traces frames of one job, keeping the scene of the current radio loaded."""
 
     def __init__(self, job: dict[str, Any]) -> None:
+        """Opens the scene.
+
+        Args:
+            job: `bundle` (folder), `sequence` (folder the channels go to), `devices` by radio,
+                `depth`, `shadow` and `seed`.
+        """
         from dataset_factory.trace.setup import prepare
 
         prepare(threads=1)
         self.job = job
         self.bundle: Bundle = read_bundle(Path(job["bundle"]))
-        self.files = SequenceFiles(Path(job["sequence"]))
         self.radio = ""
         self.tracer: Tracer | None = None
 
-    def trace(self, radio: str, frame: int | None) -> dict[str, float]:
-        """Traces one frame, or the static channel for None, and stores it.
+    def trace(self, radio: str, frame: int | None, file: str | None) -> dict[str, float]:
+        """Traces one frame and stores it.
+
+        Args:
+            radio: Name of the radio.
+            frame: Frame number; None is the static channel.
+            file: A `.npy` file to write instead of the job's sequence, which may not be at hand.
 
         Returns:
-            Seconds spent per stage so far by the radio's tracer.
+            Seconds spent on it per stage.
         """
+        before = dict(self.tracer.timings) if self.tracer and self.radio == radio else {}
         tracer = self._tracer(radio)
         value = tracer.static() if frame is None else tracer.samples(self.bundle.frame(frame))
-        index = None if frame is None else self.bundle.frames.index(frame)
-        write_csi(self.files.csi(radio), index, value, self.files.csi_done(radio, frame))
-        return dict(tracer.timings)
+        spent = {stage: s - before.get(stage, 0.0) for stage, s in tracer.timings.items()}
+        start = time.perf_counter()
+        if file is not None:
+            np.save(file, value)
+        else:
+            files = SequenceFiles(Path(self.job["sequence"]))
+            index = None if frame is None else self.bundle.frames.index(frame)
+            write_csi(files.csi(radio), index, value, files.csi_done(radio, frame))
+        return {**spent, "write": time.perf_counter() - start}
 
     def _tracer(self, radio: str) -> Tracer:
         from dataset_factory.trace import Tracer
@@ -78,7 +98,7 @@ def serve(tasks: IO[str], replies: IO[str]) -> None:
                 worker = Worker(request)
                 reply: dict[str, Any] = {"ready": True}
             else:
-                reply = {"seconds": worker.trace(request["radio"], request["frame"])}
+                reply = {"seconds": worker.trace(**request)}
         except RfgsError as error:
             reply = {"error": str(error)}
         except OSError as error:

@@ -41,6 +41,12 @@ class GenerateArgs:
     """Root seed; the same seed gives the same bytes."""
     workers: int = 2
     """Tracing processes; each keeps one core busy."""
+    worker_memory: float = 0.0
+    """Memory of each [GB]: at 80 % of it a process is replaced after its frame, beyond it the
+    process is killed and the frame tried once more; 0 shares 90 % of the machine's memory."""
+    scheduler: str = ""
+    """Address of a Dask scheduler, as in tcp://node1:8786, whose workers trace instead. They
+    need this version of RF-GS, no shared storage; see docs/cluster.md."""
     shadow: Literal["kirchhoff", "hard"] = "kirchhoff"
     """How bodies shadow paths: diffracted at the silhouette, or cut off sharply."""
     impairments: str = ""
@@ -64,6 +70,8 @@ def run(args: GenerateArgs) -> int:
 
     if not 1 <= args.workers <= 256:
         raise RfgsError(f"--workers {args.workers}: expected 1 to 256")
+    if not 0.0 <= args.worker_memory <= 1e4:
+        raise RfgsError(f"--worker-memory {args.worker_memory}: expected GB, or 0")
     scene = find_scene(args.scene)
     plan = make_plan(
         scene,
@@ -79,7 +87,9 @@ def run(args: GenerateArgs) -> int:
         impairments=asdict(read_impairments(args.impairments)) if args.impairments else None,
     )
     use_llvm()
-    made = generate(Job(args.out, plan, Blender(scene.blend, args.blender), args.workers))
+    blender = Blender(scene.blend, args.blender)
+    job = Job(args.out, plan, blender, args.workers, args.worker_memory, args.scheduler)
+    made = generate(job)
     what = "finished" if made else "already complete"
     sys.stdout.write(f"{args.out}: {what}; look at it with: rfgs-factory preview {args.out}\n")
     return 0

@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -59,7 +60,9 @@ def box_room(build_scene: BuildScene) -> Path:
 def make_job(box_room: Path) -> MakeJob:
     """A job of two frames, one camera of 32 px, Wi-Fi at depth 1."""
 
-    def make(out: Path, *, frames: str = "1:2", workers: int = 1, seed: int = 0) -> Job:
+    def make(
+        out: Path, *, frames: str = "1:2", seed: int = 0, images: bool = True, **options: Any
+    ) -> Job:
         plan = make_plan(
             find_scene(str(box_room)),
             ("wifi",),
@@ -70,9 +73,9 @@ def make_job(box_room: Path) -> MakeJob:
             depth=1,
             seed=seed,
             shadow="kirchhoff",
-            images=True,
+            images=images,
         )
-        return Job(out, plan, Blender(box_room), workers)
+        return Job(out, plan, Blender(box_room), **{"workers": 1, **options})
 
     return make
 

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Who traces does not show in the data: one process, two, or a cluster that loses a worker."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dataset_factory.generate import generate
+from dataset_factory.job import Job
+from dataset_factory.plan import versions
+from rfgs_core.errors import RfgsError
+
+pytest.importorskip("distributed", reason="the extra 'cluster' is not installed")
+
+MakeJob = Callable[..., Job]
+Bytes = Callable[[Path], dict[str, bytes]]
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[Any]:
+    """Two workers of this machine, each a process that comes back when it is killed."""
+    from distributed import LocalCluster
+
+    with LocalCluster(
+        n_workers=2,
+        threads_per_worker=1,
+        processes=True,
+        dashboard_address=None,
+        local_directory=str(tmp_path / "dask"),
+        silence_logs=50,
+    ) as cluster:
+        yield cluster
+
+
+def kill_when(sign: Path, pid: int, killed: threading.Event) -> threading.Thread:
+    """Kills a process as soon as a file appears."""
+
+    def watch() -> None:
+        while not sign.exists():
+            time.sleep(0.01)
+        os.kill(pid, signal.SIGKILL)
+        killed.set()
+
+    thread = threading.Thread(target=watch, daemon=True)
+    thread.start()
+    return thread
+
+
+@pytest.mark.slow
+def test_one_worker_two_workers_and_a_cluster_that_loses_one_give_the_same_bytes(
+    make_job: MakeJob, data_of: Bytes, cluster: Any, tmp_path: Path
+) -> None:
+    common = {"frames": "1:4", "images": False}
+    folders = [tmp_path / name for name in ("one", "two", "cluster")]
+    assert generate(make_job(folders[0], workers=1, **common))
+    assert generate(make_job(folders[1], workers=2, **common))
+    killed = threading.Event()
+    sign = folders[2] / "box_room/radio/wifi/done/static"
+    kill_when(sign, cluster.workers[0].pid, killed)
+    address = cluster.scheduler_address
+    assert generate(make_job(folders[2], scheduler=address, **common))
+    assert killed.is_set()
+    one, two, spread = (data_of(folder) for folder in folders)
+    assert one == two
+    assert one == spread
+
+
+@pytest.mark.slow
+def test_workers_with_other_versions_are_refused(
+    make_job: MakeJob, cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wanted = {**versions(), "sionna-rt": "0.0.1"}
+    monkeypatch.setattr("dataset_factory.cluster.versions", lambda: wanted)
+    job = make_job(tmp_path / "out", images=False, scheduler=cluster.scheduler_address)
+    with pytest.raises(RfgsError, match=r"a worker of the cluster has sionna-rt 2.2.0, this"):
+        generate(job)
+
+
+def test_an_address_without_a_scheduler_is_named(
+    make_job: MakeJob, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("dataset_factory.cluster._PATIENCE_S", 3)
+    job = make_job(tmp_path / "out", images=False, scheduler="tcp://127.0.0.1:9")
+    with pytest.raises(RfgsError, match=r"--scheduler tcp://127.0.0.1:9: no Dask scheduler"):
+        generate(job)

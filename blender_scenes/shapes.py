@@ -69,6 +69,8 @@ class Builder:
                 segments=segments,
                 profile=0.5,
                 affect="EDGES",
+                # -1: of the faces beside it; the default is the first material of the object.
+                material=-1,
                 clamp_overlap=True,
             )
 

@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Builds gestures."""
+
+from __future__ import annotations
+
+import bpy
+
+from blender_scenes.sets import workplace
+from blender_scenes.sets.lighting import COOL, ceiling_row
+from blender_scenes.sets.room import Room, put
+from blender_scenes.sets.shell import Shell, Wall, door
+
+
+def _furnish(to: bpy.types.Collection) -> None:
+    put(to, workplace.shelf_rack("rack_1"), -1.2, 1.95, 180)
+    put(to, workplace.shelf_rack("rack_2"), 0.15, 1.95, 180)
+    put(to, workplace.desk("bench_1", 1.6, 0.7), 1.25, -1.80)
+    put(to, workplace.screen("screen_1"), 0.95, -1.92, 0, 0.752)
+    put(to, workplace.filing_cabinet("cabinet", 2), -1.5, -1.85)
+    put(to, workplace.whiteboard("whiteboard", 1.6), 2.484, 0.3, 90, 1.0)
+    put(to, workplace.office_chair("chair"), 1.9, -1.05, 150)
+    put(to, workplace.bin_("bin"), -0.85, -1.95)
+
+
+def _light(to: bpy.types.Collection) -> None:
+    ceiling_row(
+        [(x, y, 2.62) for x in (-1.25, 1.25) for y in (-1.1, 1.1)], (1.2, 0.3), 26.0, COOL, to
+    )
+
+
+ROOM = Room(
+    Shell(
+        (5.0, 4.5, 2.7),
+        south=Wall("wall_paint"),
+        north=Wall("wall_grey"),
+        east=Wall("wall_blue"),
+        west=Wall("wall_paint", (door((-0.5, 0.5), leaf="paint_teal"),)),
+        floor="linoleum",
+    ),
+    _furnish,
+    _light,
+)

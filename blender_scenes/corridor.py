@@ -1,15 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds corridor."""
+"""Builds corridor: a person walks the length of a narrow corridor."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import bpy
 
+from blender_scenes.assemble import Folders, save_scene, watch
+from blender_scenes.motion.going import Walk
+from blender_scenes.motion.score import Posture
+from blender_scenes.people.cast import PEOPLE, cast, perform
 from blender_scenes.sets import hall
 from blender_scenes.sets.decoration import picture
 from blender_scenes.sets.lighting import COOL, NEUTRAL, ceiling_row, soft_light
 from blender_scenes.sets.room import Room, put
 from blender_scenes.sets.shell import Shell, Wall, door, window
+from blender_scenes.stage import add_access_points, corners
 
 
 def _furnish(to: bpy.types.Collection) -> None:
@@ -48,3 +55,34 @@ ROOM = Room(
     _furnish,
     _light,
 )
+
+FRAMES, FPS = 60, 10
+#: At both ends and high along the walls: lockers and bench would hide a person from elsewhere.
+CAMERAS = (
+    (-4.1, -0.9, 2.35),
+    (4.1, 0.9, 2.35),
+    (4.1, -0.9, 1.6),
+    (-4.1, 0.9, 1.6),
+    (-4.1, 0.0, 2.0),
+    (4.1, 0.0, 1.9),
+    (-4.1, -0.9, 1.5),
+    (4.1, 0.9, 1.5),
+    (4.1, -0.9, 2.35),
+    (-4.1, 0.9, 2.35),
+    (-4.1, 0.3, 1.3),
+    (4.1, -0.3, 1.3),
+)
+
+
+def build(out: Path) -> None:
+    """Builds the scene from nothing and saves it, compressed, as `out`."""
+    save_scene(out, "corridor", FRAMES, FPS, _fill)
+
+
+def _fill(scene: bpy.types.Scene, folders: Folders) -> None:
+    ROOM.build(folders)
+    anna = cast(PEOPLE["anna"], folders["Person"])
+    walk = Walk([(-0.2, -0.08), (3.4, 0.12)], 1.05, open_start=True, open_end=True)
+    perform(anna, [walk], Posture((-3.3, 0.15), 0.0), FPS, frame_end=FRAMES)
+    add_access_points(corners(ROOM.shell.half_m), (0.0, 0.0), folders["Stage"])
+    watch(scene, CAMERAS, [anna.armature], folders["Stage"])

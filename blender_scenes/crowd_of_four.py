@@ -1,16 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds crowd_of_four."""
+"""Builds crowd_of_four: four people pass each other in a lobby."""
 
 from __future__ import annotations
 
+import math
+from pathlib import Path
+
 import bpy
 
+from blender_scenes.assemble import Folders, save_scene, watch
+from blender_scenes.motion.going import Stay, Turn, Walk
+from blender_scenes.motion.score import Posture
+from blender_scenes.people.cast import PEOPLE, cast, perform
 from blender_scenes.sets import hall
 from blender_scenes.sets.decoration import picture
 from blender_scenes.sets.lighting import COOL, WARM, ceiling_row, soft_light
 from blender_scenes.sets.room import Room, put
 from blender_scenes.sets.seating import armchair
 from blender_scenes.sets.shell import Shell, Wall, door, window
+from blender_scenes.stage import add_access_points, around_room, corners
 
 
 def _furnish(to: bpy.types.Collection) -> None:
@@ -43,3 +51,31 @@ ROOM = Room(
     _furnish,
     _light,
 )
+
+FRAMES, FPS = 80, 10
+
+
+def build(out: Path) -> None:
+    """Builds the scene from nothing and saves it, compressed, as `out`."""
+    save_scene(out, "crowd_of_four", FRAMES, FPS, _fill)
+
+
+def _fill(scene: bpy.types.Scene, folders: Folders) -> None:
+    ROOM.build(folders)
+    to = folders["Person"]
+    parts = {
+        "felix": (Posture((2.3, 0.2), math.pi), [Walk([(0.7, 0.25)], 0.8), Turn(90), Stay(3.0)]),
+        "georg": (Posture((2.2, 1.6), math.pi), [Walk([(-0.2, 1.45), (-2.0, 0.9)], 0.75)]),
+        "hana": (Posture((-2.2, -1.5), 0.0), [Walk([(0.4, -1.35), (2.3, -1.0)], 0.95), Stay(2.0)]),
+        "ivan": (
+            Posture((-2.3, 0.0), 0.0),
+            [Walk([(-0.7, -0.1)], 1.0), Stay(1.2), Turn(-90), Stay(2.5)],
+        ),
+    }
+    crowd = []
+    for name, (start, pieces) in parts.items():
+        crowd.append(cast(PEOPLE[name], to))
+        perform(crowd[-1], pieces, start, FPS, frame_end=FRAMES)
+    add_access_points(corners(ROOM.shell.half_m), (0.0, 0.0), folders["Stage"])
+    cameras = around_room(ROOM.shell.half_m)
+    watch(scene, cameras, [actor.armature for actor in crowd], folders["Stage"])

@@ -57,20 +57,20 @@ ROOM = Room(
 )
 
 FRAMES, FPS = 60, 10
-#: At both ends and high along the walls: lockers and bench would hide a person from elsewhere.
+#: At both ends: from the south-west, lockers would hide the person.
 CAMERAS = (
-    (-4.1, -0.9, 2.35),
+    (-4.1, 0.9, 2.35),
     (4.1, 0.9, 2.35),
     (4.1, -0.9, 1.6),
-    (-4.1, 0.9, 1.6),
-    (-4.1, 0.0, 2.0),
+    (-4.1, 0.6, 1.6),
+    (-4.1, 0.2, 2.2),
     (4.1, 0.0, 1.9),
-    (-4.1, -0.9, 1.5),
+    (-4.1, 0.9, 1.4),
     (4.1, 0.9, 1.5),
     (4.1, -0.9, 2.35),
-    (-4.1, 0.9, 2.35),
+    (-4.1, 0.6, 2.4),
     (-4.1, 0.3, 1.3),
-    (4.1, -0.3, 1.3),
+    (4.1, -0.4, 1.3),
 )
 
 

@@ -26,7 +26,7 @@ def _furnish(to: bpy.types.Collection) -> None:
     put(to, hall.bench("bench_1", 1.8), 1.4, 2.6, 180)
     put(to, hall.planter("planter_1", 1.0), -0.7, 2.62, 180)
     put(to, hall.planter("planter_2", 1.0), 0.4, -2.62)
-    put(to, hall.lockers("lockers", 4), -1.9, -2.6)
+    put(to, hall.bench("bench_2", 1.6), -1.9, -2.6)
     put(to, hall.notice_board("notice_board"), 2.0, -2.884, 0, 1.15)
     put(to, hall.exit_sign("exit_sign"), 3.27, 0.6, 90, 2.5)
     put(to, picture("picture", (0.9, 0.6), "paint_teal"), 1.4, 2.886, 180, 1.65)

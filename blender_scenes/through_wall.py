@@ -26,8 +26,8 @@ def _furnish(to: bpy.types.Collection) -> None:
     put(to, workplace.office_chair("chair"), -2.8, -0.75, 200)
     put(to, workplace.shelf_rack("rack"), -2.2, 1.72, 180)
     put(to, hall.bench("bench"), 2.4, 1.72, 180)
-    put(to, hall.lockers("lockers", 3), 3.0, -1.72)
-    put(to, hall.planter("planter"), 1.0, -1.75)
+    put(to, hall.planter("planter_2", 1.1), 3.1, -1.75)
+    put(to, hall.planter("planter_1"), 1.0, -1.75)
     put(to, picture("picture", (0.6, 0.45), "paint_sand"), 2.4, 1.984, 180, 1.6)
 
 

@@ -99,28 +99,17 @@ def corners(
 
 
 def around_room(
-    half_m: tuple[float, float], low_m: float = 1.5, high_m: float = 2.4
+    half_m: tuple[float, float], heights_m: Sequence[float] = (2.4, 1.5, 1.95)
 ) -> list[Point]:
-    """Twelve places for cameras: high and low in the corners, and along the walls [m].
+    """Cameras at three heights in each corner, from where they see all of a room [m].
 
     Any first few of them look from all around.
     """
-    x, y = half_m[0] - 0.22, half_m[1] - 0.18
-    middle = 0.5 * (low_m + high_m)
-    return [
-        (-x, -y, high_m),
-        (x, y, high_m),
-        (x, -y, low_m),
-        (-x, y, low_m),
-        (0.08 * x, y, middle),
-        (-0.12 * x, -y, middle),
-        (-x, -y, low_m),
-        (x, -y, high_m),
-        (x, y, low_m),
-        (-x, y, high_m),
-        (0.4 * x, -y, low_m),
-        (-0.3 * x, y, high_m),
-    ]
+    made = []
+    for round_ in range(len(heights_m)):
+        places = corners(half_m, [heights_m[(round_ + k) % len(heights_m)] for k in range(4)])
+        made += [places[index] for index in (0, 2, 1, 3)]
+    return made
 
 
 def show_first_camera(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:

@@ -54,9 +54,7 @@ def measure(blend: str) -> dict:
         "faces": {item.name: len(item.data.polygons) for item in bodies},
         "actions": sorted({a.name for a in bpy.data.actions}),
         "seen": seen,
-        "static": {
-            i.name: [i.users_collection[0].name, *box(world_vertices(i))] for i in static
-        },
+        "static": {i.name: [i.users_collection[0].name, *box(world_vertices(i))] for i in static},
         "devices": {i.name: list(i.matrix_world.translation) for i in devices},
         "materials": {
             m.name: [m.rfgs.radio_material, m.rfgs.thickness_m] for m in bpy.data.materials

@@ -38,7 +38,7 @@ def test_listing_needs_no_blender(python: Run) -> None:
 def test_wrong_names_get_one_clear_line(python: Run, tmp_path: Path) -> None:
     done = python("-m", "blender_scenes", "build", "castle")
     assert done.returncode == 2
-    assert done.stderr == "error: no scene 'castle'; there are: living_room_walk\n"
+    assert done.stderr == f"error: no scene 'castle'; there are: {', '.join(scenes())}\n"
     done = python("-m", "blender_scenes", "build", "--out", tmp_path / "absent" / "a.blend")
     assert done.returncode == 2
     assert "no such folder" in done.stderr and len(done.stderr.splitlines()) == 1

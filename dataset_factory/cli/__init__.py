@@ -13,6 +13,8 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "validate": ("validate", "ValidateArgs"),
     "preview": ("preview", "PreviewArgs"),
     "impair": ("impair", "ImpairArgs"),
+    "stats": ("stats", "StatsArgs"),
+    "convert": ("convert", "ConvertArgs"),
 }
 
 _FIRST_STEPS = r"""A first dataset, about two minutes on two cores:

@@ -270,12 +270,25 @@ def _swing(
     spin = (start_pitch - before_pitch) / step * duration
     # The foot comes down on its heel nearly straight from above, slowing as it goes.
     arrival = 0.35 * (end - start) * np.array([1.0, 1.0, 0.0]) + np.array([0.0, 0.0, -0.05])
-    ankle = _hermite(share, start, velocity, end, arrival)
-    # A foot that climbs or comes down a step keeps clear of the edge.
-    lift = gait.lift_m + 0.9 * abs(there.place[2] - here.place[2])
-    ankle = ankle + np.array([0.0, 0.0, lift * np.sin(np.pi * share) ** 2])
+    climbed = there.place[2] - here.place[2]
+    if climbed == 0:
+        ankle = _hermite(share, start, velocity, end, arrival)
+        ankle = ankle + np.array([0.0, 0.0, gait.lift_m * np.sin(np.pi * share) ** 2])
+    else:
+        ankle = _over_edge(share, start, end, gait.lift_m + 0.15 * abs(climbed), climbed > 0)
     pitch = _hermite(share, np.array(start_pitch), np.array(0.6 * spin), np.array(end_pitch), 0.0)
     return ankle, float(pitch)
+
+
+def _over_edge(
+    share: float, start: np.ndarray, end: np.ndarray, lift_m: float, up: bool
+) -> np.ndarray:
+    """Ankle [m] of a foot that changes levels: up before it goes ahead, or ahead and then down."""
+    ahead = smoothstep((share - 0.22) / 0.78) if up else smoothstep(share / 0.75)
+    risen = smoothstep(share / 0.6) if up else smoothstep((share - 0.5) / 0.5)
+    ankle = start + ahead * (end - start)
+    ankle[2] = start[2] + risen * (end[2] - start[2]) + lift_m * np.sin(np.pi * share) ** 2
+    return ankle
 
 
 def _hermite(

@@ -49,6 +49,16 @@ class Legs:
 
 
 @dataclass(frozen=True)
+class Surface:
+    """A few points of the skin, each carried by one bone: enough to find what touches what."""
+
+    points: np.ndarray
+    """Where they are in the rest pose [m], shape (N, 3)."""
+    bone: np.ndarray
+    """Number of the bone that carries each, shape (N,)."""
+
+
+@dataclass(frozen=True)
 class Skeleton:
     """Bones of a body at rest."""
 
@@ -60,6 +70,8 @@ class Skeleton:
     """Where each bone starts [m], shape (B, 3)."""
     heel: np.ndarray
     """Lowest points of the heels, on z = 0, left first [m], shape (2, 3)."""
+    surface: Surface
+    """Points of the skin."""
     index: dict[str, int] = field(init=False, compare=False, repr=False)
     """Number of each bone."""
 
@@ -105,6 +117,20 @@ class Skeleton:
                 out[index] = out[parent] + turns[parent] @ (self.heads[index] - self.heads[parent])
         return out
 
+    def touching(self, pose: Pose, *prefixes: str) -> np.ndarray:
+        """Where the skin's points are in the world [m], shape (N, 3).
+
+        Args:
+            pose: The pose.
+            prefixes: Only points of bones whose names start so; none for all.
+        """
+        turns, joints = self.world_turns(pose), self.joints(pose)
+        bone, points = self.surface.bone, self.surface.points
+        if prefixes:
+            chosen = [self.bones[index].startswith(prefixes) for index in bone]
+            bone, points = bone[chosen], points[chosen]
+        return joints[bone] + np.einsum("nij,nj->ni", turns[bone], points - self.heads[bone])
+
     def locals(self, pose: Pose) -> np.ndarray:
         """Rotation of each bone against its parent as unit quaternions, w first, (B, 4)."""
         turns = self.world_turns(pose)
@@ -134,4 +160,22 @@ def skeleton_of(body: Body) -> Skeleton:
         low &= body.share(f"foot.{side}") > 0.5
         rearmost = body.vertices[low][body.vertices[low][:, 1].argmax()]
         heels.append([rearmost[0], rearmost[1] - 0.015, 0.0])
-    return Skeleton(body.bones, body.parents, body.heads, np.array(heels))
+    return Skeleton(body.bones, body.parents, body.heads, np.array(heels), _surface(body))
+
+
+def _surface(body: Body, per_bone: int = 7) -> Surface:
+    """Points far from each other on the skin of every bone, fingers with fewer."""
+    main = body.weights.argmax(axis=1)
+    points, bones = [], []
+    for index, name in enumerate(body.bones):
+        skin = body.vertices[main == index]
+        if not len(skin):
+            continue
+        count = min(2 if name.startswith("finger") else per_bone, len(skin))
+        chosen = [int(np.linalg.norm(skin - skin.mean(axis=0), axis=1).argmax())]
+        while len(chosen) < count:
+            gaps = np.linalg.norm(skin[:, None] - skin[chosen], axis=2).min(axis=1)
+            chosen.append(int(gaps.argmax()))
+        points.append(skin[chosen])
+        bones += [index] * count
+    return Surface(np.concatenate(points), np.array(bones))

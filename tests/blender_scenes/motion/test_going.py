@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -13,18 +15,14 @@ HERE = Posture((0.5, -0.2), 0.3)
 STEP_S = 0.02
 
 
-def joints_over(score: Score, step_s: float = STEP_S) -> np.ndarray:
-    """Joints [time, bone, 3] every `step_s` seconds."""
-    skeleton = score.figure.skeleton
-    times = np.arange(0, score.duration_s + step_s, step_s)
-    return np.stack([skeleton.joints(score.pose(float(time_s))) for time_s in times])
+Follow = Callable[[Score, float], np.ndarray]
 
 
 @pytest.fixture(scope="module")
-def outing(figure: Figure) -> tuple[Score, np.ndarray]:
+def outing(figure: Figure, joints_over: Follow) -> tuple[Score, np.ndarray]:
     pieces = [Walk([(2.5, -0.2), (2.5, 1.8)], 1.2), Turn(100), Stay(1.5), Walk([(0.5, 1.8)], 0.8)]
     score = compose(figure, HERE, pieces)
-    return score, joints_over(score)
+    return score, joints_over(score, STEP_S)
 
 
 def test_corners_are_arcs_of_their_radius() -> None:
@@ -111,12 +109,12 @@ def test_legs_never_stretch(outing: tuple[Score, np.ndarray]) -> None:
         assert np.linalg.norm(ankle - hip, axis=1).max() < 0.998 * (thigh + shin)
 
 
-def test_people_walk_differently(figure: Figure) -> None:
+def test_people_walk_differently(figure: Figure, joints_over: Follow) -> None:
     pieces: list[Piece] = [Walk([(3.5, -0.2)], 1.1)]
     other = Figure(figure.skeleton, Manner(arm_swing=1.4, sway=1.5, cadence=1.1, stoop_rad=0.1))
     swings = []
     for who in (figure, other):
-        joints = joints_over(compose(who, Posture((0.5, -0.2), 0.0), pieces))
+        joints = joints_over(compose(who, Posture((0.5, -0.2), 0.0), pieces), STEP_S)
         wrist = joints[:, who.skeleton.index["wrist.L"]] - joints[:, who.skeleton.index["root"]]
         swings.append(np.ptp(wrist[:, 0]))
     assert swings[1] > 1.2 * swings[0]
@@ -136,7 +134,7 @@ def test_breath_goes_in_and_out_at_its_rate() -> None:
     assert ((values[1:-1] > values[:-2]) & (values[1:-1] > values[2:])).sum() == 15
 
 
-def test_standing_is_never_frozen(figure: Figure) -> None:
+def test_standing_is_never_frozen(figure: Figure, joints_over: Follow) -> None:
     joints = joints_over(compose(figure, HERE, [Stay(6.0)]), 0.1)
     head = joints[:, figure.skeleton.index["head"]]
     foot = joints[:, figure.skeleton.index["foot.L"]]

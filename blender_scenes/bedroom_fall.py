@@ -1,15 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds bedroom_fall."""
+"""Builds bedroom_fall: an old man walks past his bed, falls and stays lying."""
 
 from __future__ import annotations
 
+import math
+from pathlib import Path
+
 import bpy
 
+from blender_scenes.assemble import Folders, save_scene, watch
+from blender_scenes.motion.falling import Fall
+from blender_scenes.motion.going import Stay, Walk
+from blender_scenes.motion.score import Posture
+from blender_scenes.people.cast import PEOPLE, cast, perform
 from blender_scenes.sets import bedroom
 from blender_scenes.sets.decoration import picture, plant
 from blender_scenes.sets.lighting import WARM, bulb, soft_light
 from blender_scenes.sets.room import Room, put
 from blender_scenes.sets.shell import Shell, Wall, door, window
+from blender_scenes.stage import add_access_points, around_room, corners
 
 
 def _furnish(to: bpy.types.Collection) -> None:
@@ -40,3 +49,19 @@ ROOM = Room(
     _furnish,
     _light,
 )
+
+FRAMES, FPS = 70, 10
+
+
+def build(out: Path) -> None:
+    """Builds the scene from nothing and saves it, compressed, as `out`."""
+    save_scene(out, "bedroom_fall", FRAMES, FPS, _fill)
+
+
+def _fill(scene: bpy.types.Scene, folders: Folders) -> None:
+    ROOM.build(folders)
+    georg = cast(PEOPLE["georg"], folders["Person"])
+    pieces = [Walk([(0.85, 0.2)], 0.6, open_start=True), Stay(0.4), Fall("front"), Stay(3.0)]
+    perform(georg, pieces, Posture((0.85, 1.0), -math.pi / 2), FPS, frame_end=FRAMES)
+    add_access_points(corners(ROOM.shell.half_m), (0.0, 0.0), folders["Stage"])
+    watch(scene, around_room(ROOM.shell.half_m), [georg.armature], folders["Stage"])

@@ -1,21 +1,34 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds office_sit_stand."""
+"""Builds office_sit_stand: a person sits down at a desk, works and stands up again."""
 
 from __future__ import annotations
 
+import math
+from pathlib import Path
+
 import bpy
 
+from blender_scenes.assemble import Folders, save_scene, watch
+from blender_scenes.motion.going import Stay
+from blender_scenes.motion.seat import Rise, Sit, before_seat
+from blender_scenes.people.cast import PEOPLE, cast, perform
 from blender_scenes.sets import workplace
 from blender_scenes.sets.decoration import ceiling_light, plant
 from blender_scenes.sets.lighting import COOL, NEUTRAL, ceiling_row, soft_light, sun
 from blender_scenes.sets.room import Room, put
 from blender_scenes.sets.shell import Shell, Wall, door, window
+from blender_scenes.stage import add_access_points, around_room, corners
+
+FRAMES, FPS = 90, 10
+#: Above the seat of the chair by more than a centimetre, so that the ray tracer keeps both.
+SEAT_M = 0.475
+CHAIR_M = (0.35, -0.20)
 
 
 def _furnish(to: bpy.types.Collection) -> None:
     put(to, workplace.desk("desk_1", 1.6), 0.35, -1.30)
     put(to, workplace.screen("screen_1"), 0.35, -1.47, 0, 0.752)
-    put(to, workplace.office_chair("chair_1"), 0.35, -0.46, 180)
+    put(to, workplace.office_chair("chair_1"), *CHAIR_M, 180)
     put(to, workplace.desk("desk_2", 1.4), -1.55, 1.42, 180)
     put(to, workplace.screen("screen_2"), -1.55, 1.58, 180, 0.752)
     put(to, workplace.office_chair("chair_2"), -1.4, 0.72, 20)
@@ -45,3 +58,18 @@ ROOM = Room(
     _furnish,
     _light,
 )
+
+
+def build(out: Path) -> None:
+    """Builds the scene from nothing and saves it, compressed, as `out`."""
+    save_scene(out, "office_sit_stand", FRAMES, FPS, _fill)
+
+
+def _fill(scene: bpy.types.Scene, folders: Folders) -> None:
+    ROOM.build(folders)
+    david = cast(PEOPLE["david"], folders["Person"])
+    start = before_seat(david.figure, CHAIR_M, -math.pi / 2, SEAT_M)
+    again = [Stay(0.5), Sit(SEAT_M), Stay(2.2), Rise(SEAT_M), Stay(0.9), Sit(SEAT_M), Stay(2.0)]
+    perform(david, again, start, FPS, frame_end=FRAMES)
+    add_access_points(corners(ROOM.shell.half_m), (0.0, 0.0), folders["Stage"])
+    watch(scene, around_room(ROOM.shell.half_m), [david.armature], folders["Stage"])

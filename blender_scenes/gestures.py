@@ -49,7 +49,7 @@ ROOM = Room(
     _light,
 )
 
-FRAMES, FPS = 240, 20
+FRAMES, FPS = 190, 10
 KINDS = ("push_pull", "sweep", "clap", "slide", "draw_o", "draw_zigzag")
 
 

@@ -20,6 +20,7 @@ from .materials import MaterialTable
 from .naming import Names
 from .people import Instance, action_label, find_instances, joints, segments
 from .ply import write_mesh
+from .poses import at_offsets, pose_offsets, pose_table
 from .state import kept, show_what_renders
 from .survey import Surface, positions, survey
 
@@ -76,6 +77,7 @@ def export_bundle(
     cameras: int | None = None,
     resolution: int | None = None,
     progress: Callable[[int, int], None] | None = None,
+    spans_s: list[float] | None = None,
 ) -> dict[str, Any]:
     """Writes the open scene as a bundle.
 
@@ -86,6 +88,7 @@ def export_bundle(
         cameras: The first so many cameras by name, None for all.
         resolution: Longer side of the pictures [px], None for the scene's.
         progress: Called with (frames done, frames in all).
+        spans_s: Times after each frame over which poses are written too [s], see `pose_table`.
 
     Returns:
         What `bundle.json` holds.
@@ -93,7 +96,8 @@ def export_bundle(
     Raises:
         AddonError: The scene cannot be exported; the message says why.
     """
-    numbers, sha256 = chosen_frames(scene, frames), file_sha256()
+    poses = pose_table(scene, spans_s or [])
+    numbers, sha256 = chosen_frames(scene, frames, between=bool(poses)), file_sha256()
     # Everything is written beside the old bundle first, so a failed export leaves that as it was.
     with kept(scene) as keeper:
         show_what_renders(keeper, scene)
@@ -110,8 +114,10 @@ def export_bundle(
             table = MaterialTable()
             objects = _write_objects(target, content, table)
             _write_topology(scene, target, content, table)
-            bounds = _write_frames(scene, target, content, numbers, progress)
+            offsets_s = pose_offsets(poses)
+            bounds = _write_frames(scene, target, content, numbers, offsets_s, progress)
             info = _describe(scene, content, numbers, sha256)
+            info.update({"poses": poses} if poses else {})
             info.update(
                 bounds_m=bounds.tolist(),
                 devices=devices,
@@ -197,9 +203,13 @@ def _write_frames(
     target: Path,
     content: Content,
     numbers: list[int],
+    offsets_s: list[float],
     progress: Callable[[int, int], None] | None,
 ) -> np.ndarray:
-    """Writes what moves, frame by frame; returns the bounds [2, 3] of the whole scene."""
+    """Writes what moves, frame by frame; returns the bounds [2, 3] of the whole scene.
+
+    Bounds come from whole frames alone: asking for poses between them moves no radio.
+    """
     people = content.people
     ids = np.array([person.id for person in people], np.int32)
     still = [surface.vertices for surface in content.surfaces if not surface.moving]
@@ -210,13 +220,19 @@ def _write_frames(
         vertices = _moving_vertices(scene, content.moving, number)
         low = np.minimum(low, vertices.min(axis=0))
         high = np.maximum(high, vertices.max(axis=0))
-        _save_arrays(
-            target / "frames" / f"{number:06d}.npz",
-            vertices=vertices,
-            joints=joints(scene, people),
-            person_instance=ids,
-            action=np.array([action_label(person, number) for person in people], dtype=np.str_),
-        )
+        arrays = {
+            "vertices": vertices,
+            "joints": joints(scene, people),
+            "person_instance": ids,
+            "action": np.array([action_label(item, number) for item in people], dtype=np.str_),
+        }
+        if offsets_s:
+            poses = [
+                _moving_vertices(scene, content.moving, number)
+                for _ in at_offsets(scene, number, offsets_s)
+            ]
+            arrays.update(pose_offset_s=np.array(offsets_s), pose_vertices=np.stack(poses))
+        _save_arrays(target / "frames" / f"{number:06d}.npz", **arrays)
         if progress:
             progress(done, len(numbers))
     return np.stack([low, high]).astype(np.float64)

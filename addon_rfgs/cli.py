@@ -34,6 +34,13 @@ def parser(program: str) -> argparse.ArgumentParser:
     commands = main.add_subparsers(dest="command", required=True, metavar="COMMAND")
     export = commands.add_parser("export", help="write the scene as a bundle")
     export.add_argument("--out", type=Path, required=True, help="folder of the bundle")
+    export.add_argument(
+        "--span",
+        type=float,
+        action="append",
+        metavar="SECONDS",
+        help="also write poses over so long after each frame (0: until the next); repeatable",
+    )
     truth = commands.add_parser("groundtruth", help="render pictures and passes with Cycles")
     truth.add_argument("--out", type=Path, required=True, help="folder of the pictures")
     for command in (export, truth):
@@ -102,6 +109,7 @@ def _export(options: argparse.Namespace, out: TextIO) -> str:
         options.cameras,
         options.resolution,
         _progress(out),
+        options.span,
     )
     return (
         f"wrote {options.out}: {len(info['frames'])} frames, {len(info['objects'])} objects, "

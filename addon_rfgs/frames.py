@@ -14,8 +14,14 @@ from .errors import AddonError
 _PATTERN = re.compile(r"\s*(-?\d+)\s*:\s*(-?\d+)\s*(?::\s*(\d+)\s*)?")
 
 
-def chosen_frames(scene: bpy.types.Scene, text: str | None) -> list[int]:
+def chosen_frames(scene: bpy.types.Scene, text: str | None, *, between: bool = False) -> list[int]:
     """Frame numbers of `A:B[:STEP]`, both ends included; nothing means the whole range.
+
+    Args:
+        scene: Gives the range.
+        text: What the user asked for.
+        between: Whether poses until the next frame are wanted too: the range's last frame has
+            none and is left out.
 
     Raises:
         AddonError: The scene has no range, or `text` is no range within it.
@@ -26,6 +32,7 @@ def chosen_frames(scene: bpy.types.Scene, text: str | None) -> list[int]:
             f"{file_label()}: the scene has no frame range ({first}:{last}); "
             "set Start and End in its output properties"
         )
+    last -= int(between)
     if not text:
         return list(range(first, last + 1))
     match = _PATTERN.fullmatch(text)
@@ -35,7 +42,8 @@ def chosen_frames(scene: bpy.types.Scene, text: str | None) -> list[int]:
     if start > end or step < 1:
         raise AddonError(f"frames: expected FIRST <= LAST and STEP >= 1, got {text!r}")
     if start < first or end > last:
-        raise AddonError(f"frames: {text} leaves the range {first}:{last} of {file_label()}")
+        why = ", whose last frame no packet can follow" if between else ""
+        raise AddonError(f"frames: {text} leaves the range {first}:{last} of {file_label()}{why}")
     return list(range(start, end + 1, step))
 
 

@@ -30,7 +30,7 @@ from rfgs_core.dataset.writer import (
 )
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json, write_json
-from rfgs_core.radio import DevicePose, frame_samples, layout, preset
+from rfgs_core.radio import DevicePose, frame_samples, layout, pose_span_s
 from rfgs_core.radio.impairments import impairments_from_json
 
 logger = logging.getLogger(__name__)
@@ -107,8 +107,11 @@ def _export(job: Job) -> Bundle:
         logger.info("exporting the scene from Blender")
         arguments = ["--out", str(fresh), *job.picture_size]
         frames = ["--frames", job.plan.frames] if job.plan.frames else []
+        spans = {pose_span_s(job.plan.radio(name)) for name in job.plan.radios}
+        spans_s = sorted(span_s for span_s in spans if span_s is not None)
+        poses = [text for span_s in spans_s for text in ("--span", repr(span_s))]
         with progress_bar("export", "frame") as progress:
-            job.blender.run("export", *arguments, *frames, progress=progress)
+            job.blender.run("export", *arguments, *frames, *poses, progress=progress)
         read_bundle(fresh)
         fresh.rename(target)
     return read_bundle(target)
@@ -116,7 +119,7 @@ def _export(job: Job) -> Bundle:
 
 def _choose(job: Job, bundle: Bundle) -> tuple[dict[str, list[DevicePose]], list[dict[str, Any]]]:
     """Chooses each radio's devices and refuses what cannot be traced."""
-    radios = [preset(name) for name in job.plan.radios]
+    radios = [job.plan.radio(name) for name in job.plan.radios]
     devices, guesses = {}, []
     for radio in radios:
         devices[radio.name], guess = choose_devices(bundle, radio)
@@ -140,7 +143,7 @@ def _prepare(
     write_sequence_info(job.files, sequence)
     times = [(frame - sequence.frame_start) / sequence.fps for frame in sequence.frames]
     for name, poses in devices.items():
-        radio = preset(name)
+        radio = job.plan.radio(name)
         samples = frame_samples(radio, sequence.fps)
         create_csi(
             job.files.csi(name), radio, layout(radio, poses), sequence.frames, times, samples

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib import metadata
 from pathlib import Path
 from typing import Any, Literal
@@ -13,8 +13,10 @@ from rfgs_core.dataset.csi_store import chunk_file
 from rfgs_core.dataset.names import SequenceFiles
 from rfgs_core.errors import RfgsError
 from rfgs_core.frames import parse_frames
-from rfgs_core.radio import preset
+from rfgs_core.radio import Radio, preset
 
+#: More packets per frame than any radio sends.
+MAX_PACKETS = 10_000
 #: Packages whose version may change a byte of the data.
 PACKAGES = ("rfgs", "sionna-rt", "mitsuba", "drjit", "numpy", "scipy", "numba", "zarr", "OpenEXR")
 
@@ -47,6 +49,15 @@ class Plan:
     """Whether pictures are rendered."""
     impairments: dict[str, Any] | None = None
     """Settings of the impaired channels beside the clean ones; none makes none."""
+    packets_per_frame: int = 1
+    """Packets or chirps of each frame; 1 leaves every radio its own number."""
+
+    def radio(self, name: str) -> Radio:
+        """One of the plan's radios, with the packets asked for."""
+        radio = preset(name)
+        if self.packets_per_frame == 1:
+            return radio
+        return replace(radio, samples_per_frame=self.packets_per_frame)
 
 
 def make_plan(scene: Scene, radios: tuple[str, ...], frames: str, **options: Any) -> Plan:
@@ -74,6 +85,9 @@ def make_plan(scene: Scene, radios: tuple[str, ...], frames: str, **options: Any
     for name, (low, high) in limits.items():
         if not low <= options[name] <= high:
             raise RfgsError(f"--{name} {options[name]}: expected {low} to {high}")
+    packets = options.get("packets_per_frame", 1)
+    if not 1 <= packets <= MAX_PACKETS:
+        raise RfgsError(f"--packets-per-frame {packets}: expected 1 to {MAX_PACKETS}")
     return Plan(
         scene=scene.name,
         blend_sha256=blend_digest(scene),

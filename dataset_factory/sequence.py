@@ -17,7 +17,7 @@ from rfgs_core.dataset.splits import image_split, radio_split
 from rfgs_core.dataset.writer import write_arrays
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json
-from rfgs_core.radio import DevicePose, layout, preset
+from rfgs_core.radio import DevicePose, layout
 
 
 def describe_sequence(
@@ -27,7 +27,7 @@ def describe_sequence(
     guesses: list[dict[str, Any]],
 ) -> SequenceInfo:
     """Everything `sequence.json` holds; a function of the plan and the bundle alone."""
-    radios = [preset(name) for name in plan.radios]
+    radios = [plan.radio(name) for name in plan.radios]
     cameras = [dict(row) for row in bundle.cameras] if plan.images else []
     images = image_split([row["name"] for row in cameras], bundle.frames)
     for row in cameras:

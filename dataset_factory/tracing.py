@@ -52,6 +52,7 @@ def _request(job: Job, bundle: Bundle, sequence: SequenceInfo) -> dict[str, Any]
     return {
         "bundle": str(bundle.path),
         "sequence": str(job.files.root),
+        "radios": sequence.radios,
         "devices": {
             radio: [asdict(device_pose(row)) for row in rows]
             for radio, rows in sequence.devices.items()

@@ -21,9 +21,8 @@ import numpy as np
 from dataset_factory.bundle import Bundle, read_bundle
 from rfgs_core.dataset.csi_store import write_csi
 from rfgs_core.dataset.names import SequenceFiles
-from rfgs_core.dataset.schema import device_pose
+from rfgs_core.dataset.schema import device_pose, radio_from_json
 from rfgs_core.errors import RfgsError
-from rfgs_core.radio import preset
 
 if TYPE_CHECKING:
     from dataset_factory.trace import Tracer
@@ -79,7 +78,7 @@ class Worker:
             self.radio = radio
             self.tracer = Tracer(
                 self.bundle,
-                preset(radio),
+                radio_from_json(self.bundle.path, self.job["radios"][radio]),
                 devices,
                 depth=self.job["depth"],
                 shadow=self.job["shadow"],

@@ -52,6 +52,9 @@ class GenerateArgs:
     impairments: str = ""
     """Also store what imperfect radios would report: thermal, lab, commodity or a JSON file; see
     `rfgs-factory impair --help`."""
+    packets_per_frame: int = 1
+    """Channels per frame, for Doppler: packets spread until the next frame, or for mmwave chirps
+    0.25 ms apart. The animation's last frame is left out, as nothing is known beyond it."""
     images: bool = True
     """Render pictures with Blender."""
     blender: Path | None = None
@@ -85,6 +88,7 @@ def run(args: GenerateArgs) -> int:
         shadow=args.shadow,
         images=args.images,
         impairments=asdict(read_impairments(args.impairments)) if args.impairments else None,
+        packets_per_frame=args.packets_per_frame,
     )
     use_llvm()
     blender = Blender(scene.blend, args.blender)

@@ -36,9 +36,25 @@ class PosedPoints:
         return self.positions + LIFT_M * self.normals
 
 
+def in_sight(mi_scene: Any, points: PosedPoints, layout: Layout) -> np.ndarray:
+    """Which points every pair of sites sees from both ends.
+
+    Sionna's own ray test from each point to the centre of each site, in the scene with
+    everything that moves in place.
+
+    Returns:
+        1 where nothing stands between, else 0, shape (tx site, rx site, point).
+    """
+    lifted = points.lifted
+    tx_centres, rx_centres = centres(layout)
+    sees_tx = np.stack([visible(mi_scene, lifted, centre) for centre in tx_centres])
+    sees_rx = np.stack([visible(mi_scene, lifted, centre) for centre in rx_centres])
+    return (sees_tx[:, None] & sees_rx[None]).astype(np.float64)
+
+
 def direct_channel(
-    mi_scene: Any,
     points: PosedPoints,
+    seen: np.ndarray,
     layout: Layout,
     devices: list[DevicePose],
     gamma: dict[int, np.ndarray],
@@ -46,13 +62,13 @@ def direct_channel(
 ) -> np.ndarray:
     """Single-bounce channel of the moving points, for every measured link.
 
-    Visibility is Sionna's own ray test from each point to the centre of each site, in the
-    scene with the body in it, and antenna patterns are taken in that direction; distances and
-    facets are exact per element and tone.
+    Antenna patterns are taken in the direction between points and the centre of each site;
+    distances and facets are exact per element and tone.
 
     Args:
-        mi_scene: Mitsuba scene with everything that moves in place.
         points: Scattering points.
+        seen: Share of each point that pairs of sites see, as `in_sight` tells, shape
+            (tx site, rx site, point).
         layout: Antenna elements.
         devices: Poses of the devices, for pattern and polarisation.
         gamma: Reflection coefficient by material index, each of shape (subcarrier,).
@@ -63,24 +79,21 @@ def direct_channel(
     """
     lifted = points.lifted
     tx_centres, rx_centres = centres(layout)
-    sees_tx = [visible(mi_scene, lifted, centre) for centre in tx_centres]
-    sees_rx = [visible(mi_scene, lifted, centre) for centre in rx_centres]
     tx_owner, rx_owner = owners(layout)
     shape = (len(layout.tx_xyz), len(layout.rx_xyz), radio.num_subcarriers)
     out = np.zeros(shape, dtype=np.complex128)
     for (a, b), (i, j) in product(site_pairs(layout), ports(layout)):
-        both = sees_tx[a] & sees_rx[b]
         into, out_of = lifted - tx_centres[a], rx_centres[b] - lifted
         tx_axes, rx_axes = (
             rotation(devices[owner].quat_wxyz) for owner in (tx_owner[a], rx_owner[b])
         )
         sent = field(radio.pattern, radio.slants_deg[i], into, tx_axes)
         heard = field(radio.pattern, radio.slants_deg[j], -out_of, rx_axes)
-        factor = passed_on(into, out_of, sent, heard)
+        factor = seen[a, b] * passed_on(into, out_of, sent, heard)
         tx = np.flatnonzero((layout.tx_site == a) & (layout.tx_port == i))
         rx = np.flatnonzero((layout.rx_site == b) & (layout.rx_port == j))
         for material, coefficient in gamma.items():
-            weights = np.where(both & (points.material == material), factor, 0.0)
+            weights = np.where(points.material == material, factor, 0.0)
             part = facet_sum(
                 lifted,
                 points.normals,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dataset_factory.bundle import Bundle, BundleFrame
+from dataset_factory.bundle import Bundle
 
 
 @dataclass(frozen=True)
@@ -28,9 +28,9 @@ class Movers:
     def __len__(self) -> int:
         return len(self.faces)
 
-    def posed(self, frame: BundleFrame) -> np.ndarray:
-        """Vertices at a frame [m], float32, shape (V, 3)."""
-        return frame.vertices[self.kept]
+    def posed(self, vertices: np.ndarray) -> np.ndarray:
+        """Their share of all moving vertices [m], shape (V, 3)."""
+        return vertices[self.kept]
 
 
 def split_movers(bundle: Bundle) -> tuple[Movers, Movers]:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,13 +13,15 @@ import numpy as np
 import sionna.rt as rt
 
 from dataset_factory.bundle import Bundle, BundleFrame
+from dataset_factory.motion import read_motion
 from dataset_factory.trace.bounces import BUFFER, Bounces, with_facets
-from dataset_factory.trace.direct import PosedPoints, direct_channel
+from dataset_factory.trace.direct import PosedPoints, direct_channel, in_sight
 from dataset_factory.trace.environment import (
     Environment,
     environment_channel,
     node_frequencies,
 )
+from dataset_factory.trace.held import Trace, follow, mixed
 from dataset_factory.trace.movers import split_movers
 from dataset_factory.trace.paths import PathSet
 from dataset_factory.trace.points import SurfacePoints, surface_points
@@ -34,11 +37,13 @@ from dataset_factory.trace.scene import (
 from dataset_factory.trace.shadow import Shadow, coarse_mesh, transmission
 from dataset_factory.trace.steering import steer
 from rfgs_core.errors import RfgsError
-from rfgs_core.radio import Radio, layout
+from rfgs_core.radio import Radio, frame_samples, layout, pose_span_s
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.layout import DevicePose
 from rfgs_core.seeds import sub_seed
 
+#: Longest time between traces of a frame with several samples [s].
+TRACE_STEP_S = 0.02
 #: Dr.Jit keeps kernels and memory of every frame; they are dropped this often [frames].
 FLUSH_EVERY = 10
 
@@ -84,6 +89,7 @@ class Tracer:
         self._shadow: Shadow = shadow
         self._seed = seed
         self._layout = layout(radio, devices)
+        self._samples = frame_samples(radio, bundle.fps)
         self._nodes = node_frequencies(radio)
         self.timings: dict[str, float] = dict.fromkeys(
             ("environment", "shadow", "people_direct", "people_bounces"), 0.0
@@ -118,10 +124,31 @@ class Tracer:
     def samples(self, frame: BundleFrame) -> np.ndarray:
         """Channels at every sample of a frame, complex64, shape (sample, tx, rx, subcarrier).
 
-        What the samples are, `rfgs_core.radio.frame_samples` says: their times, and the places
-        of antennas that move within a frame.
+        The first is `frame`'s. For the others the scene is traced every `TRACE_STEP_S` at most;
+        in between, points and facets are where the animation has them, with exact path lengths,
+        while visibility, walls met and shadows fade from one trace to the next.
         """
-        return self.frame(frame)[None]
+        offset_s = self._samples.offset_s
+        first = self._trace(frame.vertices)
+        channel = self._channel(first.points, (first,), (1.0,))
+        out = np.zeros((len(offset_s), *channel.shape), dtype=np.complex64)
+        out[0] = channel
+        span_s = pose_span_s(self._radio)
+        if span_s is None:
+            return out
+        motion = read_motion(self._bundle, frame.frame, span_s)
+        parts = max(1, math.ceil(offset_s[-1] / TRACE_STEP_S - 1e-9))
+        before, after, part = first, first, 0
+        for k, time_s in enumerate(offset_s[1:], start=1):
+            progress = time_s / offset_s[-1] * parts
+            while part < progress and part < parts:
+                part += 1
+                before = after
+                after = self._trace(motion.at(offset_s[-1] * part / parts))
+            share = 1.0 - part + progress
+            points = self._posed(motion.at(time_s))
+            out[k] = self._channel(points, (before, after), (1.0 - share, share))
+        return out
 
     def frame(self, frame: BundleFrame) -> np.ndarray:
         """Channel at one frame; the result does not depend on frames traced before.
@@ -132,55 +159,83 @@ class Tracer:
         Returns:
             Complex64, shape (tx, rx, subcarrier), zero where a link is not measured.
         """
-        paths = self._paths_at(frame)
+        trace = self._trace(frame.vertices)
+        return self._channel(trace.points, (trace,), (1.0,)).astype(np.complex64)
+
+    def _trace(self, vertices: np.ndarray) -> Trace:
+        """Everything that needs rays, with everything that moves in place.
+
+        Args:
+            vertices: Vertices of the bundle [m], shape (V, 3).
+        """
+        vertices = vertices.astype(np.float32)
+        paths = self._paths_at(vertices)
         if self._points is None:
             self._flush()
-            return environment_channel(paths, self._radio, self._layout).astype(np.complex64)
-        vertices = self._people.posed(frame)
+            return Trace(environment_channel(paths, self._radio, self._layout))
+        people = self._people.posed(vertices)
         with self._timed("shadow"):
-            bodies = [(vertices[kept], faces) for kept, faces in self._outlines]
+            bodies = [(people[kept], faces) for kept, faces in self._outlines]
             passed = transmission(paths, self._layout, bodies, self._nodes, self._shadow)
-            channel = environment_channel(paths, self._radio, self._layout, passed)
-        self._move(frame)
-        points = self._posed(frame)
+            environment = environment_channel(paths, self._radio, self._layout, passed)
+        self._move(vertices)
+        points = self._posed(vertices)
+        assert points is not None
         with self._timed("people_direct"):
-            channel += direct_channel(
-                self._scene.mi_scene,
-                points,
-                self._layout,
-                self._devices,
-                self._gamma(self._radio.freq_hz),
-                self._radio,
-            )
+            seen = in_sight(self._scene.mi_scene, points, self._layout)
+        bounced = None
         if self._bounces is not None:
             with self._timed("people_bounces"):
-                channel += self._bounced(points, self._bounces)
-        channel[~self._layout.measured] = 0.0
+                bounced = self._bounces.paths(points)
         self._flush()
-        return channel.astype(np.complex64)
+        return Trace(environment, points, seen, bounced)
 
-    def _paths_at(self, frame: BundleFrame) -> PathSet:
-        """Paths without people at a frame."""
+    def _channel(
+        self, points: PosedPoints | None, traces: tuple[Trace, ...], shares: tuple[float, ...]
+    ) -> np.ndarray:
+        """Channel of points in a mixture of traces, complex128, (tx, rx, subcarrier)."""
+        weighted = list(zip(traces, shares, strict=True))
+        channel = mixed([(trace.environment, share) for trace, share in weighted])
+        if points is not None:
+            with self._timed("people_direct"):
+                channel += direct_channel(
+                    points,
+                    mixed([(trace.seen, share) for trace, share in weighted]),
+                    self._layout,
+                    self._devices,
+                    self._gamma(self._radio.freq_hz),
+                    self._radio,
+                )
+            for trace, share in weighted:
+                if share and trace.bounced is not None:
+                    with self._timed("people_bounces"):
+                        channel += share * self._bounced(points, trace)
+        channel[~self._layout.measured] = 0.0
+        return channel
+
+    def _paths_at(self, vertices: np.ndarray) -> PathSet:
+        """Paths without people when the bundle's vertices are at places [m], shape (V, 3)."""
         if not len(self._vehicles):
             return self._static_paths
         with self._timed("environment"):
-            return self._environment.paths(self._vehicles.posed(frame))
+            return self._environment.paths(self._vehicles.posed(vertices))
 
-    def _bounced(self, points: PosedPoints, bounces: Bounces) -> np.ndarray:
+    def _bounced(self, points: PosedPoints, trace: Trace) -> np.ndarray:
         """People's paths by way of walls, shape (tx, rx, subcarrier)."""
+        assert trace.bounced is not None
+        paths = trace.bounced
+        if points is not trace.points:
+            paths = follow(paths, points.lifted)
         paths = with_facets(
-            bounces.paths(points),
-            points,
-            self._gamma(self._nodes),
-            self._nodes,
-            self._radio.centre_hz,
+            paths, points, self._gamma(self._nodes), self._nodes, self._radio.centre_hz
         )
         return steer(paths, self._layout, self._radio.freq_hz, self._nodes)
 
-    def _posed(self, frame: BundleFrame) -> PosedPoints:
-        """Scattering points at a frame."""
-        assert self._points is not None
-        positions, normals = self._points.at(self._people.posed(frame))
+    def _posed(self, vertices: np.ndarray) -> PosedPoints | None:
+        """Scattering points when the bundle's vertices are at places [m], shape (V, 3)."""
+        if self._points is None:
+            return None
+        positions, normals = self._points.at(self._people.posed(vertices))
         return PosedPoints(positions, normals, self._points.areas, self._points.material)
 
     def _gamma(self, freq_hz: np.ndarray) -> dict[int, np.ndarray]:
@@ -224,11 +279,11 @@ class Tracer:
         )
         self._scene.edit(add=body)
 
-    def _move(self, frame: BundleFrame) -> None:
-        """Puts people and vehicles where they are at a frame, in place."""
-        move_meshes(self._scene, {BODY: self._people.posed(frame)})
+    def _move(self, vertices: np.ndarray) -> None:
+        """Puts people and vehicles in place, given the bundle's vertices [m], shape (V, 3)."""
+        move_meshes(self._scene, {BODY: self._people.posed(vertices)})
         if len(self._vehicles):
-            move_vehicles(self._scene, self._vehicles, self._vehicles.posed(frame))
+            move_vehicles(self._scene, self._vehicles, self._vehicles.posed(vertices))
 
     def _flush(self) -> None:
         """Drops what Dr.Jit keeps of past frames, every few frames."""

@@ -6,7 +6,7 @@ from __future__ import annotations
 from rfgs_core.radio.layout import DevicePose, Layout, layout
 from rfgs_core.radio.placement import place_devices
 from rfgs_core.radio.presets import PRESETS, Radio, preset
-from rfgs_core.radio.samples import FrameSamples, frame_samples
+from rfgs_core.radio.samples import FrameSamples, frame_samples, pose_span_s
 
 __all__ = [
     "PRESETS",
@@ -17,5 +17,6 @@ __all__ = [
     "frame_samples",
     "layout",
     "place_devices",
+    "pose_span_s",
     "preset",
 ]

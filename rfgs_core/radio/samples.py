@@ -54,3 +54,14 @@ def frame_samples(radio: Radio, fps: float) -> FrameSamples:
             f"{int(frame_s / interval_s * (1.0 + 1e-9)) if interval_s > 0.0 else 1}"
         )
     return FrameSamples(np.arange(count) * interval_s)
+
+
+def pose_span_s(radio: Radio) -> float | None:
+    """Time after each frame over which a radio needs to know how things move [s].
+
+    Returns:
+        0 for all of it until the next frame; None if the frame itself is enough.
+    """
+    if radio.samples_per_frame == 1:
+        return None
+    return (radio.samples_per_frame - 1) * radio.sample_interval_s

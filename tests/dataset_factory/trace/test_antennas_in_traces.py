@@ -84,7 +84,7 @@ def test_dipoles_have_their_closed_form_in_both_terms(
     tracer = Tracer(bundle, dipoles, devices, depth=1)
     lone = Tracer(bundle, radio, devices, depth=1)
     # One facet at a time: the body is far from a point, so each has factors of its own.
-    points = tracer._posed(bundle.frame(1))
+    points = tracer._posed(bundle.frame(1).vertices)
     for index in (0, len(points.areas) // 2):
         one = replace(
             points,
@@ -105,13 +105,14 @@ def test_dipoles_have_their_closed_form_in_both_terms(
 
 def _direct(tracer, points) -> np.ndarray:
     """The direct term of some points between the two devices, without the body's own shadow."""
-    from dataset_factory.trace.direct import direct_channel
+    from dataset_factory.trace.direct import direct_channel, in_sight
     from dataset_factory.trace.scene import environment_scene
 
     free = environment_scene(tracer._bundle, tracer._radio)
     gamma = tracer._gamma(tracer._radio.freq_hz)
     devices, radio = tracer._devices, tracer._radio
-    return direct_channel(free.mi_scene, points, tracer._layout, devices, gamma, radio)[0, 1]
+    seen = in_sight(free.mi_scene, points, tracer._layout)
+    return direct_channel(points, seen, tracer._layout, devices, gamma, radio)[0, 1]
 
 
 @pytest.mark.parametrize("polarization", ["V", "H"])
@@ -161,7 +162,7 @@ def test_direct_term_of_any_antenna_matches_the_solver(
 ) -> None:
     from dataset_factory.trace import Tracer
     from dataset_factory.trace.bounces import with_facets
-    from dataset_factory.trace.direct import direct_channel
+    from dataset_factory.trace.direct import direct_channel, in_sight
     from dataset_factory.trace.paths import path_set
     from dataset_factory.trace.scene import centres
     from dataset_factory.trace.steering import steer
@@ -170,8 +171,12 @@ def test_direct_term_of_any_antenna_matches_the_solver(
     devices = [replace(devices[0], quat_wxyz=(0.95, 0.2, 0.1, 0.2)), devices[1]]
     bundle = make_bundle(static=[], mover=coarse_capsule)
     tracer = Tracer(bundle, radio, devices, depth=2)
-    tracer._move(bundle.frame(1))
-    points, elements, nodes = tracer._posed(bundle.frame(1)), layout(radio, devices), radio.freq_hz
+    tracer._move(bundle.frame(1).vertices)
+    points, elements, nodes = (
+        tracer._posed(bundle.frame(1).vertices),
+        layout(radio, devices),
+        radio.freq_hz,
+    )
     bounces = tracer._bounces
     bounces._hang(points.lifted)
     traced = bounces._solver(
@@ -181,7 +186,8 @@ def test_direct_term_of_any_antenna_matches_the_solver(
     paths = with_facets(paths, points, tracer._gamma(nodes), nodes, radio.centre_hz)
     solver = steer(paths, elements, radio.freq_hz, nodes)
     scene, gamma = tracer._scene.mi_scene, tracer._gamma(nodes)
-    ours = direct_channel(scene, points, elements, devices, gamma, radio)
+    seen = in_sight(scene, points, elements)
+    ours = direct_channel(points, seen, elements, devices, gamma, radio)
     assert np.linalg.norm(solver) > 0
     error = np.linalg.norm(ours - solver) / np.linalg.norm(solver)
     assert 20 * np.log10(error) < -80.0

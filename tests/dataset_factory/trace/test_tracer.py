@@ -27,8 +27,16 @@ def posed_body(bundle: Bundle, radio: Radio, devices: list[DevicePose]) -> tuple
 
     tracer = Tracer(bundle, radio, devices, depth=2)
     frame = bundle.frame(1)
-    tracer._move(frame)
-    return tracer, tracer._posed(frame)
+    tracer._move(frame.vertices)
+    return tracer, tracer._posed(frame.vertices)
+
+
+def bounced(tracer, points) -> np.ndarray:
+    """Channel of the points by way of walls."""
+    from dataset_factory.trace.held import Trace
+
+    trace = Trace(np.zeros(0), points, None, tracer._bounces.paths(points))
+    return tracer._bounced(points, trace)
 
 
 @pytest.mark.parametrize("quat", [UPRIGHT, TILTED], ids=["upright", "tilted"])
@@ -40,7 +48,7 @@ def test_direct_term_matches_the_solver(
     quat: tuple[float, float, float, float],
 ) -> None:
     from dataset_factory.trace.bounces import with_facets
-    from dataset_factory.trace.direct import direct_channel
+    from dataset_factory.trace.direct import direct_channel, in_sight
     from dataset_factory.trace.paths import path_set
     from dataset_factory.trace.scene import centres
     from dataset_factory.trace.steering import steer
@@ -58,9 +66,8 @@ def test_direct_term_matches_the_solver(
     paths = path_set(traced, *centres(elements))
     paths = with_facets(paths, points, tracer._gamma(nodes), nodes, radio.centre_hz)
     solver = steer(paths, elements, radio.freq_hz, nodes)
-    ours = direct_channel(
-        tracer._scene.mi_scene, points, elements, devices, tracer._gamma(nodes), radio
-    )
+    seen = in_sight(tracer._scene.mi_scene, points, elements)
+    ours = direct_channel(points, seen, elements, devices, tracer._gamma(nodes), radio)
     assert error_db(ours, solver) < -80.0
 
 
@@ -75,9 +82,9 @@ def test_chunked_bounces_match_one_call(
     # Enough rays that every wall is hit from every point, whatever its place in a chunk.
     monkeypatch.setattr(bounces, "NUM_SAMPLES", 4000)
     tracer, points = posed_body(person_bundle, small_radio, two_devices)
-    whole = tracer._bounced(points, tracer._bounces)
+    whole = bounced(tracer, points)
     monkeypatch.setattr(bounces, "CHUNK", 400)
-    assert error_db(tracer._bounced(points, tracer._bounces), whole) < -60.0
+    assert error_db(bounced(tracer, points), whole) < -60.0
 
 
 def test_joined_legs_match_the_original_solver(
@@ -86,9 +93,9 @@ def test_joined_legs_match_the_original_solver(
     from sionna.rt.rcs import RCSSolver
 
     tracer, points = posed_body(person_bundle, small_radio, two_devices)
-    ours = tracer._bounced(points, tracer._bounces)
+    ours = bounced(tracer, points)
     tracer._bounces._solver = RCSSolver(deterministic=True)
-    assert error_db(tracer._bounced(points, tracer._bounces), ours) < -100.0
+    assert error_db(bounced(tracer, points), ours) < -100.0
 
 
 def test_bounced_elements_match_tracing_each_of_them(
@@ -102,13 +109,13 @@ def test_bounced_elements_match_tracing_each_of_them(
     single = replace(radio, rx_rows=1, rx_cols=1)
     bundle = make_bundle(static=three_sheets, mover=coarse_capsule)
     tracer, points = posed_body(bundle, radio, two_devices)
-    ours = tracer._bounced(points, tracer._bounces)[0, 4::3]
+    ours = bounced(tracer, points)[0, 4::3]
     elements = layout(radio, two_devices).rx_xyz[4::3]
     alone = []
     for place in elements:
         devices = [two_devices[0], replace(two_devices[1], position_m=tuple(place.tolist()))]
         lone, _ = posed_body(bundle, single, devices)
-        alone.append(lone._bounced(points, lone._bounces)[0, 1])
+        alone.append(bounced(lone, points)[0, 1])
     assert error_db(ours, np.stack(alone)) < -25.0
 
 

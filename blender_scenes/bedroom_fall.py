@@ -27,7 +27,7 @@ def _furnish(to: bpy.types.Collection) -> None:
     put(to, bedroom.wardrobe("wardrobe"), -0.2, 1.56, 180)
     put(to, bedroom.dresser("dresser"), 1.98, 0.75, 90)
     put(to, picture("picture", (0.7, 0.5), "paint_sand"), -1.1, -1.986, 0, 1.65)
-    put(to, plant(), 1.75, 1.55)
+    put(to, plant(), 1.95, -0.45)
 
 
 def _light(to: bpy.types.Collection) -> None:

@@ -36,7 +36,7 @@ def _furnish(to: bpy.types.Collection) -> None:
     put(to, workplace.filing_cabinet("cabinet_2", 3), 0.72, 1.66, 180)
     put(to, workplace.whiteboard("whiteboard"), -2.484, -0.2, -90, 1.0)
     put(to, workplace.bin_("bin"), -0.75, -1.55)
-    put(to, plant(), -2.05, -1.5)
+    put(to, plant(), 2.05, -1.55)
     put(to, ceiling_light(), 0.0, 0.0)
 
 

@@ -23,6 +23,7 @@ from .ply import write_mesh
 from .poses import at_offsets, pose_offsets, pose_table
 from .state import kept, show_what_renders
 from .survey import Surface, positions, survey
+from .velocities import SegmentVelocities
 
 SCHEMA = "rfgs-bundle/1"
 VERSION = "0.1.0"
@@ -113,9 +114,9 @@ def export_bundle(
             content.guesses += light_guesses(scene)
             table = MaterialTable()
             objects = _write_objects(target, content, table)
-            _write_topology(scene, target, content, table)
+            topology = _write_topology(scene, target, content, table)
             offsets_s = pose_offsets(poses)
-            bounds = _write_frames(scene, target, content, numbers, offsets_s, progress)
+            bounds = _write_frames(scene, target, content, topology, numbers, offsets_s, progress)
             info = _describe(scene, content, numbers, sha256)
             info.update({"poses": poses} if poses else {})
             info.update(
@@ -174,8 +175,12 @@ def _write_objects(target: Path, content: Content, table: MaterialTable) -> list
 
 def _write_topology(
     scene: bpy.types.Scene, target: Path, content: Content, table: MaterialTable
-) -> None:
-    """Writes `topology.npz`; the rest pose has all armatures of moving things at rest."""
+) -> dict[str, np.ndarray]:
+    """Writes `topology.npz`; the rest pose has all armatures of moving things at rest.
+
+    Returns:
+        Faces, and material, instance and segment of each.
+    """
     owner = {surface.key: item for item in content.instances for surface in item.surfaces}
     parts: dict[str, list[np.ndarray]] = {
         name: [] for name in ("faces", "material", "instance", "segment")
@@ -196,12 +201,14 @@ def _write_topology(
         scene.frame_set(scene.frame_start)
         rest = _moving_vertices(scene, content.moving, scene.frame_start)
     _save_arrays(target / "topology.npz", **arrays, rest_vertices=rest)
+    return arrays
 
 
 def _write_frames(
     scene: bpy.types.Scene,
     target: Path,
     content: Content,
+    topology: dict[str, np.ndarray],
     numbers: list[int],
     offsets_s: list[float],
     progress: Callable[[int, int], None] | None,
@@ -215,7 +222,11 @@ def _write_frames(
     still = [surface.vertices for surface in content.surfaces if not surface.moving]
     low = np.min([points.min(axis=0) for points in still], axis=0) if still else np.full(3, np.inf)
     high = np.max([points.max(axis=0) for points in still], axis=0) if still else -low
+    velocities = SegmentVelocities(
+        scene, people, topology, lambda frame: _moving_vertices(scene, content.moving, frame)
+    )
     for done, number in enumerate(numbers, start=1):
+        velocity = velocities.at(number)
         scene.frame_set(number)
         vertices = _moving_vertices(scene, content.moving, number)
         low = np.minimum(low, vertices.min(axis=0))
@@ -223,6 +234,7 @@ def _write_frames(
         arrays = {
             "vertices": vertices,
             "joints": joints(scene, people),
+            "segment_velocity": velocity,
             "person_instance": ids,
             "action": np.array([action_label(item, number) for item in people], dtype=np.str_),
         }

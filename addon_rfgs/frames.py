@@ -68,3 +68,8 @@ def file_sha256() -> str:
         raise AddonError("the scene was never saved; save it first")
     with Path(bpy.data.filepath).open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def seconds_per_frame(scene: bpy.types.Scene) -> float:
+    """Time from one frame to the next [s]."""
+    return float(scene.render.fps_base / scene.render.fps)

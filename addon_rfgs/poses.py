@@ -10,6 +10,7 @@ from typing import Any
 import bpy
 
 from .errors import AddonError
+from .frames import seconds_per_frame
 
 #: Longest time between poses [s]; within it a spline follows a limb to a tenth of a millimetre.
 POSE_STEP_S = 0.02
@@ -33,7 +34,7 @@ def pose_table(scene: bpy.types.Scene, spans_s: list[float]) -> list[dict[str, A
     Raises:
         AddonError: A span is negative or longer than a frame.
     """
-    frame_s = scene.render.fps_base / scene.render.fps
+    frame_s = seconds_per_frame(scene)
     rows = []
     for span_s in spans_s:
         length_s = span_s or frame_s
@@ -55,7 +56,7 @@ def pose_offsets(table: list[dict[str, Any]]) -> list[float]:
 def at_offsets(scene: bpy.types.Scene, frame: int, offsets_s: list[float]) -> Iterator[float]:
     """Puts the scene at each time after a frame in turn; yields the offset [s]."""
     for offset_s in offsets_s:
-        time = frame + offset_s * scene.render.fps / scene.render.fps_base
+        time = frame + offset_s / seconds_per_frame(scene)
         # A pose that closes a whole frame is the next frame, whatever the rounding.
         whole = math.floor(time + 1e-6)
         scene.frame_set(whole, subframe=max(0.0, time - whole))

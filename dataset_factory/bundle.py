@@ -17,6 +17,7 @@ from rfgs_core.files import inside, read_json
 SCHEMA = "rfgs-bundle/1"
 NUM_JOINTS = 17
 
+_FRAME_ARRAYS = ("vertices", "joints", "segment_velocity", "person_instance", "action")
 _FIELDS: dict[str, type | tuple[type, ...]] = {
     "blend_name": str,
     "blend_sha256": str,
@@ -67,6 +68,8 @@ class BundleFrame:
     """World positions [m], float32, shape (V, 3)."""
     joints: np.ndarray
     """Joint positions of each person [m], float32, shape (P, 17, 3)."""
+    segment_velocity: np.ndarray
+    """Velocity of the centre of each body segment's skin [m/s], float32, shape (P, 17, 3)."""
     person_instance: np.ndarray
     """Instance id of each person, int32, shape (P,)."""
     action: np.ndarray
@@ -121,17 +124,23 @@ class Bundle:
             RfgsFormatError: The file is missing, damaged or does not fit the topology.
         """
         path = self.path / "frames" / f"{frame:06d}.npz"
-        arrays = read_arrays(path, ("vertices", "joints", "person_instance", "action"))
-        vertices, joints = arrays["vertices"], arrays["joints"]
+        arrays = read_arrays(path, _FRAME_ARRAYS)
+        vertices = arrays["vertices"]
         _expect(path, "vertices", vertices, self.topology.rest_vertices.shape)
         people = len(arrays["person_instance"])
+        labels = {name: arrays[name] for name in ("joints", "segment_velocity")}
         if people:
-            _expect(path, "joints", joints, (people, NUM_JOINTS, 3))
+            for name, values in labels.items():
+                _expect(path, name, values, (people, NUM_JOINTS, 3))
+        joints, velocity = (
+            values.astype(np.float32).reshape(people, NUM_JOINTS, 3) for values in labels.values()
+        )
         _expect(path, "action", arrays["action"], (people,))
         return BundleFrame(
             frame=frame,
             vertices=vertices.astype(np.float32),
-            joints=joints.astype(np.float32).reshape(people, NUM_JOINTS, 3),
+            joints=joints,
+            segment_velocity=velocity,
             person_instance=arrays["person_instance"].astype(np.int32),
             action=arrays["action"].astype(str),
         )

@@ -17,6 +17,8 @@ JOINT_MARGIN_M = 0.1
 MASK_MARGIN_PX = 2.0
 #: A joint lies at most this deep under the surface that a camera sees [m].
 JOINT_DEPTH_M = 0.35
+#: No part of a person is faster: hands that throw a ball reach 40 m/s.
+FASTEST_M_S = 50.0
 #: Share of a person's visible joints that must lie on its mask; hands may slip off at the rim.
 JOINTS_ON_MASK = 0.7
 
@@ -26,12 +28,15 @@ def label_faults(sequence: Sequence, frame: int) -> Iterator[str]:
     file = sequence.files.geometry(frame)
     people, actions = sequence.people(frame), sequence.actions(frame)
     joints = sequence.joints(frame)
-    if not len(people) == len(actions) == len(joints):
+    velocity = sequence.segment_velocity(frame)
+    if not len(people) == len(actions) == len(joints) == len(velocity):
         yield (
-            f"{file}: {len(people)} persons, {len(actions)} actions and {len(joints)} skeletons; "
-            "expected one of each per person"
+            f"{file}: {len(people)} persons, {len(actions)} actions, {len(joints)} skeletons and "
+            f"{len(velocity)} sets of velocities; expected one of each per person"
         )
         return
+    if (np.linalg.norm(velocity, axis=-1) > FASTEST_M_S).any():
+        yield f"{file}: body segments faster than {FASTEST_M_S:g} m/s"
     vertices, faces, instance = sequence.moving_mesh(frame)
     for person, skeleton in zip(people, joints, strict=True):
         own = vertices[np.unique(faces[instance == person])]

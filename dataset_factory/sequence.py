@@ -89,6 +89,7 @@ def write_geometry(files: SequenceFiles, bundle: Bundle) -> None:
             files.geometry(number),
             vertices=frame.vertices,
             joints=frame.joints,
+            segment_velocity=frame.segment_velocity,
             person_instance=frame.person_instance,
             action=frame.action,
         )

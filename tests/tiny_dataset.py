@@ -44,6 +44,10 @@ RADIO = Radio(
 )
 
 
+#: Of the sphere, by its way from frame to frame.
+VELOCITY_M_S = (0.2 * FPS, 0.0, 0.0)
+
+
 def centre_m(frame: int) -> np.ndarray:
     """Centre of the sphere that stands for a person."""
     return np.array([1.1 + 0.2 * frame, 1.4, 1.0])
@@ -217,6 +221,7 @@ def write_tiny_dataset(root: Path) -> Path:
             files.geometry(frame),
             vertices=(centre_m(frame) + RADIUS_M * unit).astype(np.float32),
             joints=(centre_m(frame) + height).astype(np.float32)[None],
+            segment_velocity=np.full((1, 17, 3), VELOCITY_M_S, np.float32),
             person_instance=np.array([1], np.int32),
             action=np.array(["stand"]),
         )

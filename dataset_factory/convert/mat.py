@@ -53,13 +53,14 @@ def _all(sequence: Sequence, radio: str, *, impaired: bool) -> np.ndarray:
 
 
 def _labels(sequence: Sequence) -> dict[str, Any]:
-    """Joints (frame, person, 17, 3) [m] and actions (frame, person), where geometry is there."""
+    """Joints and velocities (frame, person, 17, 3), actions (frame, person), if they are there."""
     if not sequence.files.geometry(sequence.frames[0]).is_file():
         return {}
     actions = [sequence.actions(frame) for frame in sequence.frames]
     return {
         "label_frame": np.array(sequence.frames),
         "joints_m": np.stack([sequence.joints(frame) for frame in sequence.frames]),
+        "segment_velocity_m_s": np.stack([sequence.segment_velocity(f) for f in sequence.frames]),
         "person_instance": np.stack([sequence.people(frame) for frame in sequence.frames]),
         "action": np.array(actions, dtype=object),
     }

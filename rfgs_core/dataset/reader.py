@@ -275,6 +275,18 @@ class Sequence:
         """Joint positions of each person [m], in the order of `rfgs_core.skeleton`."""
         return self._geometry(frame)["joints"]
 
+    def segment_velocity(self, frame: int) -> Float32[np.ndarray, "person 17 3"]:
+        """Velocity of the centre of each body segment's skin [m/s], segments as `joints`.
+
+        A segment is the skin that follows a joint of `rfgs_core.skeleton` (`segment` of the
+        topology); one without skin of its own has the velocity of the joint.
+        """
+        file = self.files.geometry(frame)
+        self._index(frame)
+        return load_arrays(file, _NO_GEOMETRY, {"segment_velocity": ("person", 17, 3)})[
+            "segment_velocity"
+        ]
+
     def people(self, frame: int) -> Int32[np.ndarray, "person"]:
         """Instance id of each person, in the order of `joints`."""
         return self._geometry(frame)["person_instance"]

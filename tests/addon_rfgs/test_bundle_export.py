@@ -84,6 +84,33 @@ def test_joints_follow_the_bones(room: Bundle) -> None:
     assert first.action.tolist() == ["stroll"]
 
 
+def segment_centre(bundle: Bundle, frame: int, joint: str) -> np.ndarray:
+    topology = bundle.topology
+    own = topology.faces[topology.segment == JOINTS.index(joint)]
+    a, b, c = np.moveaxis(bundle.frame(frame).vertices[own].astype(np.float64), 1, 0)
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    return area @ (a + b + c) / 3 / area.sum()
+
+
+def test_segments_move_as_fast_as_their_skin(room: Bundle) -> None:
+    velocity = np.stack([room.frame(n).segment_velocity[0] for n in room.frames])
+    joints = np.stack([room.frame(n).joints[0] for n in room.frames])
+    pelvis, hand = JOINTS.index("pelvis"), JOINTS.index("left_wrist")
+    # Trunk and legs glide along +y, one metre in four frames at 10 fps.
+    for joint in ("pelvis", "left_ankle", "right_knee", "head"):
+        assert velocity[:, JOINTS.index(joint)] == pytest.approx(velocity[:, pelvis], abs=1e-4)
+    assert np.abs(velocity[:, pelvis, [0, 2]]).max() < 1e-4
+    way_m = 0.1 * 0.5 * (velocity[1:, pelvis, 1] + velocity[:-1, pelvis, 1]).sum()
+    assert way_m == pytest.approx(1.0, rel=0.06)
+    # Against differences of joints, and of the skin itself, over the frames on either side.
+    gliding = (joints[2:, pelvis] - joints[:-2, pelvis]) * 10 / 2
+    assert velocity[1:-1, pelvis] == pytest.approx(gliding, abs=0.3)
+    before, after = (segment_centre(room, n, "left_wrist") for n in (2, 4))
+    assert velocity[2, hand] == pytest.approx((after - before) * 10 / 2, rel=0.1, abs=0.15)
+    # The arm that turns is faster than the trunk.
+    assert np.linalg.norm(velocity[2, hand] - velocity[2, pelvis]) > 0.5
+
+
 def test_every_face_knows_its_joint(room: Bundle) -> None:
     topology = room.topology
     counts = np.bincount(topology.segment, minlength=17)

@@ -79,6 +79,7 @@ def write_bundle(
             folder / "frames" / f"{frame:06d}.npz",
             vertices=vertices + np.float32(place),
             joints=np.zeros((1, 17, 3), np.float32),
+            segment_velocity=np.zeros((1, 17, 3), np.float32),
             person_instance=np.array([1], np.int32),
             action=np.array(["walk"]),
         )

@@ -64,6 +64,8 @@ def test_pictures_agree_with_geometry(tiny_dataset: Path) -> None:
             np.linalg.norm(sequence.normal(camera["name"], 2), axis=-1), 1, atol=1e-3
         )
         joint = sequence.joints(2)[0, 8]
+        moved = (sequence.joints(2) - sequence.joints(1)) * sequence.fps
+        np.testing.assert_allclose(sequence.segment_velocity(2), moved, rtol=1e-4, atol=1e-5)
         local = np.linalg.inv(camera["world_from_camera"]) @ [*joint, 1.0]
         u = camera["cx"] - camera["fl_x"] * local[0] / local[2]
         v = camera["cy"] + camera["fl_y"] * local[1] / local[2]

@@ -10,9 +10,11 @@ from typing import Any
 
 from dataset_factory.bundle import Bundle, read_bundle
 from dataset_factory.devices import check_scene, choose_devices
+from dataset_factory.disk import refuse_small_disk, space
 from dataset_factory.folder import locked, open_folder, sweep
 from dataset_factory.impair import impair_radio
 from dataset_factory.job import Job
+from dataset_factory.pace_cache import remember
 from dataset_factory.plan import versions
 from dataset_factory.progress import progress_bar
 from dataset_factory.render import render
@@ -59,6 +61,8 @@ def generate(job: Job) -> bool:
         if not (job.out / "dataset.json").exists():
             write_dataset_info(job.out, info)
         sequence = _prepare(job, bundle, devices, guesses)
+        needed = space(job, bundle, sequence)
+        refuse_small_disk(job, needed.bytes(len(sequence.frames)))
         with job.stage("trace"):
             trace(job, bundle, sequence)
         if job.plan.impairments:
@@ -77,6 +81,7 @@ def generate(job: Job) -> bool:
                 DatasetInfo(made, info.config, info.root_seed, info.has, info.sequences),
             )
     shutil.rmtree(job.work)
+    remember(job, len(sequence.frames), len(sequence.cameras), needed)
     return True
 
 
@@ -110,8 +115,13 @@ def _export(job: Job) -> Bundle:
         spans = {pose_span_s(job.plan.radio(name)) for name in job.plan.radios}
         spans_s = sorted(span_s for span_s in spans if span_s is not None)
         poses = [text for span_s in spans_s for text in ("--span", repr(span_s))]
-        with progress_bar("export", "frame") as progress:
-            job.blender.run("export", *arguments, *frames, *poses, progress=progress)
+        with progress_bar("export", "frame") as progress, job.clock("export") as clock:
+
+            def step(done: int, total: int) -> None:
+                progress(done, total)
+                clock.step()
+
+            job.blender.run("export", *arguments, *frames, *poses, progress=step)
         read_bundle(fresh)
         fresh.rename(target)
     return read_bundle(target)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from dataset_factory.blender import Blender
 from dataset_factory.bundle import sanitised
+from dataset_factory.pace import Clock, Pace
 from dataset_factory.plan import Plan
 from rfgs_core.dataset.names import SequenceFiles
 from rfgs_core.files import write_json
@@ -34,6 +35,8 @@ class Job:
     """Address of a Dask scheduler that traces instead; empty for this machine."""
     seconds: dict[str, float] = field(default_factory=dict)
     """Wall time per stage of this run [s]."""
+    paces: dict[str, Pace] = field(default_factory=dict)
+    """Speed of the stages of this run that had enough steps to tell."""
 
     @property
     def work(self) -> Path:
@@ -55,6 +58,19 @@ class Job:
         """Arguments of the add-on that choose cameras and resolution."""
         cameras = ["--cameras", str(self.plan.cameras)] if self.plan.cameras else []
         return [*cameras, "--resolution", str(self.plan.resolution)]
+
+    @contextmanager
+    def clock(self, name: str) -> Iterator[Clock]:
+        """Measures a stage step by step."""
+        clock = Clock()
+        yield clock
+        self.note_pace(name, clock)
+
+    def note_pace(self, name: str, clock: Clock) -> None:
+        """Keeps what a clock has to say."""
+        pace = clock.pace()
+        if pace:
+            self.paces[name] = pace
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from dataset_factory.encode import encode_empty, encode_frame, rendered_whole
 from dataset_factory.job import Job
+from dataset_factory.pace import Clock
 from dataset_factory.plan import frame_runs, missing_pictures
 from dataset_factory.progress import progress_bar
 from rfgs_core.dataset.schema import SequenceInfo
@@ -27,10 +28,13 @@ def render(job: Job, sequence: SequenceInfo) -> None:
     for run in frame_runs(missing):
         shutil.rmtree(rendered, ignore_errors=True)
         frames = list(parse_frames(run))
-        with progress_bar("render") as progress:
+        with progress_bar("render") as progress, job.clock("render") as clock:
 
-            def encode(done: int, total: int, frames: list[int] = frames) -> None:
+            def encode(
+                done: int, total: int, frames: list[int] = frames, clock: Clock = clock
+            ) -> None:
                 progress(done, total)
+                clock.step()
                 # Frames are rendered one after the other with all cameras, so these are whole.
                 _encode(job, rendered, cameras, frames[: done // len(cameras)])
 
@@ -49,3 +53,7 @@ def _encode(job: Job, rendered: Path, cameras: list[str], frames: list[int]) -> 
     for frame in missing_pictures(job.files, frames):
         if rendered_whole(rendered, cameras, frame):
             encode_frame(rendered, job.files, cameras, frame)
+            # What Blender wrote is larger than what is kept of it.
+            for camera in cameras:
+                for file in (rendered / camera).glob(f"{frame:06d}.*"):
+                    file.unlink()

@@ -11,6 +11,7 @@ from tqdm import tqdm
 from dataset_factory.bundle import Bundle
 from dataset_factory.cluster import run_on_cluster
 from dataset_factory.job import Job
+from dataset_factory.pace import Clock
 from dataset_factory.plan import missing_channels
 from dataset_factory.workers import Task, limits, run_tasks
 from rfgs_core.dataset.schema import SequenceInfo, device_pose
@@ -31,11 +32,13 @@ def trace(job: Job, bundle: Bundle, sequence: SequenceInfo) -> None:
     if not tasks:
         return
     request = _request(job, bundle, sequence)
+    pace = _Paces(job)
     with tqdm(total=len(tasks), desc="trace", unit="frame") as bar:
 
         def done(task: Task) -> None:
             bar.set_postfix_str(str(task), refresh=False)
             bar.update()
+            pace.step(task)
 
         if job.scheduler:
             allowed = limits(1, job.worker_memory_gb)
@@ -44,6 +47,7 @@ def trace(job: Job, bundle: Bundle, sequence: SequenceInfo) -> None:
             allowed = limits(job.workers, job.worker_memory_gb)
             log = job.out / "log"
             seconds = run_tasks(request, tasks, job.workers, allowed, log, done)
+    pace.note()
     job.seconds.update({f"trace.{name}": value for name, value in seconds.items()})
 
 
@@ -61,3 +65,25 @@ def _request(job: Job, bundle: Bundle, sequence: SequenceInfo) -> dict[str, Any]
         "shadow": job.plan.shadow,
         "seed": job.plan.seed,
     }
+
+
+class _Paces:
+    """The pace of each radio's frames; radios follow one another."""
+
+    def __init__(self, job: Job) -> None:
+        self._job = job
+        self._radio = ""
+        self._clock = Clock(job.workers)
+
+    def step(self, task: Task) -> None:
+        """A frame is done."""
+        if self._radio not in ("", task.radio):
+            self.note()
+            self._clock = Clock(self._job.workers, began_s=self._clock.ends_s[-1])
+        self._radio = task.radio
+        self._clock.step()
+
+    def note(self) -> None:
+        """Keeps the pace of the last radio; a cluster's says nothing about this machine."""
+        if not self._job.scheduler:
+            self._job.note_pace(f"trace {self._radio}", self._clock)

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 #: Command name → module below `dataset_factory.cli` and its arguments dataclass.
 COMMANDS: dict[str, tuple[str, str]] = {
     "scenes": ("scenes", "ScenesArgs"),
+    "plan": ("plan", "PlanArgs"),
     "generate": ("generate", "GenerateArgs"),
     "validate": ("validate", "ValidateArgs"),
     "preview": ("preview", "PreviewArgs"),

@@ -6,11 +6,15 @@ from __future__ import annotations
 import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import tyro
 
 from rfgs_core.errors import RfgsError
+
+if TYPE_CHECKING:
+    from dataset_factory.job import Job
+    from dataset_factory.scenes import Scene
 
 
 @dataclass(frozen=True)
@@ -63,8 +67,21 @@ class GenerateArgs:
 
 def run(args: GenerateArgs) -> int:
     """Makes the dataset, or what is missing of it."""
-    from dataset_factory.blender import Blender
     from dataset_factory.generate import generate
+
+    made = generate(job_of(args)[0])
+    what = "finished" if made else "already complete"
+    sys.stdout.write(f"{args.out}: {what}; look at it with: rfgs-factory preview {args.out}\n")
+    return 0
+
+
+def job_of(args: GenerateArgs) -> tuple[Job, Scene]:
+    """The job that arguments ask for, and its scene.
+
+    Raises:
+        RfgsError: An argument is out of range, or names nothing.
+    """
+    from dataset_factory.blender import Blender
     from dataset_factory.job import Job
     from dataset_factory.plan import make_plan
     from dataset_factory.scenes import find_scene
@@ -93,7 +110,4 @@ def run(args: GenerateArgs) -> int:
     use_llvm()
     blender = Blender(scene.blend, args.blender)
     job = Job(args.out, plan, blender, args.workers, args.worker_memory, args.scheduler)
-    made = generate(job)
-    what = "finished" if made else "already complete"
-    sys.stdout.write(f"{args.out}: {what}; look at it with: rfgs-factory preview {args.out}\n")
-    return 0
+    return job, scene

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a dataset will take: its disk from above, its time from the pace of a few frames."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from dataset_factory.disk import space
+from dataset_factory.estimate import estimate
+from dataset_factory.generate import generate
+from dataset_factory.job import Job
+from dataset_factory.pace import Clock, Pace
+from rfgs_core.errors import RfgsError
+
+MakeJob = Callable[..., Job]
+Factory = Callable[..., subprocess.CompletedProcess[str]]
+
+
+def paced(ends_s: list[float], at_once: int) -> Pace | None:
+    times = iter([0.0, *ends_s])
+    clock = Clock(at_once, now=lambda: next(times))
+    for _ in ends_s:
+        clock.step()
+    return clock.pace()
+
+
+@pytest.mark.parametrize("processes", [1, 2, 3])
+def test_the_pace_of_equal_frames_is_exact(processes: int) -> None:
+    """Every process starts for 7 s, then takes 3 s a frame."""
+    ends = [7.0 + 3.0 * (turn + 1) for turn in range(4) for _ in range(processes)]
+    pace = paced(ends, processes)
+    assert pace is not None
+    assert pace.step_s == pytest.approx(3.0 / processes, rel=0.01)
+    assert pace.seconds(400 * processes) == pytest.approx(7.0 + 1200.0, rel=0.01)
+
+
+def test_too_few_frames_tell_nothing() -> None:
+    assert paced([], 1) is None
+    assert paced([5.0], 1) is None
+    assert paced([5.0, 5.0, 8.0], 2) is None
+
+
+def test_disk_is_estimated_from_above_and_closely(
+    make_job: MakeJob, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = []
+
+    def kept(job: Job, *rest: object) -> object:
+        found.append(space(job, *rest))  # type: ignore[arg-type]
+        return found[-1]
+
+    monkeypatch.setattr("dataset_factory.generate.space", kept)
+    job = make_job(tmp_path / "out")
+    assert generate(job)
+    channels = [file for file in job.out.rglob("*") if file.is_file() and "/c/" in str(file)]
+    pictures = [file for file in job.out.rglob("*") if file.suffix in (".png", ".exr")]
+    size = sum(file.stat().st_size for file in [*channels, *pictures])
+    assert size < found[0].bytes(2)
+    # Links are all measured, so channels hardly compress; pictures of 32 px are small.
+    raw = 3 * 4 * 256 * 64 * 8
+    assert raw < found[0].bytes(2) < 1.2 * raw
+
+
+def test_a_disk_that_is_too_small_is_refused_before_tracing(
+    make_job: MakeJob, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(shutil, "disk_usage", lambda _path: SimpleNamespace(free=1_000_000))
+    job = make_job(tmp_path / "out")
+    with pytest.raises(RfgsError, match=r"needs about 1.\d MB more, 1.0 MB are free; take fewer"):
+        generate(job)
+    assert not list(job.out.rglob("csi/c/*"))
+
+
+def test_frames_of_a_foreign_file_must_be_said(make_job: MakeJob, tmp_path: Path) -> None:
+    with pytest.raises(RfgsError, match="give the frames to plan for"):
+        estimate(make_job(tmp_path, frames=""), "")
+
+
+@pytest.mark.slow
+def test_plan_measures_once_and_then_remembers(
+    factory: Factory, box_room: Path, tmp_path: Path
+) -> None:
+    arguments = ["plan", str(box_room), "--radio", "wifi", "--frames", "1:4", "--cameras", "1"]
+    arguments += ["--resolution", "32", "--samples", "2", "--depth", "1", "--workers", "1"]
+    arguments += ["--out", str(tmp_path / "out")]
+    cache = {"XDG_CACHE_HOME": str(tmp_path / "cache")}
+    answers = [factory(*arguments, **cache) for _ in range(2)]
+    assert [answer.returncode for answer in answers] == [0, 0], answers[0].stderr
+    assert "a few frames made just now" in answers[0].stdout
+    assert "an earlier run" in answers[1].stdout
+    assert "frames  4, 1 cameras, 1 workers" in answers[1].stdout
+    assert not (tmp_path / "out").exists()
+    seconds = [row for row in answers[1].stdout.splitlines() if row.startswith("time")]
+    assert seconds and all(stage in seconds[0] for stage in ("export", "trace wifi", "render"))

@@ -130,21 +130,6 @@ def test_full_disk(
     assert "error: the disk is full while writing csi.zarr" in capsys.readouterr().err
 
 
-def test_preview_draws_pictures_and_channels(factory: Factory, box_copy: Path) -> None:
-    answer = factory("preview", str(box_copy))
-    assert answer.returncode == 0, answer.stderr
-    page = Path(answer.stdout.strip())
-    text = page.read_text()
-    assert text.count("data:image/png;base64,") == 4 and "http" not in text
-    assert {file.name for file in page.parent.glob("*.png")} == {
-        "pictures.png",
-        "layers.png",
-        "wifi_profiles.png",
-        "wifi_delay_angle.png",
-    }
-    assert factory("validate", str(box_copy)).returncode == 0
-
-
 def test_frames_are_grouped_into_runs() -> None:
     assert frame_runs([]) == []
     assert frame_runs([4]) == ["4:4:1"]

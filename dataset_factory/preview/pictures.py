@@ -11,24 +11,9 @@ from rfgs_core.dataset import Sequence
 
 #: Larger sheets would no longer be seen at a glance.
 MOST_CAMERAS = 6
-MOST_FRAMES = 6
 
 #: What shows through where a picture is transparent.
 _BACKDROP = np.array([0.93, 0.94, 0.96])
-
-
-def contact_sheet(sequence: Sequence) -> Figure:
-    """Colour pictures, cameras by rows and frames by columns."""
-    names = [row["name"] for row in sequence.cameras][:MOST_CAMERAS]
-    frames = _spread(sequence.frames, MOST_FRAMES)
-    figure, axes = _grid(len(names), len(frames))
-    for row, name in zip(axes, names, strict=True):
-        for axis, frame in zip(row, frames, strict=True):
-            axis.imshow(_over_backdrop(sequence.image(name, frame)))
-        row[0].set_ylabel(_label(sequence, name), fontsize=9)
-    for axis, frame in zip(axes[0], frames, strict=True):
-        axis.set_title(f"frame {frame}", fontsize=9)
-    return figure
 
 
 def layer_sheet(sequence: Sequence) -> Figure:
@@ -38,7 +23,7 @@ def layer_sheet(sequence: Sequence) -> Figure:
     figure, axes = _grid(len(names), 4)
     far = float(np.linalg.norm(sequence.bounds_m[1] - sequence.bounds_m[0]))
     for row, name in zip(axes, names, strict=True):
-        row[0].imshow(_over_backdrop(sequence.image(name, frame)))
+        row[0].imshow(over_backdrop(sequence.image(name, frame)))
         shown = row[1].imshow(sequence.depth(name, frame), cmap="viridis_r", vmin=0, vmax=far)
         figure.colorbar(shown, ax=row[1], fraction=0.046, pad=0.03).ax.tick_params(labelsize=7)
         row[2].imshow(np.clip(0.5 + 0.5 * sequence.normal(name, frame), 0, 1))
@@ -59,18 +44,13 @@ def _grid(rows: int, cols: int) -> tuple[Figure, np.ndarray]:
     return figure, axes
 
 
-def _spread(values: list[int], most: int) -> list[int]:
-    if len(values) <= most:
-        return values
-    return [values[index] for index in np.linspace(0, len(values) - 1, most).round().astype(int)]
-
-
 def _label(sequence: Sequence, name: str) -> str:
     row = next(row for row in sequence.cameras if row["name"] == name)
     return f"{name} (test)" if row["split"] == "test" else name
 
 
-def _over_backdrop(rgba: np.ndarray) -> np.ndarray:
+def over_backdrop(rgba: np.ndarray) -> np.ndarray:
+    """Colours in [0, 1] on a plain backdrop where a picture is transparent."""
     alpha = rgba[..., 3:] / 255.0
     return rgba[..., :3] / 255.0 * alpha + _BACKDROP * (1.0 - alpha)
 

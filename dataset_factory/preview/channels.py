@@ -33,7 +33,7 @@ def profile_figure(sequence: Sequence, radio: str, frame: int) -> Figure:
     axis = figure.add_subplot(grid[0, :])
     rms = np.sqrt((np.abs(csi) ** 2).sum(0) / np.maximum(layout.measured.sum(0), 1)[:, None])
     shown = axis.imshow(
-        _db(rms**2),
+        decibels(rms**2),
         aspect="auto",
         extent=(spec.freq_min_hz / 1e9, spec.freq_max_hz / 1e9, len(rms) - 0.5, -0.5),
     )
@@ -61,7 +61,7 @@ def delay_angle_figure(sequence: Sequence, radio: str, frame: int) -> Figure:
     for row, (a, b) in zip(axes, pairs, strict=True):
         for axis, value, title in zip(row, (csi, static, csi - static), _KINDS, strict=True):
             power, angle_deg, length_m = delay_angle(sequence, radio, value, (a, b))
-            level = _db(power)
+            level = decibels(power)
             # A device's own transmitter is so near that it would hide the room.
             top = level[:, length_m > (1.0 if a == b else 0.0)].max()
             shown = axis.imshow(
@@ -76,7 +76,7 @@ def delay_angle_figure(sequence: Sequence, radio: str, frame: int) -> Figure:
             figure.colorbar(shown, ax=axis, pad=0.01).ax.tick_params(labelsize=7)
             axis.set_title(f"device {a} to {b}, {title}", fontsize=9)
             for point in sequence.joints(frame)[:, 0]:
-                angle, length = _seen_from(sequence, radio, (a, b), point)
+                angle, length = seen_from(sequence, radio, (a, b), point)
                 axis.plot(angle, length, "x", color="#4dd2ff", ms=8, mew=2)
         row[0].set_ylabel("path length [m]")
     for axis in axes[-1]:
@@ -141,7 +141,7 @@ def _profiles(
     for value, name, colour in zip(values, _KINDS, _COLOURS, strict=True):
         profile, length_m = delay_profile(sequence, radio, value[np.ix_(tx, rx)])
         power = (np.abs(profile) ** 2).mean(axis=(0, 1))
-        axis.plot(length_m, _db(power), color=colour, lw=1.2, label=name)
+        axis.plot(length_m, decibels(power), color=colour, lw=1.2, label=name)
     direct = np.linalg.norm(layout.tx_xyz[tx].mean(0) - layout.rx_xyz[rx].mean(0))
     axis.axvline(direct, color="#444", ls=":", lw=1)
     axis.set_title(f"device {pair[0]} to {pair[1]}", fontsize=9)
@@ -150,7 +150,7 @@ def _profiles(
     axis.grid(alpha=0.25)
 
 
-def _seen_from(
+def seen_from(
     sequence: Sequence, radio: str, pair: tuple[int, int], point: np.ndarray
 ) -> tuple[float, float]:
     """Angle [°] and path length [m] of a single scatterer."""
@@ -170,5 +170,6 @@ def _listening_pairs(layout: Layout) -> list[tuple[int, int]]:
     return [chosen[b] for b in sorted(chosen)]
 
 
-def _db(power: np.ndarray) -> np.ndarray:
+def decibels(power: np.ndarray) -> np.ndarray:
+    """Power in dB, at least -300."""
     return 10.0 * np.log10(np.maximum(power, 1e-30))

@@ -137,7 +137,7 @@ def _radio(
             channel_strip(sequence, radio, timeline, seen),
             folder / f"{radio}_strip.png",
             f"Channels of {radio} over time",
-            f"Device {seen.pair[0]} to {seen.pair[1]}, the pair that people change most. The "
+            f"Device {seen.pair[0]} to {seen.pair[1]}, the pair that shows movement best. The "
             "change is the channel less that of the empty scene; dashed: where the pelvis of "
             f"each person is. {doppler} Bottom: delay and angle of the change under each picture "
             "(20 dB), the cross marks the pelvis.",

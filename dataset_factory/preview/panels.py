@@ -16,6 +16,10 @@ from rfgs_core.encode.micro_doppler import micro_doppler
 
 #: Dynamic range of the images [dB].
 RANGE_DB = 30.0
+#: Dynamic range of spectrograms, in which limbs are weaker than the torso [dB].
+DOPPLER_RANGE_DB = 40.0
+#: Shorter changes of path length are no movement to choose a pair by [m].
+LEAST_TRAVEL_M = 0.5
 #: Frames that choose which pair of devices is shown.
 TRIAL_FRAMES = 4
 #: A Doppler axis that ends below this speed would show a walking person aliased [m/s].
@@ -41,7 +45,7 @@ class Watch:
 
 
 def watch(sequence: Sequence, radio: str) -> Watch:
-    """Reads the device pair whose channel people change most, relative to the static one."""
+    """Reads the device pair that shows people's movement best."""
     layout = sequence.layout(radio)
     pair = _liveliest(sequence, radio)
     index = np.ix_(layout.tx_device == pair[0], layout.rx_device == pair[1])
@@ -57,7 +61,18 @@ def watch(sequence: Sequence, radio: str) -> Watch:
 
 
 def _liveliest(sequence: Sequence, radio: str) -> tuple[int, int]:
-    layout, static = sequence.layout(radio), sequence.csi_static(radio)
+    """The pair over which people move: through whom the path changes length most.
+
+    Pairs of different devices come first, as a device's own transmitter outshines people. Where
+    nobody moves far, the pair whose channel changes most relative to the static one.
+    """
+    layout = sequence.layout(radio)
+    apart = [pair for pair in layout.device_pairs if pair[0] != pair[1]] or layout.device_pairs
+    travel_m = {pair: _travel_m(sequence, radio, pair) for pair in apart}
+    best = max(apart, key=lambda pair: travel_m[pair])
+    if travel_m[best] >= LEAST_TRAVEL_M:
+        return best
+    static = sequence.csi_static(radio)
     step = max(1, len(sequence.frames) // TRIAL_FRAMES)
     change = [sequence.csi(radio, frame) - static for frame in sequence.frames[::step]]
     share = {}
@@ -66,6 +81,12 @@ def _liveliest(sequence: Sequence, radio: str) -> tuple[int, int]:
         moved = sum(float((np.abs(value[index]) ** 2).sum()) for value in change)
         share[pair] = moved / max(float((np.abs(static[index]) ** 2).sum()), 1e-30)
     return max(share, key=lambda pair: share[pair])
+
+
+def _travel_m(sequence: Sequence, radio: str, pair: tuple[int, int]) -> float:
+    """How much the path over the person that moves most changes its length [m]."""
+    _, places = _truth(sequence, radio, pair)
+    return float(np.ptp(places[..., 1], axis=0).max(initial=0.0))
 
 
 def _edges(seen: Watch) -> list[tuple[np.ndarray, slice]]:
@@ -169,7 +190,7 @@ def doppler_panel(axis: Any, sequence: Sequence, radio: str, seen: Watch) -> Any
         level,
         shading="nearest",
         cmap="inferno",
-        vmin=level.max() - RANGE_DB,
+        vmin=level.max() - DOPPLER_RANGE_DB,
         vmax=level.max(),
         rasterized=True,
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
@@ -20,6 +21,7 @@ from dataset_factory.preview.player import plan, player
 from dataset_factory.preview.strips import MARGINS, Timeline, channel_strip
 from dataset_factory.validate import validate
 from rfgs_core.dataset import Sequence, open_dataset
+from rfgs_core.dataset.writer import write_arrays
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
 
@@ -98,7 +100,7 @@ def test_every_panel_has_the_same_axis_in_the_same_place(sequence: Sequence) -> 
         assert (box.x0, box.x1) == pytest.approx(MARGINS)
 
 
-def test_the_pair_that_people_change_most_is_watched(sequence: Sequence) -> None:
+def test_where_nobody_moves_far_the_pair_of_most_change_is_watched(sequence: Sequence) -> None:
     seen = watch(sequence, "wifi")
     layout, static = sequence.layout("wifi"), sequence.csi_static("wifi")
     change = sequence.csi("wifi", 1) - static, sequence.csi("wifi", 2) - static
@@ -110,6 +112,30 @@ def test_the_pair_that_people_change_most_is_watched(sequence: Sequence) -> None
 
     assert share(seen.pair) == max(share(pair) for pair in layout.device_pairs)
     assert seen.csi.shape == (2, 1, 8, 16) and seen.time_s.tolist() == [0.0, 0.1]
+
+
+def test_where_somebody_moves_the_pair_of_most_travel_is_watched(
+    tiny_dataset: Path, tmp_path: Path
+) -> None:
+    copy = Path(shutil.copytree(tiny_dataset, tmp_path / "copy"))
+    sequence = open_dataset(copy).sequence()
+    file = sequence.files.geometry(2)
+    stored = dict(np.load(file))
+    stored["joints"] = sequence.joints(1) + np.float32([1.0, 0.0, 0.0])
+    write_arrays(file, **stored)
+    places = [device.position_m for device in sequence.devices("wifi")]
+
+    def travel(pair: tuple[int, int]) -> float:
+        lengths = [
+            sum(np.linalg.norm(sequence.joints(frame)[0, 0] - places[end]) for end in pair)
+            for frame in sequence.frames
+        ]
+        return float(np.ptp(lengths))
+
+    seen = watch(sequence, "wifi").pair
+    assert seen[0] != seen[1]
+    others = [pair for pair in sequence.layout("wifi").device_pairs if pair[0] != pair[1]]
+    assert travel(seen) > 0.9 * max(travel(pair) for pair in others) > 0.5
 
 
 def test_doppler_of_an_approaching_reflector_shows_its_speed(sequence: Sequence) -> None:

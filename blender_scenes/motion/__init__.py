@@ -3,7 +3,7 @@
 
 NumPy only; `blender_scenes.people` writes scores into a Blender scene. A piece says what to do
 (`Walk`, `Turn`, `Stay` in going.py, `Gesture`, `Sit` and `Rise` in seat.py, `Climb` in stairs.py,
-`Fall`), a posture where it begins and ends, a score gives the pose and the
+`Fall`, `Recorded`), a posture where it begins and ends, a score gives the pose and the
 label at any time:
 
     >>> score = compose(figure, Posture((0, 0), 0.0), [Walk([(2, 0)]), Turn(90), Stay(2)])

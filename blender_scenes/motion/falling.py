@@ -57,8 +57,8 @@ _LYING: dict[str, _Bends] = {
         "spine03": (-0.05, 0.0),
         "neck01": (-0.15, 0.0),
         "head": (-0.20, 0.0),
-        "upperarm01": (-0.9, 0.75),
-        "lowerarm01": (-1.1, 0.0),
+        "upperarm01": (0.0, 0.9),
+        "lowerarm01": (0.97, 1.6),
     },
     "side": {
         "upperleg01.under": (-0.55, 0.0),

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reads motion capture in BVH, Biovision's text format."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from blender_scenes.motion.rotations import about_x, about_y, about_z
+
+_ABOUT = {"Xrotation": about_x, "Yrotation": about_y, "Zrotation": about_z}
+_ALONG = {"Xposition": 0, "Yposition": 1, "Zposition": 2}
+
+
+@dataclass(frozen=True)
+class Bvh:
+    """A recorded skeleton and its motion, in the axes and units of the file."""
+
+    joints: tuple[str, ...]
+    """Names, parents before children."""
+    parents: tuple[int, ...]
+    """Index of each joint's parent, -1 for the root."""
+    offsets: np.ndarray
+    """From the parent to each joint at rest, shape (J, 3)."""
+    turns: np.ndarray
+    """Rotation of each joint against its parent, shape (F, J, 3, 3)."""
+    root: np.ndarray
+    """Position of the root, shape (F, 3)."""
+    frame_s: float
+    """Time from frame to frame [s]."""
+
+    def world_turns(self) -> np.ndarray:
+        """Rotation of each joint against its rest, in the axes of the file, (F, J, 3, 3)."""
+        out = self.turns.copy()
+        for index, parent in enumerate(self.parents):
+            if parent >= 0:
+                out[:, index] = out[:, parent] @ self.turns[:, index]
+        return out
+
+
+def read_bvh(path: Path) -> Bvh:
+    """Reads a BVH file.
+
+    Raises:
+        ValueError: The file is no BVH, or is damaged; the message says where.
+    """
+    try:
+        text = path.read_text("utf-8")
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path}: expected a BVH text file, found other bytes") from error
+    head, found, body = text.partition("MOTION")
+    if not head.strip().startswith("HIERARCHY") or not found:
+        raise ValueError(f"{path}: expected HIERARCHY and MOTION, as BVH files have")
+    names, parents, offsets, channels = _hierarchy(path, iter(head.split()[1:]))
+    values, frame_s = _motion(path, body, sum(len(row) for row in channels))
+    turns = np.broadcast_to(np.eye(3), (len(values), len(names), 3, 3)).copy()
+    root = np.broadcast_to(offsets[0], (len(values), 3)).copy()
+    column = 0
+    for joint, row in enumerate(channels):
+        for name in row:
+            # Other joints than the root keep their offsets: bones do not stretch.
+            if name in _ALONG and joint == 0:
+                root[:, _ALONG[name]] = values[:, column]
+            elif name in _ABOUT:
+                angles = np.radians(values[:, column])
+                turns[:, joint] @= np.stack([_ABOUT[name](angle) for angle in angles])
+            column += 1
+    return Bvh(tuple(names), tuple(parents), np.array(offsets), turns, root, frame_s)
+
+
+def _hierarchy(
+    path: Path, words: Iterator[str]
+) -> tuple[list[str], list[int], list[list[float]], list[list[str]]]:
+    names: list[str] = []
+    parents: list[int] = []
+    offsets: list[list[float]] = []
+    channels: list[list[str]] = []
+    # Open braces: the joint that each belongs to, None for the end of a limb.
+    line: list[int | None] = []
+    try:
+        for word in words:
+            if word in ("ROOT", "JOINT"):
+                parents.append(next((j for j in reversed(line) if j is not None), -1))
+                names.append(next(words))
+                line.append(len(names) - 1)
+            elif word == "End":
+                next(words)
+                line.append(None)
+            elif word == "OFFSET":
+                offset = [float(next(words)) for _ in range(3)]
+                if line[-1] is not None:
+                    offsets.append(offset)
+            elif word == "CHANNELS":
+                row = [next(words) for _ in range(int(next(words)))]
+                unknown = [name for name in row if name not in _ABOUT and name not in _ALONG]
+                if unknown:
+                    raise ValueError(f"{path}: unknown channels {', '.join(unknown)}")
+                channels.append(row)
+            elif word == "}":
+                line.pop()
+            elif word != "{":
+                raise ValueError(f"{path}: unexpected {word!r} in the hierarchy")
+    except (StopIteration, IndexError) as error:
+        raise ValueError(f"{path}: the hierarchy ends within a joint") from error
+    if not names or line or not len(names) == len(offsets) == len(channels):
+        raise ValueError(f"{path}: expected an OFFSET and CHANNELS for every joint")
+    return names, parents, offsets, channels
+
+
+def _motion(path: Path, body: str, columns: int) -> tuple[np.ndarray, float]:
+    """Channel values [F, C] and the time from frame to frame [s]."""
+    words = body.split()
+    try:
+        if words[0] != "Frames:" or words[2:4] != ["Frame", "Time:"]:
+            raise ValueError(f"{path}: expected `Frames:` and `Frame Time:` after MOTION")
+        count, frame_s = int(words[1]), float(words[4])
+        values = np.array(words[5:], dtype=np.float64)
+    except IndexError as error:
+        raise ValueError(f"{path}: the motion has no frames") from error
+    if count < 1 or frame_s <= 0 or len(values) != count * columns:
+        raise ValueError(
+            f"{path}: expected {count} frames of {columns} channels, got {len(values)} numbers"
+        )
+    return values.reshape(count, columns), frame_s

@@ -81,7 +81,7 @@ def make_plan(scene: Scene, radios: tuple[str, ...], frames: str, **options: Any
     if frames and len(only := parse_frames(frames)) == 1:
         # Inside Blender frames are always a range.
         frames = f"{only[0]}:{only[0]}"
-    limits = {"depth": (1, 5), "resolution": (16, 8192), "samples": (1, 65536), "cameras": (0, 999)}
+    limits = {"depth": (1, 3), "resolution": (16, 8192), "samples": (1, 65536), "cameras": (0, 999)}
     for name, (low, high) in limits.items():
         if not low <= options[name] <= high:
             raise RfgsError(f"--{name} {options[name]}: expected {low} to {high}")

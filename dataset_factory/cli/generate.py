@@ -40,7 +40,8 @@ class GenerateArgs:
     samples: int = 16
     """Light samples per pixel; more is less noisy and slower."""
     depth: int = 2
-    """Interactions of a path that meets a person: 1 the person alone (fast), 2 also one wall."""
+    """Interactions of a path that meets a person: 1 the person alone (fast), 2 also one wall, 3
+    two (slow; needed behind a wall)."""
     seed: int = 0
     """Root seed; the same seed gives the same bytes."""
     workers: int = 2

@@ -155,7 +155,7 @@ class Sequence:
 
     @property
     def trace_depth(self) -> int:
-        """Interactions that a traced path may have."""
+        """Interactions of a path that meets a person, that one included."""
         return self.info.trace_depth
 
     @property

@@ -94,9 +94,9 @@ class SequenceInfo:
     guesses: list[dict[str, Any]] = field(default_factory=list)
     """Every default that was guessed, with the reason."""
     trace_depth: int = 1
-    """Interactions that a traced path may have."""
+    """Interactions of a path that meets a person, that one included."""
     shadow: str = "kirchhoff"
-    """How bodies shadow paths."""
+    """How bodies shadow paths: kirchhoff or hard."""
 
 
 def info_json(info: DatasetInfo | SequenceInfo) -> dict[str, Any]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`python -m blender_scenes list` and `python -m blender_scenes build [NAME] [--out FILE]`."""
+"""`python -m blender_scenes list`, `… build [NAME] [--out FILE]` and `… sheet --out FILE`."""
 
 from __future__ import annotations
 
@@ -20,6 +20,10 @@ def main(arguments: list[str] | None = None) -> int:
     build = commands.add_parser("build", help="build a scene's .blend from code")
     build.add_argument("name", nargs="?", default="living_room_walk", help="which scene")
     build.add_argument("--out", type=Path, help="where to; default: beside the catalogue")
+    sheet = commands.add_parser("sheet", help="render one picture of every scene side by side")
+    sheet.add_argument("--out", type=Path, required=True, help="the picture, .jpg or .png")
+    sheet.add_argument("--size", type=int, default=300, help="width of each picture [pixel]")
+    sheet.add_argument("--samples", type=int, default=32, help="samples per pixel")
     args = parser.parse_args(arguments)
     known = scenes()
     if args.command == "list":
@@ -27,10 +31,23 @@ def main(arguments: list[str] | None = None) -> int:
             frames = f"{scene.frame_start}:{scene.frame_end} at {scene.fps} fps"
             sys.stdout.write(f"{scene.name}  {frames}  {scene.description}\n")
         return 0
+    if args.command == "sheet":
+        return _sheet(args.out, args.size, args.samples)
     if args.name not in known:
         sys.stderr.write(f"error: no scene {args.name!r}; there are: {', '.join(known)}\n")
         return 2
     return _build(known[args.name].name, args.out or known[args.name].path)
+
+
+def _sheet(out: Path, size_px: int, samples: int) -> int:
+    if out.suffix not in (".jpg", ".png") or not out.resolve().parent.is_dir():
+        sys.stderr.write(f"error: {out}: expected a .jpg or .png file in a folder that exists\n")
+        return 2
+    from blender_scenes.sheet import contact_sheet
+
+    contact_sheet(list(scenes().values()), out, size_px, samples)
+    sys.stdout.write(f"wrote {out}\n")
+    return 0
 
 
 def _build(name: str, out: Path) -> int:

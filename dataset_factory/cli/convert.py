@@ -17,7 +17,8 @@ class ConvertArgs:
 
     nerfstudio and d-nerf: pictures with cameras and time. colmap: the first frame's pictures as a
     text model with points. nerf2: angular spectra per receiving array. mat: channels and labels
-    for MATLAB.
+    for MATLAB. DeepMIMO is left out: its scenarios store single rays with their angles, while a
+    dataset stores their sum.
     """
 
     dataset: tyro.conf.Positional[Path]

@@ -126,7 +126,8 @@ class Tracer:
 
         The first is `frame`'s. For the others the scene is traced every `TRACE_STEP_S` at most;
         in between, points and facets are where the animation has them, with exact path lengths,
-        while visibility, walls met and shadows fade from one trace to the next.
+        while visibility, walls met and shadows fade from one trace to the next. Where there are
+        vehicles, the environment is traced again for every sample.
         """
         offset_s = self._samples.offset_s
         first = self._trace(frame.vertices)
@@ -146,8 +147,10 @@ class Tracer:
                 before = after
                 after = self._trace(motion.at(offset_s[-1] * part / parts))
             share = 1.0 - part + progress
-            points = self._posed(motion.at(time_s))
-            out[k] = self._channel(points, (before, after), (1.0 - share, share))
+            pose = motion.at(time_s)
+            environment = self._environment_at(pose) if len(self._vehicles) else None
+            shares = (1.0 - share, share)
+            out[k] = self._channel(self._posed(pose), (before, after), shares, environment)
         return out
 
     def frame(self, frame: BundleFrame) -> np.ndarray:
@@ -169,15 +172,10 @@ class Tracer:
             vertices: Vertices of the bundle [m], shape (V, 3).
         """
         vertices = vertices.astype(np.float32)
-        paths = self._paths_at(vertices)
+        environment = self._environment_at(vertices)
+        self._flush()
         if self._points is None:
-            self._flush()
-            return Trace(environment_channel(paths, self._radio, self._layout))
-        people = self._people.posed(vertices)
-        with self._timed("shadow"):
-            bodies = [(people[kept], faces) for kept, faces in self._outlines]
-            passed = transmission(paths, self._layout, bodies, self._nodes, self._shadow)
-            environment = environment_channel(paths, self._radio, self._layout, passed)
+            return Trace(environment)
         self._move(vertices)
         points = self._posed(vertices)
         assert points is not None
@@ -187,15 +185,40 @@ class Tracer:
         if self._bounces is not None:
             with self._timed("people_bounces"):
                 bounced = self._bounces.paths(points)
-        self._flush()
         return Trace(environment, points, seen, bounced)
 
+    def _environment_at(self, vertices: np.ndarray) -> np.ndarray:
+        """Channel of everything but people's echoes, complex128, (tx, rx, subcarrier)."""
+        vertices = vertices.astype(np.float32)
+        paths = self._paths_at(vertices)
+        passed = None
+        if self._points is not None:
+            people = self._people.posed(vertices)
+            bodies = [(people[kept], faces) for kept, faces in self._outlines]
+            with self._timed("shadow"):
+                passed = transmission(paths, self._layout, bodies, self._nodes, self._shadow)
+        with self._timed("environment"):
+            return environment_channel(paths, self._radio, self._layout, passed)
+
     def _channel(
-        self, points: PosedPoints | None, traces: tuple[Trace, ...], shares: tuple[float, ...]
+        self,
+        points: PosedPoints | None,
+        traces: tuple[Trace, ...],
+        shares: tuple[float, ...],
+        environment: np.ndarray | None = None,
     ) -> np.ndarray:
-        """Channel of points in a mixture of traces, complex128, (tx, rx, subcarrier)."""
+        """Channel of points in a mixture of traces, complex128, (tx, rx, subcarrier).
+
+        Args:
+            points: Scattering points; None if there are none.
+            traces: What rays have told.
+            shares: Weight of each trace.
+            environment: Channel without people's echoes; None mixes that of the traces.
+        """
         weighted = list(zip(traces, shares, strict=True))
-        channel = mixed([(trace.environment, share) for trace, share in weighted])
+        if environment is None:
+            environment = mixed([(trace.environment, share) for trace, share in weighted])
+        channel = environment
         if points is not None:
             with self._timed("people_direct"):
                 channel += direct_channel(

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dataset_factory.bundle import Bundle, BundleFrame, read_bundle
+from dataset_factory.bundle import Bundle, read_bundle
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json, write_json
 from rfgs_core.radio import DevicePose, Radio, frame_samples
@@ -138,13 +138,31 @@ def test_packets_agree_with_tracing_each_of_them(
     dense = []
     for time_s in frame_samples(radio, 1 / FRAME_S).offset_s:
         pose = motion.at(time_s).astype(np.float32)
-        dense.append(
-            tracer.frame(BundleFrame(0, pose, frame.joints, frame.person_instance, frame.action))
-        )
+        dense.append(tracer.frame(replace(frame, vertices=pose)))
     static = tracer.static()
     found = error_db(packets - static, np.stack(dense) - static)
     held = error_db(np.stack([packets[0]] * 4) - static, np.stack(dense) - static)
     assert found < -20.0 and held > found + 15.0
+
+
+def test_vehicles_are_traced_at_every_packet(
+    make_bundle: MakeBundle, small_radio: Radio, two_devices: list[DevicePose]
+) -> None:
+    from dataset_factory.motion import read_motion
+    from dataset_factory.trace import Tracer
+
+    vertices, faces = plate(side=1.5, cells=1)
+    steel = (vertices @ np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 1]], np.float32), faces)
+    bundle = in_motion(make_bundle(static=[], vehicle=steel), (0.0, 8.0, 0.0))
+    tracer = Tracer(bundle, replace(small_radio, samples_per_frame=3), two_devices, depth=1)
+    frame, motion = bundle.frame(1), read_motion(bundle, 1, 0.0)
+    packets = tracer.samples(frame)
+    for packet, time_s in zip(
+        packets, frame_samples(tracer._radio, 1 / FRAME_S).offset_s, strict=True
+    ):
+        pose = motion.at(float(time_s)).astype(np.float32)
+        assert np.array_equal(packet, tracer.frame(replace(frame, vertices=pose)))
+    assert not np.array_equal(packets[1], packets[2])
 
 
 def test_packets_without_poses_are_refused(

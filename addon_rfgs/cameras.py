@@ -172,6 +172,7 @@ def find_devices(scene: bpy.types.Scene) -> tuple[list[dict[str, Any]], list[dic
                 "role": item.rfgs.role,
                 "position_m": [float(value) * unit for value in place],
                 "quat_wxyz": [float(value) for value in turn.normalized()],
+                "rf": item.rfgs.rf.row(),
             }
         )
     return rows, _moving(scene, "radio device", poses)

@@ -30,6 +30,11 @@ class RFGS_PT_object(_Tab, bpy.types.Panel):
             layout.prop(item.rfgs, "role")
             if item.rfgs.role != "NONE":
                 layout.prop(item.rfgs, "radio")
+                if item.rfgs.radio in {"any", "scene"}:
+                    box = layout.box()
+                    box.label(text="Radio 'scene'")
+                    for name in item.rfgs.rf.bl_rna.properties.keys()[2:]:
+                        box.prop(item.rfgs.rf, name)
         if item.type in {"MESH", "CURVE", "SURFACE", "FONT", "META", "EMPTY"}:
             layout.prop(item.rfgs, "object_class")
             layout.prop(item.rfgs, "instance")

@@ -5,6 +5,7 @@ import zlib
 
 import bpy
 
+from .radio_properties import RFGS_PG_radio
 from .tables import MATERIALS, RADIOS
 
 ROLES = [
@@ -40,7 +41,7 @@ def _material_items() -> list[tuple[str, str, str, int]]:
 
 
 def _search_radios(_self: object, _context: object, text: str) -> list[str]:
-    return [name for name in ("any", *RADIOS) if text.lower() in name]
+    return [name for name in ("any", "scene", *RADIOS) if text.lower() in name]
 
 
 class RFGS_PG_object(bpy.types.PropertyGroup):
@@ -54,10 +55,12 @@ class RFGS_PG_object(bpy.types.PropertyGroup):
     )
     radio: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Radio",
-        description="Preset this device belongs to, or 'any' for every radio",
+        description="Preset this device belongs to, 'any' for every radio, or 'scene' for the one "
+        "described below",
         default="any",
         search=_search_radios,
     )
+    rf: bpy.props.PointerProperty(type=RFGS_PG_radio)  # type: ignore[valid-type]
     object_class: bpy.props.EnumProperty(  # type: ignore[valid-type]
         name="Class",
         description="What this mesh is to the radio",
@@ -164,7 +167,7 @@ class RFGS_PG_scene(bpy.types.PropertyGroup):
     )
 
 
-CLASSES_TO_REGISTER = (RFGS_PG_object, RFGS_PG_material, RFGS_PG_scene)
+CLASSES_TO_REGISTER = (RFGS_PG_radio, RFGS_PG_object, RFGS_PG_material, RFGS_PG_scene)
 
 
 def register() -> None:

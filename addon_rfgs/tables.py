@@ -11,6 +11,12 @@ _TABLES = json.loads((Path(__file__).parent / "tables.json").read_text("utf-8"))
 #: Name and one-line description of every radio preset.
 RADIOS: dict[str, str] = {row["name"]: row["description"] for row in _TABLES["radios"]}
 
+#: Fields of a radio that Empties hold, with the value each starts with.
+RADIO_DEFAULTS: dict[str, object] = _TABLES["radio_defaults"]
+
+#: What pattern, polarization and own_device_links may be.
+RADIO_CHOICES: dict[str, list[str]] = _TABLES["radio_choices"]
+
 #: Radio materials by name, each with freq_min_hz, freq_max_hz, thickness_m [m] and color.
 MATERIALS: dict[str, dict] = {row["name"]: row for row in _TABLES["materials"]}
 

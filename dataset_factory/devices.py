@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from dataset_factory.bundle import Bundle
+from dataset_factory.radios import SCENE_RADIO
 from rfgs_core.dataset.schema import device_pose
 from rfgs_core.errors import RfgsError
 from rfgs_core.radio import DevicePose, Radio, place_devices
@@ -32,20 +33,27 @@ def choose_devices(bundle: Bundle, radio: Radio) -> tuple[list[DevicePose], dict
     Returns:
         The devices, and the guess that was made, None if the scene brought them.
     """
-    names = {"any", radio.name} if radio.placement == "corners" else {radio.name}
+    at_points = radio.placement == "corners" or radio.name == SCENE_RADIO
+    names = {"any", radio.name} if at_points else {radio.name}
     own = [
         device_pose(row)
         for row in bundle.devices
-        if row["role"] == "ACCESS_POINT" and row["radio"] in names
+        if row["role"] != "NONE" and row["radio"] in names
     ]
     if own:
+        for other, word in (("RECEIVER", "transmits"), ("TRANSMITTER", "receives")):
+            if all(device.role == other for device in own):
+                raise RfgsError(
+                    f"{bundle.info['blend_name']}: no device of radio {radio.name!r} {word}; give "
+                    "an Empty another role"
+                )
         return own, None
     placed = place_devices(radio, bundle.bounds_m)
     guess = {
         "what": "devices",
         "object": radio.name,
         "value": f"{len(placed)} {_WHERE[radio.placement]}",
-        "why": "no Empty has the role access point with radio "
+        "why": "no Empty has a role with radio "
         + " or ".join(repr(name) for name in sorted(names)),
     }
     return placed, guess

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import logging
 import shutil
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 from dataset_factory.bundle import Bundle, read_bundle
@@ -17,6 +17,7 @@ from dataset_factory.job import Job
 from dataset_factory.pace_cache import remember
 from dataset_factory.plan import versions
 from dataset_factory.progress import progress_bar
+from dataset_factory.radios import SCENE_RADIO, scene_radio
 from dataset_factory.render import render
 from dataset_factory.sequence import describe_sequence, write_geometry
 from dataset_factory.tracing import trace
@@ -56,6 +57,8 @@ def generate(job: Job) -> bool:
         info = DatasetInfo(versions(), asdict(job.plan), job.plan.seed, _contents(job), [job.name])
         with job.stage("export"):
             bundle = _export(job)
+        if SCENE_RADIO in job.plan.radios:
+            job = replace(job, plan=job.plan.with_radio(scene_radio(bundle)))
         devices, guesses = _choose(job, bundle)
         # Only a usable scene claims the folder: who mends theirs may use the same --out again.
         if not (job.out / "dataset.json").exists():

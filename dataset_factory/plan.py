@@ -3,17 +3,19 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from importlib import metadata
 from pathlib import Path
 from typing import Any, Literal
 
+from dataset_factory.radios import chosen_radios
 from dataset_factory.scenes import Scene, blend_digest
 from rfgs_core.dataset.csi_store import chunk_file
 from rfgs_core.dataset.names import SequenceFiles
 from rfgs_core.errors import RfgsError
 from rfgs_core.frames import parse_frames
-from rfgs_core.radio import Radio, preset
+from rfgs_core.radio import PRESETS, Radio, preset
+from rfgs_core.radio.files import checked_radio
 
 #: More packets per frame than any radio sends.
 MAX_PACKETS = 10_000
@@ -52,12 +54,20 @@ class Plan:
     packets_per_frame: int = 1
     """Packets or chirps of each frame; 1 leaves every radio its own number."""
 
+    custom_radios: dict[str, dict[str, Any]] = field(default_factory=dict)
+    """All fields of the radios that are no presets, by name."""
+
     def radio(self, name: str) -> Radio:
         """One of the plan's radios, with the packets asked for."""
-        radio = preset(name)
+        custom = self.custom_radios.get(name)
+        radio = checked_radio(name, custom) if custom else preset(name)
         if self.packets_per_frame == 1:
             return radio
         return replace(radio, samples_per_frame=self.packets_per_frame)
+
+    def with_radio(self, radio: Radio) -> Plan:
+        """The plan with another definition of one of its radios."""
+        return replace(self, custom_radios={**self.custom_radios, radio.name: asdict(radio)})
 
 
 def make_plan(scene: Scene, radios: tuple[str, ...], frames: str, **options: Any) -> Plan:
@@ -65,19 +75,16 @@ def make_plan(scene: Scene, radios: tuple[str, ...], frames: str, **options: Any
 
     Args:
         scene: Where the data comes from.
-        radios: Preset names.
+        radios: Presets, files of radios, or `scene`.
         frames: Frames `A:B[:STEP]`, one number, or empty.
         **options: The other fields of `Plan`.
 
     Raises:
-        RfgsError: A radio is unknown or named twice, or a number is out of range.
+        RfgsError: A radio is unknown, unusable or named twice, or a number is out of range.
     """
     if not radios:
         raise RfgsError("no radio given; add --radio wifi, --radio mmwave or both")
-    for name in radios:
-        preset(name)
-    if len(set(radios)) != len(radios):
-        raise RfgsError(f"a radio is named twice: {', '.join(radios)}")
+    chosen = chosen_radios(radios)
     if frames and len(only := parse_frames(frames)) == 1:
         # Inside Blender frames are always a range.
         frames = f"{only[0]}:{only[0]}"
@@ -91,7 +98,10 @@ def make_plan(scene: Scene, radios: tuple[str, ...], frames: str, **options: Any
     return Plan(
         scene=scene.name,
         blend_sha256=blend_digest(scene),
-        radios=sorted(radios),
+        radios=sorted(chosen),
+        custom_radios={
+            name: asdict(radio) for name, radio in chosen.items() if name not in PRESETS
+        },
         frames=frames,
         **options,
     )

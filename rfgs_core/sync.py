@@ -10,15 +10,25 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from rfgs_core.files import write_text
+from rfgs_core.radio.antennas import PATTERNS, POLARIZATIONS
 from rfgs_core.radio.materials import MATERIALS
-from rfgs_core.radio.presets import PRESETS, Radio
+from rfgs_core.radio.presets import PRESETS, OwnLinks, Radio, preset
 from rfgs_core.skeleton import JOINTS, PARENTS
 
 #: Where the add-on keeps its copy.
 TABLES_PATH = Path(__file__).resolve().parent.parent / "addon_rfgs" / "tables.json"
+
+
+#: Fields of a radio that the add-on's Empties hold; the others are about placing devices.
+SCENE_FIELDS = (
+    *("freq_min_hz", "freq_max_hz", "num_subcarriers"),
+    *("tx_rows", "tx_cols", "rx_rows", "rx_cols", "tx_spacing_m", "rx_spacing_m", "tx_offset_m"),
+    *("own_device_links", "isolation_db", "power_dbm", "noise_figure_db"),
+    *("pattern", "polarization"),
+)
 
 
 def describe(radio: Radio) -> str:
@@ -37,6 +47,12 @@ def tables() -> dict[str, Any]:
         "radios": [
             {"name": radio.name, "description": describe(radio)} for radio in PRESETS.values()
         ],
+        "radio_defaults": {name: getattr(preset("wifi"), name) for name in SCENE_FIELDS},
+        "radio_choices": {
+            "pattern": list(PATTERNS),
+            "polarization": list(POLARIZATIONS),
+            "own_device_links": list(get_args(OwnLinks)),
+        },
         "materials": [
             {
                 "name": material.name,

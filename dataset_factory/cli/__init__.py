@@ -10,6 +10,7 @@ from collections.abc import Sequence
 COMMANDS: dict[str, tuple[str, str]] = {
     "scenes": ("scenes", "ScenesArgs"),
     "plan": ("plan", "PlanArgs"),
+    "radios": ("radios", "RadiosArgs"),
     "generate": ("generate", "GenerateArgs"),
     "validate": ("validate", "ValidateArgs"),
     "preview": ("preview", "PreviewArgs"),

@@ -28,7 +28,8 @@ class GenerateArgs:
     scene: tyro.conf.Positional[str]
     """Name from `rfgs-factory scenes`, or path of a .blend file."""
     radio: tyro.conf.UseAppendAction[tuple[str, ...]]
-    """Radio to trace: wifi or mmwave; repeat the option for several."""
+    """Radio to trace: a preset (see `rfgs-factory radios`), a file like my_radio.yaml, or `scene`
+    for the one that the scene's Empties describe; repeat the option for several."""
     out: Path
     """Folder of the dataset."""
     frames: str = ""

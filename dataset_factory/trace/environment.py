@@ -3,15 +3,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import sionna.rt as rt
 
 from dataset_factory.bundle import Bundle
+from dataset_factory.trace.band_solver import BandSolver
 from dataset_factory.trace.movers import Movers
-from dataset_factory.trace.paths import PathSet, joined, path_set
+from dataset_factory.trace.paths import PathSet, joined, merged, path_set, united
 from dataset_factory.trace.scene import (
+    Group,
     add_antennas,
     centres,
     environment_scene,
@@ -31,8 +34,16 @@ NUM_SAMPLES = 300_000
 MAX_PATHS = 20_000
 #: Above this fractional bandwidth materials are evaluated at several frequencies.
 WIDE_BAND = 0.05
-#: Frequencies of a wide band at which paths are traced again.
+#: Above this fractional bandwidth (the usual definition of ultra-wide band) paths are found once
+#: and evaluated at every frequency; below, they are traced again.
+ULTRA_WIDE_BAND = 0.2
+#: Fewest frequencies of a wide band.
 WIDE_BAND_NODES = 9
+#: Largest distance of the frequencies of an ultra-wide band [Hz]: a slab of 3 cm and √ε = 2
+#: ripples every 2.5 GHz.
+NODE_SPACING_HZ = 0.125e9
+#: Receiving sites per call, which bounds memory to 1.5 GB.
+SITES_AT_ONCE = 8
 #: Frequencies of a narrow band, where only the shadow changes.
 NARROW_BAND_NODES = 3
 
@@ -41,7 +52,14 @@ def node_frequencies(radio: Radio) -> np.ndarray:
     """Frequencies [Hz] between which amplitudes are interpolated, both band edges included."""
     wide = radio.bandwidth_hz / radio.centre_hz > WIDE_BAND
     count = WIDE_BAND_NODES if wide else NARROW_BAND_NODES
+    if ultra_wide(radio):
+        count = max(count, math.ceil(radio.bandwidth_hz / NODE_SPACING_HZ) + 1)
     return np.linspace(radio.freq_min_hz, radio.freq_max_hz, count)
+
+
+def ultra_wide(radio: Radio) -> bool:
+    """Whether paths are found once and evaluated at every frequency."""
+    return radio.bandwidth_hz / radio.centre_hz > ULTRA_WIDE_BAND
 
 
 class Environment:
@@ -67,11 +85,11 @@ class Environment:
             vehicles: Rigid metal that `paths` moves; None leaves everything that moves out.
         """
         self._radio, self._layout, self._seed = radio, layout, seed
+        self._devices, self._groups = devices, groups(layout)
         self._vehicles = vehicles
         self._scatters = any(row["scattering_coefficient"] > 0.0 for row in bundle.materials)
         self._scene = environment_scene(bundle, radio, vehicles)
-        self._solver = rt.PathSolver(deterministic=True)
-        add_antennas(self._scene, layout, devices)
+        self._solver = BandSolver(deterministic=True)
 
     def paths(self, vertices: np.ndarray | None = None) -> PathSet:
         """Traces the scene; the result does not depend on what was traced before.
@@ -86,17 +104,35 @@ class Environment:
         """
         if self._vehicles is not None and vertices is not None:
             move_vehicles(self._scene, self._vehicles, vertices)
+        parts = []
+        for group in self._groups:
+            add_antennas(self._scene, self._layout, self._devices, group)
+            parts.append(self._between(group))
+        return parts[0] if len(parts) == 1 else merged(parts)
+
+    def _between(self, group: Group) -> PathSet:
+        """Paths between the sites of a group, whose antennas are in the scene."""
         nodes = node_frequencies(self._radio)
+        centre_hz = self._radio.centre_hz
         if len(nodes) == NARROW_BAND_NODES:
-            traced = self._traced(self._radio.centre_hz)
+            traced = self._read(self._traced(centre_hz), group, centre_hz)
             # Walls hardly change over a narrow band.
             return replace(traced, amplitude=np.repeat(traced.amplitude, len(nodes), axis=2))
-        return joined([self._traced(float(f)) for f in nodes])
+        if not ultra_wide(self._radio):
+            return joined([self._read(self._traced(float(f)), group, float(f)) for f in nodes])
+        sets = []
+        # Rays choose by the material whether to go through, so each edge finds paths of its own.
+        for edge_hz in (self._radio.freq_min_hz, self._radio.freq_max_hz):
+            found = self._traced(edge_hz)
+            every = self._solver.at_frequencies(self._scene, found, nodes, NUM_SAMPLES)
+            parts = zip(every, nodes, strict=True)
+            sets.append(joined([self._read(part, group, float(f)) for part, f in parts]))
+        return united(sets)
 
-    def _traced(self, freq_hz: float) -> PathSet:
-        """Paths at one frequency, one amplitude each."""
+    def _traced(self, freq_hz: float) -> rt.Paths:
+        """Paths at one frequency."""
         set_frequency(self._scene, freq_hz)
-        paths = self._solver(
+        return self._solver(
             self._scene,
             max_depth=MAX_DEPTH,
             samples_per_src=NUM_SAMPLES,
@@ -106,8 +142,13 @@ class Environment:
             refraction=True,
             seed=self._seed,
         )
-        found = path_set(paths, *centres(self._layout))
-        found = replace(found, amplitude=found.amplitude * (freq_hz / self._radio.centre_hz))
+
+    def _read(self, paths: rt.Paths, group: Group, freq_hz: float) -> PathSet:
+        """Sionna's paths between the sites of a group, one amplitude each."""
+        tx_centres, rx_centres = centres(self._layout)
+        found = path_set(paths, tx_centres[group[0]], rx_centres[group[1]])
+        amplitude = found.amplitude * (freq_hz / self._radio.centre_hz)
+        found = replace(found, tx=group[0][found.tx], rx=group[1][found.rx], amplitude=amplitude)
         tx_owner, rx_owner = owners(self._layout)
         straight = (found.kinds == 0).all(axis=1) & (tx_owner[found.tx] == rx_owner[found.rx])
         found.amplitude[straight] *= 10.0 ** (-self._radio.isolation_db / 20.0)
@@ -127,6 +168,18 @@ def environment_channel(
     """
     channel = steer(paths, layout, radio.freq_hz, node_frequencies(radio), transmission)
     return channel * (radio.centre_hz / radio.freq_hz)
+
+
+def groups(layout: Layout) -> list[Group]:
+    """Sites to trace together, so that all measured pairs are and memory stays bounded."""
+    wanted = measured_pairs(layout)
+    tx, rx = (np.arange(count) for count in wanted.shape)
+    if len(tx) <= SITES_AT_ONCE and len(rx) <= SITES_AT_ONCE:
+        return [(tx, rx)]
+    if len(tx) == len(rx) and (wanted == np.eye(len(tx), dtype=bool)).all():
+        return [(tx[i : i + 1], rx[i : i + 1]) for i in tx]
+    starts = range(0, len(rx), SITES_AT_ONCE)
+    return [(tx, rx[i : i + SITES_AT_ONCE]) for i in starts]
 
 
 def measured_pairs(layout: Layout) -> np.ndarray:

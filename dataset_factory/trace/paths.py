@@ -138,19 +138,34 @@ def joined(sets: list[PathSet]) -> PathSet:
     if not filled:
         return empty(0, len(sets))
     node = np.concatenate([np.full(len(paths), node) for node, paths in filled])
-    every = PathSet(
-        *(
-            np.concatenate([getattr(paths, column.name) for _, paths in filled])
-            for column in fields(PathSet)
-        )
-    )
-    corners = np.round(every.vertices * 1e3).astype(np.int64).reshape(len(every), -1)
-    keys = np.concatenate([every.tx[:, None], every.rx[:, None], every.kinds, corners], axis=1)
-    _, first, row = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    every = _concatenated([paths for _, paths in filled])
+    _, first, row = np.unique(_keys(every), axis=0, return_index=True, return_inverse=True)
     amplitude = np.zeros((len(first), every.amplitude.shape[1], len(sets)), dtype=np.complex128)
     # Zipped axes first, so that each row of a path adds to its own frequency.
     np.add.at(amplitude.transpose(0, 2, 1), (row.ravel(), node), every.amplitude[:, :, 0])
     return replace(every.select(first), amplitude=amplitude).sorted()
+
+
+def united(sets: list[PathSet]) -> PathSet:
+    """Every path of several sets of equal depth and nodes once, the first of equal ones."""
+    filled = [paths for paths in sets if len(paths)]
+    if not filled:
+        return sets[0]
+    every = _concatenated(filled)
+    _, first = np.unique(_keys(every), axis=0, return_index=True)
+    return every.select(first).sorted()
+
+
+def _concatenated(sets: list[PathSet]) -> PathSet:
+    """Sets of equal depth one after the other."""
+    columns = (column.name for column in fields(PathSet))
+    return PathSet(*(np.concatenate([getattr(part, name) for part in sets]) for name in columns))
+
+
+def _keys(paths: PathSet) -> np.ndarray:
+    """What makes paths the same: ends, interactions and corners to the millimetre."""
+    corners = np.round(paths.vertices * 1e3).astype(np.int64).reshape(len(paths), -1)
+    return np.concatenate([paths.tx[:, None], paths.rx[:, None], paths.kinds, corners], axis=1)
 
 
 def _padded(part: PathSet, depth: int) -> PathSet:

@@ -17,9 +17,11 @@ from scipy.spatial import KDTree
 
 #: Spacing of points as a share of the shortest wavelength; 0.4 is the coarsest that works.
 SPACING_WAVELENGTHS = 0.385
-#: Points per square metre beyond which a finer surface would cost more than it gives; at
-#: 60 GHz this is coarser than a wavelength, so levels hold there and waveforms do not.
-MAX_DENSITY = 4500.0
+#: Points per square metre up to which the spacing follows the wavelength: to 13 GHz.
+MAX_DENSITY = 13_000.0
+#: Points per square metre beyond that, where no number that can be afforded would do: coarser
+#: than a wavelength, so levels hold at 60 GHz and waveforms do not.
+COARSE_DENSITY = 4500.0
 #: Points sit this far outside the skin [m], so that the skin itself can shadow them.
 LIFT_M = 1e-3
 #: Parts of an instance smaller than this share of its area (eyes, tongue) are left out.
@@ -70,8 +72,9 @@ class SurfacePoints:
 
 
 def density(wavelength_m: float) -> float:
-    """Points per square metre for a spacing of `SPACING_WAVELENGTHS`, capped."""
-    return min(1.0 / (SPACING_WAVELENGTHS * wavelength_m) ** 2, MAX_DENSITY)
+    """Points per square metre for a spacing of `SPACING_WAVELENGTHS`, where that is possible."""
+    needed = 1.0 / (SPACING_WAVELENGTHS * wavelength_m) ** 2
+    return needed if needed <= MAX_DENSITY else COARSE_DENSITY
 
 
 def surface_points(

@@ -20,6 +20,8 @@ from rfgs_core.radio.layout import DevicePose, rotation
 from rfgs_core.radio.materials import MATERIALS
 from rfgs_core.radio.tissue import normal_reflection, skin_conductivity, skin_permittivity
 
+#: Transmitting and receiving sites that are traced together.
+Group = tuple[np.ndarray, np.ndarray]
 #: Name of the one object that holds everything that moves and scatters from points.
 BODY = "moving"
 
@@ -166,16 +168,24 @@ def set_frequency(scene: rt.Scene, freq_hz: float) -> None:
     scene.frequency = dr.opaque(mi.Float, freq_hz)
 
 
-def add_antennas(scene: rt.Scene, layout: Layout, devices: list[DevicePose]) -> None:
-    """Adds every site as a one-element transmitter or a one-element receiver, in order."""
+def add_antennas(
+    scene: rt.Scene, layout: Layout, devices: list[DevicePose], group: Group | None = None
+) -> None:
+    """Adds sites as one-element transmitters and receivers, in order; those of a group, or all.
+
+    What stood there before goes.
+    """
+    for name in [*scene.transmitters, *scene.receivers]:
+        scene.remove(name)
     tx_centres, rx_centres = centres(layout)
     tx_owner, rx_owner = owners(layout)
-    for index, device in enumerate(tx_owner):
-        orientation = mi.Point3f(*euler_angles(devices[device].quat_wxyz))
+    tx, rx = group or (np.arange(len(tx_owner)), np.arange(len(rx_owner)))
+    for index in tx:
+        orientation = mi.Point3f(*euler_angles(devices[tx_owner[index]].quat_wxyz))
         position = tx_centres[index].tolist()
         scene.add(rt.Transmitter(f"tx-{index}", position=position, orientation=orientation))
-    for index, device in enumerate(rx_owner):
-        orientation = mi.Point3f(*euler_angles(devices[device].quat_wxyz))
+    for index in rx:
+        orientation = mi.Point3f(*euler_angles(devices[rx_owner[index]].quat_wxyz))
         position = rx_centres[index].tolist()
         scene.add(rt.Receiver(f"rx-{index}", position=position, orientation=orientation))
 

@@ -20,6 +20,7 @@ from dataset_factory.trace.environment import (
     Environment,
     environment_channel,
     node_frequencies,
+    ultra_wide,
 )
 from dataset_factory.trace.held import Trace, follow, mixed
 from dataset_factory.trace.movers import split_movers
@@ -84,6 +85,11 @@ class Tracer:
         """
         if depth != 1 and depth not in BUFFER:
             raise RfgsError(f"trace depth {depth}: expected 1, 2 or 3")
+        if depth > 1 and ultra_wide(radio):
+            raise RfgsError(
+                f"radio {radio.name!r}, trace depth {depth}: people's paths by way of walls are "
+                "traced at one frequency, too few for an ultra-wide band; use --depth 1"
+            )
         check_materials(bundle, radio)
         self._bundle, self._radio, self._devices = bundle, radio, devices
         self._shadow: Shadow = shadow

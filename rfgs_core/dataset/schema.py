@@ -14,6 +14,7 @@ from jaxtyping import Float64
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.files import read_json
 from rfgs_core.radio import DevicePose, Radio
+from rfgs_core.radio.layout import Role
 from rfgs_core.radio.presets import OwnLinks
 
 DATASET_SCHEMA = "rfgs-dataset/1"
@@ -206,7 +207,10 @@ def device_pose(values: dict[str, Any]) -> DevicePose:
         ) from error
     if not np.isfinite([x, y, z, w, i, j, k]).all() or not np.any([w, i, j, k]):
         raise RfgsFormatError(f"device {name!r}: expected finite numbers and a rotation")
-    return DevicePose(name, (x, y, z), (w, i, j, k))
+    role = values.get("role", "ACCESS_POINT")
+    if role not in get_args(Role):
+        raise RfgsFormatError(f"device {name!r}: role: expected {' or '.join(get_args(Role))}")
+    return DevicePose(name, (x, y, z), (w, i, j, k), role)
 
 
 def bounds_array(info: SequenceInfo) -> Float64[np.ndarray, "2 3"]:

@@ -4,12 +4,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
 from rfgs_core.radio.presets import Radio
 from rfgs_core.rotations import rotation_rows
+
+Role = Literal["ACCESS_POINT", "TRANSMITTER", "RECEIVER"]
 
 
 @dataclass(frozen=True)
@@ -22,6 +25,8 @@ class DevicePose:
     """Centre of the RX array [m]."""
     quat_wxyz: tuple[float, float, float, float]
     """Rotation world_from_device, unit quaternion, w first."""
+    role: Role = "ACCESS_POINT"
+    """Whether it transmits, receives or, as an access point, does both."""
 
 
 @dataclass(frozen=True)
@@ -92,8 +97,11 @@ def layout(radio: Radio, devices: list[DevicePose]) -> Layout:
     rx_local, column = element_offsets(
         radio.rx_rows, radio.rx_cols, _spacing_m(radio.rx_spacing_m, radio)
     )
-    tx_xyz, tx_device, tx_port, tx_site = _spread(radio, devices, tx_local, radio.tx_spacing_m)
-    rx_xyz, rx_device, rx_port, rx_site = _spread(radio, devices, rx_local, radio.rx_spacing_m)
+    senders = [i for i, device in enumerate(devices) if device.role != "RECEIVER"]
+    hearers = [i for i, device in enumerate(devices) if device.role != "TRANSMITTER"]
+    far = radio.tx_spacing_m > radio.wavelength_m, radio.rx_spacing_m > radio.wavelength_m
+    tx_xyz, tx_device, tx_port, tx_site = _spread(radio, devices, senders, tx_local, far[0])
+    rx_xyz, rx_device, rx_port, rx_site = _spread(radio, devices, hearers, rx_local, far[1])
     own = tx_device[:, None] == rx_device[None, :]
     measured = {"included": np.ones_like(own), "only": own, "excluded": ~own}
     quats = np.array([device.quat_wxyz for device in devices], dtype=np.float64)
@@ -119,18 +127,24 @@ def _spacing_m(given_m: float, radio: Radio) -> float:
 
 
 def _spread(
-    radio: Radio, devices: list[DevicePose], local: Float64[np.ndarray, "element 3"], given_m: float
+    radio: Radio,
+    devices: list[DevicePose],
+    chosen: list[int],
+    local: Float64[np.ndarray, "element 3"],
+    far_apart: bool,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Position [m], device, port and site of one array's elements in every device."""
+    """Position [m], device, port and site of one array's elements in the chosen devices."""
     ports = len(radio.slants_deg)
     xyz = [
-        np.tile(local @ rotation(device.quat_wxyz).T + np.asarray(device.position_m), (ports, 1))
-        for device in devices
+        np.tile(
+            local @ rotation(devices[i].quat_wxyz).T + np.asarray(devices[i].position_m), (ports, 1)
+        )
+        for i in chosen
     ]
-    index = np.arange(len(devices), dtype=np.int64)
-    port = np.tile(np.repeat(np.arange(ports), len(local)), len(devices))
-    site = device = np.repeat(index, ports * len(local))
-    if given_m > radio.wavelength_m:
+    port = np.tile(np.repeat(np.arange(ports, dtype=np.int64), len(local)), len(chosen))
+    site = np.repeat(np.arange(len(chosen), dtype=np.int64), ports * len(local))
+    device = np.array(chosen, dtype=np.int64)[site]
+    if far_apart:
         # Too far apart to see the same: rays are traced to each element.
-        site = device * len(local) + np.tile(np.arange(len(local)), ports * len(devices))
-    return np.concatenate(xyz), device, port.astype(np.int64), site
+        site = site * len(local) + np.tile(np.arange(len(local)), ports * len(chosen))
+    return np.concatenate([np.zeros((0, 3)), *xyz]), device, port, site

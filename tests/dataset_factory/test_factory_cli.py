@@ -46,7 +46,7 @@ def test_help_teaches(factory: Factory) -> None:
         ("missing.blend", "wifi", [], ["missing.blend", "no such Blender file"]),
         ("nowhere", "wifi", [], ["no scene 'nowhere'", "living_room_walk"]),
         ("text.blend", "wifi", [], ["text.blend", "not a Blender file"]),
-        ("room", "lora", [], ["unknown radio 'lora'", "mmwave", "wifi24"]),
+        ("room", "lora", [], ["unknown radio 'lora'", "wifi_commodity, wifi24", "my_radio.yaml"]),
         ("room", "wifi", ["--frames", "5:"], ["--frames '5:'", "FIRST:LAST"]),
         ("room", "wifi", ["--frames", "9:1"], ["FIRST <= LAST"]),
         ("room", "wifi", ["--depth", "4"], ["--depth 4", "1 to 3"]),

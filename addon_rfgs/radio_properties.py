@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The radio that Empties describe by themselves: band, arrays, antennas and power."""
+
+from __future__ import annotations
+
+import zlib
+from typing import Any
+
+import bpy
+
+from .tables import RADIO_CHOICES, RADIO_DEFAULTS
+
+_GHZ = 1e9
+
+
+def _choice(name: str, label: str, text: str) -> Any:
+    """An enum whose stored numbers follow from the names, so a longer table shifts nothing."""
+    items = [
+        (value, value, "", zlib.crc32(value.encode()) & 0x7FFFFFFF) for value in RADIO_CHOICES[name]
+    ]
+    default = RADIO_DEFAULTS[name]
+    return bpy.props.EnumProperty(name=label, description=text, items=items, default=default)
+
+
+def _count(name: str, label: str, text: str, low: int = 1) -> Any:
+    return bpy.props.IntProperty(
+        name=label, description=text, default=RADIO_DEFAULTS[name], min=low
+    )
+
+
+def _number(name: str, label: str, text: str, **limits: float) -> Any:
+    return bpy.props.FloatProperty(
+        name=label, description=text, default=RADIO_DEFAULTS[name], precision=4, **limits
+    )
+
+
+def _edge_ghz(name: str, label: str) -> Any:
+    return bpy.props.FloatProperty(
+        name=label,
+        description="Edge of the band [GHz]",
+        default=RADIO_DEFAULTS[name] / _GHZ,
+        min=0.01,
+        max=100.0,
+        precision=4,
+    )
+
+
+class RFGS_PG_radio(bpy.types.PropertyGroup):
+    """Fields of the radio `scene`, the same at every Empty of it; units as in the names."""
+
+    freq_min_ghz: _edge_ghz("freq_min_hz", "From [GHz]")  # type: ignore[valid-type]
+    freq_max_ghz: _edge_ghz("freq_max_hz", "To [GHz]")  # type: ignore[valid-type]
+    num_subcarriers: _count(  # type: ignore[valid-type]
+        "num_subcarriers", "Subcarriers", "Tones at the centres of equal slices of the band", 2
+    )
+    tx_rows: _count("tx_rows", "TX rows", "Elements along local z")  # type: ignore[valid-type]
+    tx_cols: _count("tx_cols", "TX columns", "Elements along local y")  # type: ignore[valid-type]
+    rx_rows: _count("rx_rows", "RX rows", "Elements along local z")  # type: ignore[valid-type]
+    rx_cols: _count("rx_cols", "RX columns", "Elements along local y")  # type: ignore[valid-type]
+    tx_spacing_m: _number(  # type: ignore[valid-type]
+        "tx_spacing_m", "TX spacing", "[m]; 0 takes half a wavelength", min=0.0
+    )
+    rx_spacing_m: _number(  # type: ignore[valid-type]
+        "rx_spacing_m", "RX spacing", "[m]; 0 takes half a wavelength", min=0.0
+    )
+    tx_offset_m: bpy.props.FloatVectorProperty(  # type: ignore[valid-type]
+        name="TX offset",
+        description="Centre of the TX array in the Empty's axes [m]; the RX array is at its origin",
+        size=3,
+        default=RADIO_DEFAULTS["tx_offset_m"],
+    )
+    own_device_links: _choice(  # type: ignore[valid-type]
+        "own_device_links", "Own links", "Whether a device hears its own transmitter"
+    )
+    isolation_db: _number(  # type: ignore[valid-type]
+        "isolation_db", "Isolation", "Of a device's receiver from its transmitter [dB]", min=0.0
+    )
+    power_dbm: _number("power_dbm", "Power", "Transmit power [dBm]")  # type: ignore[valid-type]
+    noise_figure_db: _number(  # type: ignore[valid-type]
+        "noise_figure_db", "Noise figure", "Of the receiver [dB]"
+    )
+    pattern: _choice("pattern", "Pattern", "Antenna pattern")  # type: ignore[valid-type]
+    polarization: _choice(  # type: ignore[valid-type]
+        "polarization", "Polarisation", "V, H, or two ports per element: VH, cross"
+    )
+
+    def row(self) -> dict[str, Any]:
+        """The fields under the names of a radio file, free of single precision's tails."""
+        out: dict[str, Any] = {}
+        for name in RADIO_DEFAULTS:
+            if name in ("freq_min_hz", "freq_max_hz"):
+                # Single precision holds a kilohertz at 10 GHz.
+                out[name] = round(getattr(self, name.replace("_hz", "_ghz")), 6) * _GHZ
+                continue
+            value = getattr(self, name)
+            if name == "tx_offset_m":
+                out[name] = [round(float(part), 6) for part in value]
+            else:
+                out[name] = round(value, 6) if isinstance(value, float) else value
+        return out

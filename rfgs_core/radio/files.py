@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Radios of one's own: a JSON or YAML file with the fields of `Radio`."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from dataclasses import MISSING, Field, asdict, fields
+from pathlib import Path
+from typing import Any, Literal, get_args, get_origin, get_type_hints
+
+import numpy as np
+import yaml
+
+from rfgs_core.errors import RfgsError
+from rfgs_core.radio.antennas import PATTERNS, POLARIZATIONS
+from rfgs_core.radio.layout import DevicePose, layout
+from rfgs_core.radio.presets import PRESETS, Radio, preset
+
+SUFFIXES = (".json", ".yaml", ".yml")
+#: Antennas closer than this have no far field to speak of, and no finite channel at zero [m].
+NEAREST_ANTENNAS_M = 1e-3
+#: Elements per device beyond which something else was meant.
+MOST_ELEMENTS = 4096
+
+_NAME = re.compile(r"[A-Za-z0-9_-]+")
+_HINTS = get_type_hints(Radio)
+
+
+def read_radio(path: Path) -> Radio:
+    """Reads a radio from a file; see docs/radios.md.
+
+    Fields are those of `Radio`. `like: NAME` takes everything that is not given from a preset;
+    without it, only fields with a default may be left out. `name` defaults to the file's.
+
+    Raises:
+        RfgsError: The file is missing, no mapping, or a field is unknown, missing, of another
+            type or impossible; one line names the file and the field.
+    """
+    given = _mapping(path)
+    base: dict[str, Any] = {}
+    like = given.pop("like", None)
+    if like is not None:
+        if not isinstance(like, str) or like not in PRESETS:
+            raise RfgsError(f"{path}: like: expected one of {', '.join(PRESETS)}, got {like!r}")
+        base = asdict(preset(like))
+    given.setdefault("name", path.stem)
+    return checked_radio(str(path), {**base, **given})
+
+
+def checked_radio(source: str, values: dict[str, Any]) -> Radio:
+    """Builds a radio and refuses impossible ones.
+
+    Args:
+        source: Where the values come from, for the message.
+        values: Fields of `Radio`.
+
+    Raises:
+        RfgsError: A field is unknown, missing, of another type or impossible.
+    """
+    known = {spec.name: spec for spec in fields(Radio)}
+    unknown = sorted(map(str, set(values) - set(known)))
+    if unknown:
+        raise RfgsError(
+            f"{source}: unknown field {unknown[0]!r}; expected some of {', '.join(known)}"
+        )
+    missing = [name for name, spec in known.items() if name not in values and _needed(spec)]
+    if missing:
+        raise RfgsError(f"{source}: field {missing[0]!r} is missing; give it, or `like: PRESET`")
+    radio = Radio(**{name: _converted(source, name, value) for name, value in values.items()})
+    if radio.name in PRESETS and radio != preset(radio.name):
+        raise RfgsError(f"{source}: name: {radio.name!r} is a preset's name; choose another")
+    for problem in radio_problems(radio):
+        raise RfgsError(f"{source}: {problem}")
+    return radio
+
+
+def radio_text(radio: Radio) -> str:
+    """A radio as YAML that `read_radio` takes."""
+    values = {
+        name: list(value) if isinstance(value, tuple) else value
+        for name, value in asdict(radio).items()
+    }
+    return yaml.safe_dump(values, sort_keys=False, default_flow_style=None)
+
+
+def radio_problems(radio: Radio) -> list[str]:
+    """What keeps a radio from being one, each as `field: why`."""
+    problems = []
+    if not _NAME.fullmatch(radio.name):
+        problems.append(f"name: {radio.name!r}: expected letters, digits, '_' and '-'")
+    if not 1e7 <= radio.freq_min_hz < radio.freq_max_hz <= 100e9:
+        problems.append(
+            f"freq_min_hz, freq_max_hz: {radio.freq_min_hz:g} to {radio.freq_max_hz:g} Hz: "
+            "expected an ascending band within 10 MHz to 100 GHz"
+        )
+    lowest = {"num_subcarriers": 2, "num_devices": 1, "samples_per_frame": 1}
+    lowest |= {f"{end}_{way}": 1 for end in ("tx", "rx") for way in ("rows", "cols")}
+    lowest |= dict.fromkeys(
+        ("tx_spacing_m", "rx_spacing_m", "isolation_db", "inset_m", "sample_interval_s"), 0
+    )
+    for name, low in lowest.items():
+        if getattr(radio, name) < low:
+            problems.append(f"{name}: {getattr(radio, name):g}: expected at least {low}")
+    if not radio.heights_m:
+        problems.append("heights_m: expected at least one height")
+    for name, table in (("pattern", PATTERNS), ("polarization", POLARIZATIONS)):
+        if getattr(radio, name) not in table:
+            problems.append(f"{name}: {getattr(radio, name)!r}: expected {' or '.join(table)}")
+    return problems or _antenna_problems(radio)
+
+
+def _antenna_problems(radio: Radio) -> list[str]:
+    """Problems of arrays whose fields are fine one by one."""
+    if max(radio.tx_rows * radio.tx_cols, radio.rx_rows * radio.rx_cols) > MOST_ELEMENTS:
+        return [f"tx_rows … rx_cols: more than {MOST_ELEMENTS} elements in one array"]
+    if radio.own_device_links == "excluded":
+        few = radio.num_devices < 2
+        return ["own_device_links: excluded leaves a single device no link"] if few else []
+    alone = layout(radio, [DevicePose("", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))])
+    nearest = min(
+        float(np.linalg.norm(alone.rx_xyz - place, axis=1).min()) for place in alone.tx_xyz
+    )
+    if nearest < NEAREST_ANTENNAS_M:
+        return [
+            "tx_offset_m: a transmitting element stands in a receiving one; move it, or set "
+            "own_device_links to excluded"
+        ]
+    return []
+
+
+def _mapping(path: Path) -> dict[str, Any]:
+    """The mapping a file holds."""
+    if path.suffix.lower() not in SUFFIXES:
+        raise RfgsError(f"{path}: expected a radio in a file ending in {', '.join(SUFFIXES)}")
+    try:
+        text = path.read_text("utf-8")
+        value = json.loads(text) if path.suffix.lower() == ".json" else yaml.safe_load(text)
+    except FileNotFoundError as error:
+        raise RfgsError(f"{path}: no such file") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise RfgsError(f"{path}: cannot be read ({error})") from error
+    except (ValueError, RecursionError, yaml.YAMLError) as error:
+        reason = " ".join(str(error).split())
+        raise RfgsError(f"{path}: no valid {path.suffix[1:].upper()} ({reason})") from error
+    if not isinstance(value, dict):
+        raise RfgsError(f"{path}: expected fields and values, got {type(value).__name__}")
+    return value
+
+
+def _needed(spec: Field) -> bool:
+    return spec.default is MISSING and spec.default_factory is MISSING
+
+
+def _converted(source: str, name: str, value: Any) -> Any:
+    """A value as the type its field has."""
+    kind = _HINTS[name]
+    if get_origin(kind) is Literal:
+        if value not in get_args(kind):
+            choices = " or ".join(get_args(kind))
+            raise RfgsError(f"{source}: {name}: expected {choices}, got {value!r}")
+        return value
+    if get_origin(kind) is tuple:
+        arguments = get_args(kind)
+        any_number = arguments[-1] is Ellipsis
+        if not isinstance(value, (list, tuple)) or not (any_number or len(value) == len(arguments)):
+            count = "" if any_number else f"{len(arguments)} "
+            raise RfgsError(f"{source}: {name}: expected a list of {count}numbers, got {value!r}")
+        return tuple(_number(source, name, part) for part in value)
+    if kind is float:
+        return _number(source, name, value)
+    if kind is int and (isinstance(value, bool) or not isinstance(value, int)):
+        raise RfgsError(f"{source}: {name}: expected a whole number, got {value!r}")
+    if kind is str and not isinstance(value, str):
+        raise RfgsError(f"{source}: {name}: expected text, got {value!r}")
+    return value
+
+
+def _number(source: str, name: str, value: Any) -> float:
+    """A finite number; YAML reads 5.8e9 as text, so that is taken too."""
+    try:
+        number = math.nan if isinstance(value, bool) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not math.isfinite(number):
+        raise RfgsError(f"{source}: {name}: expected a finite number, got {value!r}")
+    return number

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What `--radio` may name besides presets."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from dataset_factory.radios import chosen_radios, scene_radio
+from rfgs_core.errors import RfgsError
+from rfgs_core.radio import preset
+from rfgs_core.sync import SCENE_FIELDS
+
+
+def empty(name: str, radio: str = "scene", **changed: Any) -> dict[str, Any]:
+    fields = {key: getattr(preset("wifi"), key) for key in SCENE_FIELDS}
+    return {"name": name, "radio": radio, "role": "ACCESS_POINT", "rf": {**fields, **changed}}
+
+
+def bundle(*devices: dict[str, Any]) -> Any:
+    return SimpleNamespace(
+        devices=list(devices), path=Path("bundle"), info={"blend_name": "room.blend"}
+    )
+
+
+def test_presets_files_and_the_scene_may_be_mixed(tmp_path: Path) -> None:
+    (tmp_path / "lab.yaml").write_text("like: wifi24\npattern: dipole\n")
+    found = chosen_radios(("uwb", str(tmp_path / "lab.yaml"), "scene"))
+    assert list(found) == ["uwb", "lab", "scene"]
+    assert found["lab"] == replace(preset("wifi24"), name="lab", pattern="dipole")
+
+
+def test_one_name_means_one_radio(tmp_path: Path) -> None:
+    with pytest.raises(RfgsError, match="a radio is named twice: wifi"):
+        chosen_radios(("wifi", "wifi"))
+    (tmp_path / "scene.yaml").write_text("like: wifi\n")
+    with pytest.raises(RfgsError, match="'scene' is kept for the scene's own radio"):
+        chosen_radios((str(tmp_path / "scene.yaml"),))
+
+
+def test_empties_make_a_radio() -> None:
+    changed = {"freq_min_hz": 2.4e9, "freq_max_hz": 2.48e9, "polarization": "VH", "rx_cols": 2}
+    found = scene_radio(
+        bundle(empty("a", **changed), empty("b", "any", **changed), empty("c", "wifi"))
+    )
+    assert asdict(found) == {
+        **asdict(preset("wifi")),
+        **changed,
+        "name": "scene",
+        "num_devices": 2,
+    }
+
+
+def test_empties_that_do_not_fit_are_named() -> None:
+    with pytest.raises(RfgsError, match="no Empty has a role in the radio 'scene'"):
+        scene_radio(bundle(empty("a", "wifi")))
+    with pytest.raises(RfgsError, match=r"power_dbm is 20\.0 at 'a' but 7\.0 at 'b'"):
+        scene_radio(bundle(empty("a"), empty("b", power_dbm=7.0)))
+    with pytest.raises(RfgsError, match=r"room\.blend: Empty 'a': freq_min_hz, freq_max_hz"):
+        scene_radio(bundle(empty("a", freq_max_hz=1e9)))

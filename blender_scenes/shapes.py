@@ -82,23 +82,21 @@ class Builder:
         *,
         sides: int = 16,
         caps: bool = True,
+        axis: str = "z",
     ) -> None:
-        """Adds a body of revolution about z; `profile` lists (radius, z) from bottom to top."""
+        """Adds a body of revolution about `axis`, z or y.
+
+        `profile` lists (radius, place along the axis) in ascending order.
+        """
         rings = []
         for radius, z in profile:
             angles = (2 * math.pi * index / sides for index in range(sides))
-            rings.append(
-                [
-                    self._bm.verts.new(
-                        (
-                            centre[0] + radius * math.cos(angle),
-                            centre[1] + radius * math.sin(angle),
-                            centre[2] + z,
-                        )
-                    )
-                    for angle in angles
-                ]
-            )
+            ring = []
+            for angle in angles:
+                x, y = radius * math.cos(angle), radius * math.sin(angle)
+                place = Vector((x, y, z) if axis == "z" else (y, z, x))
+                ring.append(self._bm.verts.new(Vector(centre) + place))
+            rings.append(ring)
         faces = []
         for low, high in pairwise(rings):
             for index in range(sides):
@@ -136,6 +134,16 @@ class Builder:
                     self._bm.faces.new((low[index], low[index + 1], high[index + 1], high[index]))
                 )
         self._finish(faces, surface)
+
+    def polygons(
+        self, points: Sequence[Point], faces: Sequence[Sequence[int]], surfaces: Sequence[str]
+    ) -> None:
+        """Adds a body of `faces` over `points`, each with its surface; normals turn outwards."""
+        verts = [self._bm.verts.new(point) for point in points]
+        made = [self._bm.faces.new([verts[index] for index in face]) for face in faces]
+        for face, surface in zip(made, surfaces, strict=True):
+            self._finish([face], surface)
+        bmesh.ops.recalc_face_normals(self._bm, faces=made)
 
     def build(
         self,

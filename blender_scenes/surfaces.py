@@ -3,32 +3,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import bpy
 
-Colour = tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class Surface:
-    """A surface as Cycles and the ray tracer see it."""
-
-    colour: Colour
-    """Main colour, linear RGB."""
-    radio: str
-    """Radio material; every one used here is valid from 1 to 100 GHz."""
-    thickness_m: float
-    """Thickness of the slab [m]."""
-    texture: str = "plain"
-    """plain, planks, grain, weave, rug, glow or pane."""
-    second: Colour = (0.0, 0.0, 0.0)
-    """Second colour of the texture, linear RGB."""
-    roughness: float = 0.6
-    """Roughness of the highlight, 0 to 1."""
-    metallic: float = 0.0
-    """1 for bare metal."""
-
+from blender_scenes.surface import Colour, Surface
+from blender_scenes.surfaces_outdoor import OUTDOOR
 
 #: Textiles and leaves have no model of their own: wood of their thickness stands in for them.
 SURFACES: dict[str, Surface] = {
@@ -114,6 +92,7 @@ SURFACES: dict[str, Surface] = {
     "trousers": Surface((0.035, 0.05, 0.10), "skin", 0.30, "weave", (0.045, 0.065, 0.125), 0.9),
     "shoes": Surface((0.70, 0.68, 0.63), "skin", 0.30, roughness=0.6),
     "soles": Surface((0.16, 0.14, 0.12), "skin", 0.30, roughness=0.8),
+    **OUTDOOR,
 }
 
 
@@ -203,6 +182,27 @@ class Nodes:
         self.tree.links.new(self._coordinates((1.0, 1.0, 1.0)), brick.inputs["Vector"])
         self.tree.links.new(brick.outputs["Color"], self.shader.inputs["Base Color"])
 
+    def bricks(self, surface: Surface) -> None:
+        """Courses of bricks on upright walls along x or y."""
+        brick = self.add("ShaderNodeTexBrick", 2, Scale=1.0)
+        brick.inputs["Brick Width"].default_value = 0.25
+        brick.inputs["Row Height"].default_value = 0.083
+        brick.inputs["Mortar Size"].default_value = 0.008
+        brick.inputs["Color1"].default_value = (*surface.colour, 1.0)
+        brick.inputs["Color2"].default_value = (*surface.second, 1.0)
+        brick.inputs["Mortar"].default_value = (0.33, 0.30, 0.27, 1.0)
+        vector = self._coordinates((1.0, 1.0, 1.0))
+        # The texture lies in x and y: the wall's height has to become y.
+        parts, joined = self.add("ShaderNodeSeparateXYZ", 3), self.add("ShaderNodeCombineXYZ", 3)
+        along = self.add("ShaderNodeMath", 3)
+        self.tree.links.new(vector, parts.inputs[0])
+        self.tree.links.new(parts.outputs["X"], along.inputs[0])
+        self.tree.links.new(parts.outputs["Y"], along.inputs[1])
+        self.tree.links.new(along.outputs[0], joined.inputs["X"])
+        self.tree.links.new(parts.outputs["Z"], joined.inputs["Y"])
+        self.tree.links.new(joined.outputs[0], brick.inputs["Vector"])
+        self.tree.links.new(brick.outputs["Color"], self.shader.inputs["Base Color"])
+
     def rug(self, surface: Surface) -> None:
         """A rug with fine diamonds between two shades of wool."""
         checker = self.add("ShaderNodeTexChecker", 1, Scale=9.0)
@@ -217,6 +217,16 @@ class Nodes:
         """A lamp that is switched on."""
         self.shader.inputs["Emission Color"].default_value = (*surface.colour, 1.0)
         self.shader.inputs["Emission Strength"].default_value = 0.85
+
+    def beam(self, surface: Surface) -> None:
+        """A lamp that one sees from afar."""
+        self.glow(surface)
+        self.shader.inputs["Emission Strength"].default_value = 3.0
+
+    def lacquer(self, _surface: Surface) -> None:
+        """Car paint: a clear coat over the colour."""
+        self.shader.inputs["Coat Weight"].default_value = 1.0
+        self.shader.inputs["Coat Roughness"].default_value = 0.03
 
     def pane(self, surface: Surface) -> None:
         """Bright sky to the eye, clear glass to the sun's light."""

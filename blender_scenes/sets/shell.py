@@ -92,15 +92,7 @@ def build_shell(
     """Builds floor, walls and ceiling; `floor` replaces the plain floor."""
     half_x, half_y = shell.half_m
     made = [(floor or _floor(shell)).build(collection, weld=True)]
-    for name, wall, axis, offset in (
-        ("wall_south", shell.south, "y", -half_y),
-        ("wall_north", shell.north, "y", half_y),
-        ("wall_east", shell.east, "x", half_x),
-        ("wall_west", shell.west, "x", -half_x),
-    ):
-        half = half_x if axis == "y" else half_y
-        sheet = _wall(shell, name, wall, axis, offset, half)
-        made.append(sheet.build(collection, weld=True))
+    made += [build_side(shell, side, collection) for side in ("south", "north", "east", "west")]
     ceiling, height = Builder("ceiling"), shell.size_m[2]
     corners = [[(x, y, height) for x in (-half_x, half_x)] for y in (half_y, -half_y)]
     ceiling.sheet(corners, shell.ceiling)
@@ -108,6 +100,21 @@ def build_shell(
     # A wire ceiling lets whoever opens the file look in from above; renders still see a sheet.
     made[-1].display_type = "WIRE"
     return made
+
+
+def build_side(
+    shell: Shell, side: str, collection: bpy.types.Collection, *, location: Point = (0.0, 0.0, 0.0)
+) -> bpy.types.Object:
+    """Builds one wall alone, as a front along a street; `location` is the room's middle [m]."""
+    half_x, half_y = shell.half_m
+    axis, offset, half = {
+        "south": ("y", -half_y, half_x),
+        "north": ("y", half_y, half_x),
+        "east": ("x", half_x, half_y),
+        "west": ("x", -half_x, half_y),
+    }[side]
+    sheet = _wall(shell, f"wall_{side}", getattr(shell, side), axis, offset, half)
+    return sheet.build(collection, weld=True, location=location)
 
 
 def build_partition(

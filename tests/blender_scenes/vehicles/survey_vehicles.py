@@ -53,6 +53,13 @@ def measure(blend: str, out: Path) -> dict:
         "area_m2": {i.name: sum(p.area for p in i.data.polygons) for i in parts},
         "materials": {i.name: [m.rfgs.radio_material for m in i.data.materials] for i in parts},
         "sight_rad": [i.data.angle for i in bpy.data.objects if i.type == "CAMERA"],
+        "eyes": [list(i.matrix_world.translation) for i in bpy.data.objects if i.type == "CAMERA"],
+        "furniture": {
+            item.name: [points.min(axis=0).tolist(), points.max(axis=0).tolist()]
+            for item in of_class("STATIC")
+            if item.users_collection[0].name == "Furniture"
+            for points in (world_vertices(item),)
+        },
         "lights": sum(i.type == "LIGHT" for i in bpy.data.objects),
     }
 

@@ -101,3 +101,10 @@ def test_cameras_are_no_fisheyes_and_lights_are_many(found: SimpleNamespace) -> 
     assert len(found.report["sight_rad"]) >= 12
     assert np.degrees(max(found.report["sight_rad"])) < 125
     assert found.report["lights"] >= 4
+
+
+def test_nothing_stands_where_a_camera_is(found: SimpleNamespace) -> None:
+    for eye in np.array(found.report["eyes"]):
+        for name, (low, high) in found.report["furniture"].items():
+            outside = np.maximum(np.maximum(low - eye, eye - high), 0.0)
+            assert np.linalg.norm(outside) > 0.05, (name, eye)

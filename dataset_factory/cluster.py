@@ -51,7 +51,7 @@ def run_on_cluster(
     job: dict[str, Any],
     tasks: list[Task],
     limits: Limits,
-    done: Callable[[Task], None],
+    done: Callable[[Task, dict[str, Any]], None],
 ) -> dict[str, float]:
     """Traces all tasks; results are on disk as soon as `done` is called.
 
@@ -60,7 +60,7 @@ def run_on_cluster(
         job: What every tracing process needs, see `dataset_factory.worker`.
         tasks: What to trace.
         limits: What each tracing process may take.
-        done: Called in this thread after each task.
+        done: Called in this thread after each task, as in `workers.run_tasks`.
 
     Returns:
         Seconds per stage, summed over processes.
@@ -95,7 +95,7 @@ def run_on_cluster(
             reply = _answer(future, task, address)
             store.write(task, reply.pop("value"))
             seconds.update(stages(task, reply))
-            done(task)
+            done(task, reply)
             for following in islice(waiting, 1):
                 running.add(submit(following))
     return {name: round(value, 3) for name, value in sorted(seconds.items())}

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from dataset_factory.blender import Blender
 from dataset_factory.bundle import sanitised
@@ -37,6 +38,8 @@ class Job:
     """Wall time per stage of this run [s]."""
     paces: dict[str, Pace] = field(default_factory=dict)
     """Speed of the stages of this run that had enough steps to tell."""
+    traced: list[tuple[str, int | None, dict[str, Any]]] = field(default_factory=list)
+    """Radio, frame and answer (seconds per stage, memory) of each channel traced in this run."""
 
     @property
     def work(self) -> Path:

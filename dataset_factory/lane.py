@@ -50,8 +50,6 @@ class Lane:
         self._lock = threading.Lock()
         self.started = 0
         """How many processes there have been."""
-        self.peak_bytes = 0
-        """The most memory that one of them held between frames."""
 
     def trace(self, request: dict[str, Any]) -> dict[str, Any]:
         """Has one frame traced; a frame whose process dies gets a second one.
@@ -60,8 +58,8 @@ class Lane:
             request: The frame, as `dataset_factory.worker` takes it.
 
         Returns:
-            The answer of the process, or `error` with the reason; `crash` if it is not the
-            user's mistake.
+            The answer of the process and its `memory_bytes` after the frame, or `error` with
+            the reason; `crash` if it is not the user's mistake.
         """
         reason = ""
         for _ in range(_ATTEMPTS):
@@ -73,8 +71,7 @@ class Lane:
                 if self._ended:
                     break
             else:
-                self._recycle()
-                return reply
+                return {**reply, "memory_bytes": self._recycle()}
         return {"error": f"{reason} (tried twice)", "crash": True}
 
     def end(self) -> None:
@@ -103,13 +100,14 @@ class Lane:
             self._frames = 0
             self.started += 1
 
-    def _recycle(self) -> None:
+    def _recycle(self) -> int:
+        """Replaces the process if it is full; returns the memory that it held."""
         assert self._process is not None
         memory = self._process.memory_bytes()
-        self.peak_bytes = max(self.peak_bytes, memory)
         full = memory > RECYCLE_SHARE * self._limits.memory_bytes
         if full or self._frames >= self._limits.frames:
             self._drop()
+        return memory
 
     def _drop(self) -> None:
         with self._lock:

@@ -35,10 +35,11 @@ def trace(job: Job, bundle: Bundle, sequence: SequenceInfo) -> None:
     pace = _Paces(job)
     with tqdm(total=len(tasks), desc="trace", unit="frame") as bar:
 
-        def done(task: Task) -> None:
+        def done(task: Task, reply: dict[str, Any]) -> None:
             bar.set_postfix_str(str(task), refresh=False)
             bar.update()
             pace.step(task)
+            job.traced.append((task.radio, task.frame, reply))
 
         if job.scheduler:
             allowed = limits(1, job.worker_memory_gb)

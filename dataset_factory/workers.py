@@ -55,7 +55,7 @@ def run_tasks(
     workers: int,
     limits: Limits,
     log_folder: Path,
-    done: Callable[[Task], None],
+    done: Callable[[Task, dict[str, Any]], None],
 ) -> dict[str, float]:
     """Traces all tasks; results are on disk as soon as `done` is called.
 
@@ -65,7 +65,8 @@ def run_tasks(
         workers: Number of processes.
         limits: What each of them may take.
         log_folder: Where each process's own output goes.
-        done: Called in this thread after each task.
+        done: Called in this thread after each task, with `seconds` per stage and `memory_bytes`
+            of the process that traced it.
 
     Returns:
         Seconds per stage, summed over processes.
@@ -95,7 +96,7 @@ def run_tasks(
             if "error" in reply:
                 raise failure(task, reply, log_folder)
             seconds.update(stages(task, reply))
-            done(task)
+            done(task, reply)
     finally:
         for lane in lanes:
             lane.end()

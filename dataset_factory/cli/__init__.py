@@ -17,6 +17,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "impair": ("impair", "ImpairArgs"),
     "stats": ("stats", "StatsArgs"),
     "convert": ("convert", "ConvertArgs"),
+    "bench": ("bench", "BenchArgs"),
 }
 
 _FIRST_STEPS = r"""A first dataset, about two minutes on two cores:

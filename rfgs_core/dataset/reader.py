@@ -44,9 +44,17 @@ def open_dataset(path: Path | str) -> Dataset:
         The dataset; sequences are opened with `Dataset.sequence`.
 
     Raises:
-        RfgsError: There is no dataset, it is unfinished or of a newer schema.
+        RfgsError: There is no dataset, it is unfinished or of a newer schema; or the path is an
+            address of object storage, from which xarray reads channels but nothing reads
+            pictures and geometry.
         RfgsFormatError: `dataset.json` does not keep to its schema.
     """
+    if "://" in str(path):
+        raise RfgsError(
+            f"{path}: datasets are opened from folders; copy it with `fsspec` or your storage's "
+            "own tool, or read its channels in place: xarray.open_zarr("
+            f"'{str(path).rstrip('/')}/SEQUENCE/radio/RADIO/csi.zarr', consolidated=False)"
+        )
     path = Path(path)
     file = path / "dataset.json"
     if not file.is_file():

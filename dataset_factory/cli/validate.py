@@ -14,7 +14,7 @@ import tyro
 class ValidateArgs:
     """Checks every promise a dataset makes; exit code 1 for faults.
 
-    Schema, checksums, counts, numbers and physics; each fault is named with its file.
+    Schema, checksums, counts, numbers, physics and labels; each fault is named with its file.
     """
 
     dataset: tyro.conf.Positional[Path]

@@ -26,6 +26,8 @@ class Scene:
     """First frame."""
     frame_end: int
     """Last frame, included."""
+    depth: int = 2
+    """Interactions that a path needs to show the people: more where they are behind a wall."""
 
     @property
     def path(self) -> Path:

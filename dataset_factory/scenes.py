@@ -27,6 +27,8 @@ class Scene:
     """Frames per second, where the catalogue knows."""
     frames: str
     """Frames `A:B`, where the catalogue knows."""
+    depth: int = 2
+    """Interactions that a path needs to show what moves there."""
 
 
 def catalogue_file() -> Path:
@@ -50,6 +52,7 @@ def catalogue() -> list[Scene]:
                 description=row["description"],
                 fps=row["fps"],
                 frames=f"{row['frame_start']}:{row['frame_end']}",
+                depth=row.get("depth", 2),
             )
             for row in rows
         ]

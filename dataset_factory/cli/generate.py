@@ -40,9 +40,9 @@ class GenerateArgs:
     """Longer side of the pictures [px]."""
     samples: int = 16
     """Light samples per pixel; more is less noisy and slower."""
-    depth: int = 2
+    depth: int | None = None
     """Interactions of a path that meets a person: 1 the person alone (fast), 2 also one wall, 3
-    two (slow; needed behind a wall)."""
+    two (slow; needed behind a wall). Default: what the scene needs, else 2."""
     seed: int = 0
     """Root seed; the same seed gives the same bytes."""
     workers: int = 2
@@ -102,7 +102,7 @@ def job_of(args: GenerateArgs) -> tuple[Job, Scene]:
         cameras=args.cameras,
         resolution=args.resolution,
         samples=args.samples,
-        depth=args.depth,
+        depth=scene.depth if args.depth is None else args.depth,
         seed=args.seed,
         shadow=args.shadow,
         images=args.images,

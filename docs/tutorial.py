@@ -194,6 +194,9 @@ def tour(path: Path, radio: str | None, out: Path) -> None:
     axes = list(figure.subplots(2, 3).flat)
     if "images" in dataset.has:
         draw_pictures(axes[:2], sequence, frame)
+    else:
+        for axis in axes[:2]:
+            axis.set_axis_off()
     draw_over_time(axes[2], sequence, radio)
     draw_channel(axes[3:], sequence, radio, frame)
     for person, action in zip(sequence.people(frame), sequence.actions(frame), strict=True):

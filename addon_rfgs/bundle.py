@@ -4,71 +4,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import bpy
 import numpy as np
 
-from .cameras import cameras_ready, find_devices, find_views
-from .errors import AddonError
+from .cameras import find_devices, find_views
+from .content import Content, content_ready
 from .files import replacing, replacing_folder, write_json
-from .frames import chosen_frames, file_label, file_sha256, unit_scale
-from .lights import light_guesses
+from .findings import refuse
+from .frames import file_label, file_sha256, unit_scale
 from .materials import MaterialTable
 from .naming import Names
-from .people import Instance, action_label, find_instances, joints, segments
+from .overrides import Overrides
+from .people import action_label, joints, segments
 from .ply import write_mesh
 from .poses import at_offsets, pose_offsets, pose_table
-from .state import kept, show_what_renders
-from .survey import Surface, positions, survey
+from .scene_check import report
+from .state import kept
+from .survey import Surface, positions
 from .velocities import SegmentVelocities
 
 SCHEMA = "rfgs-bundle/1"
 VERSION = "0.1.0"
-
-
-@dataclass
-class Content:
-    """Everything of a scene that does not depend on the frame."""
-
-    surfaces: list[Surface]
-    instances: list[Instance]
-    guesses: list[dict[str, Any]]
-
-    @property
-    def moving(self) -> list[Surface]:
-        """Surfaces that move, in the order of the bundle's vertices."""
-        return [surface for surface in self.surfaces if surface.moving]
-
-    @property
-    def people(self) -> list[Instance]:
-        """People whose joints are known."""
-        return [instance for instance in self.instances if instance.rig is not None]
-
-    def box(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lower and upper corner [3] in metres of what moves, in the first frame."""
-        points = np.concatenate([surface.vertices for surface in self.moving])
-        return points.min(axis=0), points.max(axis=0)
-
-
-def read_content(scene: bpy.types.Scene) -> Content:
-    """Surveys a scene.
-
-    Raises:
-        AddonError: There is no mesh, or nothing moves.
-    """
-    surfaces = survey(scene)
-    if not surfaces:
-        raise AddonError(f"{file_label()}: no mesh that renders; RF-GS needs a scene with people")
-    if not any(surface.moving for surface in surfaces):
-        raise AddonError(
-            f"{file_label()}: no moving mesh in frames {scene.frame_start}:{scene.frame_end}; "
-            "RF-GS needs one that moves by more than 1 mm"
-        )
-    instances, guesses = find_instances(surfaces)
-    return Content(surfaces, instances, guesses + _disabled_drivers())
 
 
 def export_bundle(
@@ -79,6 +38,7 @@ def export_bundle(
     resolution: int | None = None,
     progress: Callable[[int, int], None] | None = None,
     spans_s: list[float] | None = None,
+    overrides: Overrides | None = None,
 ) -> dict[str, Any]:
     """Writes the open scene as a bundle.
 
@@ -90,6 +50,7 @@ def export_bundle(
         resolution: Longer side of the pictures [px], None for the scene's.
         progress: Called with (frames done, frames in all).
         spans_s: Times after each frame over which poses are written too [s], see `pose_table`.
+        overrides: What the user says about the scene beside the file.
 
     Returns:
         What `bundle.json` holds.
@@ -97,43 +58,37 @@ def export_bundle(
     Raises:
         AddonError: The scene cannot be exported; the message says why.
     """
-    poses = pose_table(scene, spans_s or [])
-    numbers, sha256 = chosen_frames(scene, frames, between=bool(poses)), file_sha256()
+    sha256 = file_sha256()
     # Everything is written beside the old bundle first, so a failed export leaves that as it was.
-    with kept(scene) as keeper:
-        show_what_renders(keeper, scene)
-        content = read_content(scene)
-        low, high = (corner / unit_scale(scene) for corner in content.box())
-        with (
-            cameras_ready(scene, low, high) as camera_guesses,
-            replacing_folder(folder, "bundle.json") as target,
-        ):
-            views, view_guesses = find_views(scene, cameras, resolution)
-            devices, device_guesses = find_devices(scene)
-            content.guesses += camera_guesses + view_guesses + device_guesses
-            content.guesses += light_guesses(scene)
-            table = MaterialTable()
+    with content_ready(
+        scene, frames, overrides or Overrides(), between=bool(spans_s)
+    ) as content:
+        refuse(file_label(), content.findings)
+        with replacing_folder(folder, "bundle.json") as target:
+            views, view_guesses = find_views(scene, cameras, resolution, content.ring)
+            devices, device_guesses = find_devices(scene, content.overrides.devices)
+            content.guesses += view_guesses + device_guesses
+            table = MaterialTable(content.overrides)
             objects = _write_objects(target, content, table)
             topology = _write_topology(scene, target, content, table)
-            offsets_s = pose_offsets(poses)
-            bounds = _write_frames(scene, target, content, topology, numbers, offsets_s, progress)
-            info = _describe(scene, content, numbers, sha256)
+            poses = pose_table(scene, spans_s or [])
+            _write_frames(scene, target, content, topology, pose_offsets(poses), progress)
+            info = _describe(scene, content, sha256)
             info.update({"poses": poses} if poses else {})
             info.update(
-                bounds_m=bounds.tolist(),
                 devices=devices,
                 cameras=[view.row(unit_scale(scene)) for view in views],
                 materials=table.rows,
                 objects=objects,
             )
-            write_json(target / "guesses.json", content.guesses + table.guesses)
+            content.guesses += table.guesses
+            write_json(target / "guesses.json", content.guesses)
+            write_json(target / "check.json", report(scene, content, views, devices))
             write_json(target / "bundle.json", info)
     return info
 
 
-def _describe(
-    scene: bpy.types.Scene, content: Content, numbers: list[int], sha256: str
-) -> dict[str, Any]:
+def _describe(scene: bpy.types.Scene, content: Content, sha256: str) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "blend_name": Path(bpy.data.filepath).stem,
@@ -143,7 +98,8 @@ def _describe(
         "fps": scene.render.fps / scene.render.fps_base,
         "frame_start": scene.frame_start,
         "frame_end": scene.frame_end,
-        "frames": numbers,
+        "frames": content.frames,
+        "bounds_m": content.bounds.tolist(),
         "instances": [instance.row() for instance in content.instances],
     }
 
@@ -209,30 +165,20 @@ def _write_frames(
     target: Path,
     content: Content,
     topology: dict[str, np.ndarray],
-    numbers: list[int],
     offsets_s: list[float],
     progress: Callable[[int, int], None] | None,
-) -> np.ndarray:
-    """Writes what moves, frame by frame; returns the bounds [2, 3] of the whole scene.
-
-    Bounds come from whole frames alone: asking for poses between them moves no radio.
-    """
+) -> None:
+    """Writes what moves, frame by frame."""
     people = content.people
     ids = np.array([person.id for person in people], np.int32)
-    still = [surface.vertices for surface in content.surfaces if not surface.moving]
-    low = np.min([points.min(axis=0) for points in still], axis=0) if still else np.full(3, np.inf)
-    high = np.max([points.max(axis=0) for points in still], axis=0) if still else -low
     velocities = SegmentVelocities(
         scene, people, topology, lambda frame: _moving_vertices(scene, content.moving, frame)
     )
-    for done, number in enumerate(numbers, start=1):
+    for done, number in enumerate(content.frames, start=1):
         velocity = velocities.at(number)
         scene.frame_set(number)
-        vertices = _moving_vertices(scene, content.moving, number)
-        low = np.minimum(low, vertices.min(axis=0))
-        high = np.maximum(high, vertices.max(axis=0))
         arrays = {
-            "vertices": vertices,
+            "vertices": _moving_vertices(scene, content.moving, number),
             "joints": joints(scene, people),
             "segment_velocity": velocity,
             "person_instance": ids,
@@ -246,8 +192,7 @@ def _write_frames(
             arrays.update(pose_offset_s=np.array(offsets_s), pose_vertices=np.stack(poses))
         _save_arrays(target / "frames" / f"{number:06d}.npz", **arrays)
         if progress:
-            progress(done, len(numbers))
-    return np.stack([low, high]).astype(np.float64)
+            progress(done, len(content.frames))
 
 
 def _moving_vertices(scene: bpy.types.Scene, moving: list[Surface], frame: int) -> np.ndarray:
@@ -273,22 +218,3 @@ def _save_arrays(path: Path, **arrays: np.ndarray) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as temporary, temporary.open("wb") as stream:
         np.savez(stream, **arrays)
-
-
-def _disabled_drivers() -> list[dict[str, Any]]:
-    """Drivers that need Python, which never runs from a file; their values stay as saved."""
-    notes = []
-    for owners in (bpy.data.objects, bpy.data.armatures, bpy.data.materials, bpy.data.shape_keys):
-        for owner in owners:
-            for curve in owner.animation_data.drivers if owner.animation_data else ():
-                driver = curve.driver
-                if driver.type == "SCRIPTED" and not driver.is_simple_expression:
-                    notes.append(
-                        {
-                            "what": "driver",
-                            "object": f"{owner.name}: {curve.data_path}",
-                            "value": "disabled",
-                            "why": "scripts in a file never run",
-                        }
-                    )
-    return notes

@@ -12,11 +12,15 @@ import bpy
 import mathutils
 import numpy as np
 
+from .bounds import Space
 from .errors import AddonError
 from .frames import file_label, unit_scale
+from .overrides import Ring
 
 #: Cameras set up around the scene where it brings none.
 GUESSED_CAMERAS = 8
+#: Cameras inside a room keep this far from its walls [m].
+_FROM_WALLS_M = 0.2
 
 
 @dataclass
@@ -59,9 +63,18 @@ def picture_size(scene: bpy.types.Scene, resolution: int | None) -> tuple[int, i
 
 
 def find_views(
-    scene: bpy.types.Scene, count: int | None, resolution: int | None
+    scene: bpy.types.Scene,
+    count: int | None,
+    resolution: int | None,
+    ring: list[bpy.types.Object] | None = None,
 ) -> tuple[list[View], list[dict[str, Any]]]:
     """The first `count` perspective cameras by name, as they stand in the first frame.
+
+    Args:
+        scene: The scene.
+        count: How many, None for all.
+        resolution: Longer side [px], None for the scene's.
+        ring: Cameras that were made up, to be used instead of the scene's.
 
     Returns:
         Views and what was guessed: cameras that move, are left out or were made up.
@@ -73,9 +86,8 @@ def find_views(
     scene.frame_set(scene.frame_start)
     graph = bpy.context.evaluated_depsgraph_get()
     width, height = picture_size(scene, resolution)
-    cameras = sorted(
-        (item for item in scene.objects if item.type == "CAMERA"), key=lambda item: item.name
-    )
+    found = (item for item in scene.objects if item.type == "CAMERA") if ring is None else ring
+    cameras = sorted(found, key=lambda item: item.name)
     views = []
     for item in cameras:
         if item.data.type != "PERSP":
@@ -97,38 +109,68 @@ def find_views(
     return views, guesses
 
 
+def perspective_cameras(scene: bpy.types.Scene) -> list[str]:
+    """Names of the scene's own cameras that can be used."""
+    items = [item for item in scene.objects if item.type == "CAMERA"]
+    return sorted(item.name for item in items if item.data.type == "PERSP")
+
+
 @contextmanager
 def cameras_ready(
-    scene: bpy.types.Scene, low: np.ndarray, high: np.ndarray
-) -> Iterator[list[dict[str, Any]]]:
-    """Stands a ring of cameras around a box where a scene has none; they go with the block.
+    scene: bpy.types.Scene, space: Space, ring: Ring | None
+) -> Iterator[tuple[list[bpy.types.Object] | None, list[dict[str, Any]]]]:
+    """Stands a ring of cameras around what moves where a scene has none, or where one is asked for.
 
     Args:
         scene: The scene.
-        low: Lower corner [3] of what the cameras shall see, Blender units.
-        high: Upper corner [3].
+        space: Where things are.
+        ring: What the user wants, None to help only where no camera is.
+
+    Yields:
+        The made-up cameras, gone after the block, or None; and what was guessed.
     """
-    if any(item.type == "CAMERA" and item.data.type == "PERSP" for item in scene.objects):
-        yield []
+    if ring is None and perspective_cameras(scene):
+        yield None, []
         return
-    centre, radius = 0.5 * (low + high), 1.2 * float(np.linalg.norm(high - low))
+    guesses = []
+    if ring is None:
+        ring = Ring(GUESSED_CAMERAS)
+        note = {"what": "camera", "object": "the scene", "value": f"a ring of {ring.ring}"}
+        guesses.append({**note, "why": "the scene has no perspective camera"})
     made = []
-    for index in range(GUESSED_CAMERAS):
-        angle = 2 * np.pi * index / GUESSED_CAMERAS
-        lift = radius * (0.1 if index % 2 == 0 else 0.5)
-        place = centre + np.array([radius * np.cos(angle), radius * np.sin(angle), lift])
+    for index, matrix in enumerate(_stands(space, ring)):
         item = bpy.data.objects.new(f"RFGS guessed {index:02d}", bpy.data.cameras.new("guessed"))
-        item.data.angle = np.radians(60)
-        item.matrix_world = mathutils.Matrix(look_at(place, centre).tolist())
+        item.data.angle = np.radians(ring.fov_deg)
+        matrix[:3, 3] /= unit_scale(scene)
+        item.data.clip_start, item.data.clip_end = 0.05 / unit_scale(scene), 200 / unit_scale(scene)
+        item.matrix_world = mathutils.Matrix(matrix.tolist())
         scene.collection.objects.link(item)
         made.append(item)
     bpy.context.view_layer.update()
-    note = {"what": "camera", "object": "the scene", "value": f"a ring of {GUESSED_CAMERAS}"}
     try:
-        yield [{**note, "why": "the scene has no perspective camera"}]
+        yield made, guesses
     finally:
         for item in made:
             bpy.data.cameras.remove(item.data)
+
+
+def _stands(space: Space, ring: Ring) -> list[np.ndarray]:
+    """Poses [4, 4] in metres of a ring around the middle of what moves, inside the walls."""
+    low, high = space.movers
+    centre, size = 0.5 * (low + high), float(np.linalg.norm(high - low))
+    radius = ring.radius_m or 1.2 * size
+    poses = []
+    for index in range(ring.ring):
+        angle = 2 * np.pi * index / ring.ring
+        lift = 1.2 * size * (0.1 if index % 2 == 0 else 0.5)
+        place = centre + np.array([radius * np.cos(angle), radius * np.sin(angle), lift])
+        if ring.height_m is not None:
+            place[2] = low[2] + ring.height_m
+        if space.walled:
+            inset = np.minimum(_FROM_WALLS_M, 0.25 * (space.bounds[1] - space.bounds[0]))
+            place = np.clip(place, space.bounds[0] + inset, space.bounds[1] - inset)
+        poses.append(look_at(place, centre))
+    return poses
 
 
 def look_at(place: np.ndarray, target: np.ndarray) -> np.ndarray:
@@ -155,8 +197,17 @@ def place_camera(scene: bpy.types.Scene, view: View) -> bpy.types.Object:
     return item
 
 
-def find_devices(scene: bpy.types.Scene) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    """Radio devices as they stand in the first frame, and what was guessed about them."""
+def find_devices(
+    scene: bpy.types.Scene, chosen: tuple[dict[str, Any], ...] = ()
+) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Radio devices as they stand in the first frame, and what was guessed about them.
+
+    Args:
+        scene: The scene.
+        chosen: Rows that take the place of the scene's own devices.
+    """
+    if chosen:
+        return [dict(row) for row in chosen], []
     scene.frame_set(scene.frame_start)
     graph, unit = bpy.context.evaluated_depsgraph_get(), unit_scale(scene)
     marked = [item for item in scene.objects if item.rfgs.role != "NONE"]

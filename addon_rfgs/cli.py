@@ -14,8 +14,10 @@ from typing import NoReturn, TextIO
 
 import bpy
 
-from . import bundle, groundtruth, imports
+from . import bundle, groundtruth, imports, scene_check
 from .errors import AddonError
+from .files import write_json
+from .override_file import read_overrides
 
 #: Exit code of every mistake a user can repair.
 USER_ERROR = 2
@@ -43,8 +45,12 @@ def parser(program: str) -> argparse.ArgumentParser:
     )
     truth = commands.add_parser("groundtruth", help="render pictures and passes with Cycles")
     truth.add_argument("--out", type=Path, required=True, help="folder of the pictures")
-    for command in (export, truth):
+    check = commands.add_parser("check", help="say what the scene holds and what is guessed")
+    check.add_argument("--out", type=Path, required=True, help="JSON file of the report")
+    for command in (export, truth, check):
         command.add_argument("--frames", metavar="A:B[:STEP]", help="default: the scene's range")
+        command.add_argument("--overrides", type=Path, metavar="FILE", help="JSON, see the docs")
+    for command in (export, truth):
         command.add_argument("--cameras", type=int, metavar="N", help="the first N by name")
         command.add_argument("--resolution", type=int, metavar="PX", help="longer side")
     truth.add_argument("--samples", type=int, default=16, help="samples per pixel (16)")
@@ -110,6 +116,7 @@ def _export(options: argparse.Namespace, out: TextIO) -> str:
         options.resolution,
         _progress(out),
         options.span,
+        read_overrides(options.overrides),
     )
     return (
         f"wrote {options.out}: {len(info['frames'])} frames, {len(info['objects'])} objects, "
@@ -129,8 +136,16 @@ def _groundtruth(options: argparse.Namespace, out: TextIO) -> str:
         options.passes,
         options.empty,
         _progress(out),
+        read_overrides(options.overrides),
     )
     return f"wrote {options.out}: {count} pictures"
+
+
+def _check(options: argparse.Namespace, out: TextIO) -> str:
+    overrides = read_overrides(options.overrides)
+    report = scene_check.check_scene(bpy.context.scene, options.frames, overrides)
+    write_json(options.out, report)
+    return f"wrote {options.out}: {len(report['findings'])} findings"
 
 
 def _import(options: argparse.Namespace, out: TextIO) -> str:
@@ -148,6 +163,7 @@ def _import(options: argparse.Namespace, out: TextIO) -> str:
 
 
 _COMMANDS: dict[str, Callable[[argparse.Namespace, TextIO], str]] = {
+    "check": _check,
     "export": _export,
     "groundtruth": _groundtruth,
     "import": _import,

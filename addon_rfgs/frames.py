@@ -15,7 +15,7 @@ _PATTERN = re.compile(r"\s*(-?\d+)\s*:\s*(-?\d+)\s*(?::\s*(\d+)\s*)?")
 
 
 def chosen_frames(scene: bpy.types.Scene, text: str | None, *, between: bool = False) -> list[int]:
-    """Frame numbers of `A:B[:STEP]`, both ends included; nothing means the whole range.
+    """Frame numbers of `A:B[:STEP]`, both ends included; nothing means what the scene renders.
 
     Args:
         scene: Gives the range.
@@ -30,11 +30,11 @@ def chosen_frames(scene: bpy.types.Scene, text: str | None, *, between: bool = F
     if last <= first:
         raise AddonError(
             f"{file_label()}: the scene has no frame range ({first}:{last}); "
-            "set Start and End in its output properties"
+            "set Start and End in its output properties, or give a frame range"
         )
     last -= int(between)
     if not text:
-        return list(range(first, last + 1))
+        return list(range(first, last + 1, scene.frame_step))
     match = _PATTERN.fullmatch(text)
     if not match:
         raise AddonError(f"frames: expected FIRST:LAST or FIRST:LAST:STEP, got {text!r}")

@@ -15,15 +15,17 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from .bundle import Content, read_content
-from .cameras import View, cameras_ready, find_views, place_camera
+from .cameras import View, find_views, place_camera
+from .content import Content, content_ready
 from .errors import AddonError
 from .exr import read_exr, write_exr
 from .files import replacing
-from .frames import chosen_frames, unit_scale
+from .findings import refuse
+from .frames import file_label, unit_scale
 from .lights import lights_ready
+from .overrides import Overrides
 from .png import strip_metadata
-from .state import Keeper, kept, show_what_renders
+from .state import Keeper
 
 #: Depths above this are misses; Cycles writes 1e10 [Blender units].
 _MISS = 1e9
@@ -39,6 +41,7 @@ def render_groundtruth(
     passes: bool = False,
     empty: bool = False,
     progress: Callable[[int, int], None] | None = None,
+    overrides: Overrides | None = None,
 ) -> int:
     """Writes `cam00/000001.png` and so on; with `passes` also `.exr`.
 
@@ -55,6 +58,7 @@ def render_groundtruth(
         passes: Whether to write depth, normals and ids.
         empty: Instead, render each camera once without anything that moves, as `empty.png`.
         progress: Called with (pictures done, pictures in all).
+        overrides: What the user says about the scene beside the file.
 
     Returns:
         Number of pictures.
@@ -62,15 +66,13 @@ def render_groundtruth(
     Raises:
         AddonError: The scene cannot be rendered as asked; the message says why.
     """
-    numbers = chosen_frames(scene, frames)
     if samples < 1:
         raise AddonError(f"samples: expected at least 1, got {samples}")
-    with kept(scene) as keeper:
-        show_what_renders(keeper, scene)
-        content = read_content(scene)
-        low, high = (corner / unit_scale(scene) for corner in content.box())
-        with cameras_ready(scene, low, high), lights_ready(scene):
-            views = find_views(scene, cameras, resolution)[0]
+    with content_ready(scene, frames, overrides or Overrides()) as content:
+        refuse(file_label(), content.findings)
+        keeper, numbers = content.keeper, content.frames
+        with lights_ready(scene, content.space is not None and content.space.walled):
+            views = find_views(scene, cameras, resolution, content.ring)[0]
             _number_instances(keeper, content)
             _configure(keeper, scene, views[0])
             if empty:

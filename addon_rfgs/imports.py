@@ -12,7 +12,6 @@ import bpy
 import mathutils
 import numpy as np
 
-from .bundle import read_content
 from .cameras import look_at, picture_size
 from .errors import AddonError
 from .files import replacing
@@ -21,6 +20,7 @@ from .gaussians import Display, Imported, import_gaussians
 from .groundtruth import can_denoise, keep_format, render_to
 from .lights import lights_ready
 from .state import Keeper, kept, show_what_renders
+from .survey import survey
 
 #: Gaussians that vote for the picture's camera.
 _VOTERS = 200
@@ -119,10 +119,7 @@ def _cameras(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
 
 def _moving_sources(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """Objects the Gaussians stand in for; none where the scene has nothing that moves."""
-    try:
-        return [surface.source for surface in read_content(scene).moving]
-    except AddonError:
-        return []
+    return [surface.source for surface in survey(scene)[0] if surface.moving]
 
 
 def _choose_camera(

@@ -37,13 +37,19 @@ def light_guesses(scene: bpy.types.Scene) -> list[dict[str, Any]]:
 
 
 @contextmanager
-def lights_ready(scene: bpy.types.Scene) -> Iterator[None]:
-    """Lights a dark scene for the duration of the block."""
+def lights_ready(scene: bpy.types.Scene, walled: bool = False) -> Iterator[None]:
+    """Lights a dark scene for the duration of the block.
+
+    Args:
+        scene: The scene.
+        walled: Whether walls would keep the light out; then it goes through everything.
+    """
     made = []
     if is_dark(scene):
         for strength, tilt, turn in _SUNS:
             lamp = bpy.data.lights.new("RFGS guessed", "SUN")
             lamp.energy, lamp.angle = strength, 0.3
+            lamp.use_shadow = not walled
             item = bpy.data.objects.new("RFGS guessed", lamp)
             item.rotation_euler = (tilt, 0.0, turn)
             scene.collection.objects.link(item)

@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 
 from .naming import Names
+from .overrides import Overrides, RadioMaterial, first_match
 from .survey import Surface
 from .tables import MATERIALS
 
@@ -56,6 +57,9 @@ KEYWORDS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("skin", ("skin", "flesh")),
 )
 
+#: Reasons that are no guesses.
+SAID = ("said from outside", "set in the file")
+
 #: A mesh no thicker than this share of its size counts as flat.
 _FLAT = 0.02
 
@@ -69,36 +73,55 @@ class MaterialTable:
     guesses: list[dict[str, Any]]
     """Rows of `guesses.json`."""
 
-    def __init__(self) -> None:
+    def __init__(self, overrides: Overrides | None = None) -> None:
         self.rows, self.guesses = [], []
-        self._index: dict[tuple[str, str], int] = {}
+        self._overrides = overrides or Overrides()
+        self._index: dict[tuple[str, RadioMaterial], int] = {}
         self._names = Names()
 
     def index(self, surface: Surface, slot: int) -> int:
         """Row of one material slot of a surface, made on first use."""
-        materials = surface.materials
-        material = materials[min(slot, len(materials) - 1)] if materials else None
-        chosen = "AUTO" if material is None else material.rfgs.radio_material
-        why = ""
-        if chosen == "AUTO":
-            chosen, why = guess(surface, material)
-            self._note(surface, material, chosen, why)
-        key = ("" if material is None else material.name, chosen)
+        material = surface.material(slot)
+        value, why = self.decide(surface, slot)
+        guessed = why not in SAID
+        if guessed:
+            self._note(surface, material, value.radio_material, why)
+        key = ("" if material is None else material.name, value)
         if key not in self._index:
             self._index[key] = len(self.rows)
-            self.rows.append(self._row(material, chosen, bool(why)))
+            self.rows.append(self._row(material, value, guessed))
         return self._index[key]
 
-    def _row(self, material: bpy.types.Material | None, chosen: str, guessed: bool) -> dict:
+    def decide(self, surface: Surface, slot: int) -> tuple[RadioMaterial, str]:
+        """Radio material of one slot of a surface, and why; one of `SAID` if a user said so."""
+        material = surface.material(slot)
+        names = surface.key, surface.source.name, surface.root.name
+        chosen = first_match(self._overrides.object_materials, *names)
+        if chosen is None and material is not None:
+            chosen = first_match(self._overrides.materials, material.name)
+        if chosen is not None:
+            return chosen, SAID[0]
+        if material is None:
+            name, why = guess(surface, None)
+            return RadioMaterial(name), why
+        thickness_m = round(float(material.rfgs.thickness_m), 7)
+        scattering = round(float(material.rfgs.scattering_coefficient), 7)
+        name, why = material.rfgs.radio_material, SAID[1]
+        if name == "AUTO":
+            name, why = guess(surface, material)
+        return RadioMaterial(name, thickness_m, scattering), why
+
+    def _row(
+        self, material: bpy.types.Material | None, value: RadioMaterial, guessed: bool
+    ) -> dict[str, Any]:
+        chosen = value.radio_material
         table = MATERIALS[chosen]
-        thickness_m = 0.0 if material is None else material.rfgs.thickness_m
-        scattering = 0.0 if material is None else material.rfgs.scattering_coefficient
         return {
             "name": self._names.unique(material.name if material else f"default_{chosen}"),
             "source": "" if material is None else material.name,
             "radio_material": chosen,
-            "thickness_m": round(float(thickness_m), 7) or table["thickness_m"],
-            "scattering_coefficient": round(float(scattering), 7),
+            "thickness_m": value.thickness_m or table["thickness_m"],
+            "scattering_coefficient": value.scattering_coefficient,
             "color": table["color"] if material is None else _colour(material),
             "guessed": guessed,
         }

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names that are safe in file names and unique within a bundle."""
+"""Names that are safe in file names, and names that look like others."""
 
 from __future__ import annotations
 
+import difflib
 import re
+from collections.abc import Iterable
 
 
 class Names:
@@ -24,3 +26,18 @@ class Names:
             name = f"{base}-{count}"
         self._taken.add(name)
         return name
+
+
+def closest(name: str, known: Iterable[str]) -> str:
+    """The end of a message about an unknown name: which known ones look like it.
+
+    Example:
+        >>> closest("wod", ["wood", "glass"])
+        "; did you mean 'wood'?"
+    """
+    names = sorted(known)
+    near = difflib.get_close_matches(name.strip("*?"), names, n=3, cutoff=0.5)
+    if near:
+        return f"; did you mean {' or '.join(map(repr, near))}?"
+    shown = ", ".join(names[:8]) + (", …" if len(names) > 8 else "")
+    return f"; expected one of {shown}" if names else ""

@@ -3,14 +3,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
 import bpy
+import mathutils
 import numpy as np
 
-from .errors import AddonError
+from .findings import Finding
 from .frames import unit_scale
+from .grouping import instance_names
 from .rig import Rig, read_rig
 from .survey import Surface, evaluated_mesh, placements
 
@@ -43,28 +46,37 @@ class Instance:
         }
 
 
-def find_instances(surfaces: list[Surface]) -> tuple[list[Instance], list[dict[str, Any]]]:
-    """Groups moving surfaces; also returns what was guessed about them.
+def find_instances(
+    surfaces: list[Surface],
+) -> tuple[list[Instance], list[dict[str, Any]], list[Finding]]:
+    """Groups moving surfaces; also returns what was guessed about them, and what is wrong.
 
-    Raises:
-        AddonError: An instance's size says that the unit scale is wrong.
+    The scene stands at its first frame.
     """
     rigs: dict[str, Rig | None] = {}
     for surface in surfaces:
         if surface.moving and surface.armature is not None:
             rigs.setdefault(surface.armature.name, read_rig(surface.armature))
     instances: dict[str, Instance] = {}
-    for surface in surfaces:
-        if surface.moving:
-            name = _instance_name(surface, surfaces)
-            new = Instance(len(instances) + 1, name, "other")
-            instances.setdefault(name, new).surfaces.append(surface)
+    for surface, name in instance_names([item for item in surfaces if item.moving]):
+        new = Instance(len(instances) + 1, name, "other")
+        instances.setdefault(name, new).surfaces.append(surface)
     guesses: list[dict[str, Any]] = []
+    findings = _shared_sources(surfaces, instances.values())
     for instance in instances.values():
         _classify(instance, rigs, guesses)
-        _check_size(instance)
+        findings += _size_findings(instance)
         _size_up(instance, guesses)
-    return list(instances.values()), guesses
+    if instances and all(_size_m(item) < _SIZE_M[0] for item in instances.values()):
+        findings.append(
+            Finding(
+                "error",
+                "the scene",
+                f"everything that moves is smaller than {_SIZE_M[0]:g} m",
+                "check the unit scale",
+            )
+        )
+    return list(instances.values()), guesses, findings
 
 
 def segments(surface: Surface, rig: Rig | None) -> np.ndarray:
@@ -95,12 +107,13 @@ def segments(surface: Surface, rig: Rig | None) -> np.ndarray:
 
 
 def joints(scene: bpy.types.Scene, people: list[Instance]) -> np.ndarray:
-    """Joints [P, 17, 3] in metres at the current frame, float32."""
+    """Joints [P, 17, 3] in metres at the current frame, float32; NaN where unknown."""
     graph = bpy.context.evaluated_depsgraph_get()
     where = placements(scene)
-    out = np.zeros((len(people), 17, 3))
+    out = np.full((len(people), 17, 3), np.nan)
     for index, person in enumerate(people):
-        assert person.rig is not None and person.armature is not None
+        if person.rig is None or person.armature is None:
+            continue
         points = person.rig.joints(person.armature.evaluated_get(graph))
         # An instanced person stands where the instance is, not where its armature is.
         surface = person.surfaces[0]
@@ -125,18 +138,6 @@ def action_label(person: Instance, frame: int) -> str:
     return ""
 
 
-def _instance_name(surface: Surface, surfaces: list[Surface]) -> str:
-    """The user's name, else the armature where it carries several meshes, else the object."""
-    chosen = surface.root.rfgs.instance or surface.source.rfgs.instance
-    if chosen:
-        return chosen
-    if surface.armature is not None:
-        siblings = [other for other in surfaces if other.armature == surface.armature]
-        if len(siblings) > 1:
-            return surface.armature.name
-    return surface.key
-
-
 def _classify(
     instance: Instance, rigs: dict[str, Rig | None], guesses: list[dict[str, Any]]
 ) -> None:
@@ -158,9 +159,12 @@ def _classify(
         guesses.append({**note, "why": why})
     if instance.kind != "person":
         instance.rig = None
-    elif instance.rig is None:
-        why = "no armature with known names of human bones"
-        guesses.append({"what": "joints", "object": instance.name, "value": "none", "why": why})
+        return
+    why = "" if instance.rig else "no armature with known names of human bones"
+    if instance.rig and not _stands_at(instance, instance.armature):
+        instance.rig, why = None, f"armature {instance.armature.name!r} stands somewhere else"
+    if why:
+        guesses.append({"what": "joints", "object": instance.name, "value": "unknown", "why": why})
 
 
 def _size_up(instance: Instance, guesses: list[dict[str, Any]]) -> None:
@@ -176,11 +180,64 @@ def _size_up(instance: Instance, guesses: list[dict[str, Any]]) -> None:
         guesses.append({**note, "value": f"{instance.surface_m2:g}", "why": why})
 
 
-def _check_size(instance: Instance) -> None:
+def _stands_at(instance: Instance, armature: bpy.types.Object) -> bool:
+    """Whether the armature's middle is within an instance, so that its joints are meant.
+
+    Two characters may share one armature, and only one of them stands where its bones are.
+    """
+    if any(surface.root != surface.source for surface in instance.surfaces):
+        return True  # Joints follow the instance.
+    posed = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    middle = posed.matrix_world @ mathutils.Vector(
+        np.mean([bone.head for bone in posed.pose.bones], axis=0)
+    )
+    low, high = _first_box(instance)
+    point = np.array(middle[:2]) * unit_scale(bpy.context.scene)
+    margin = 0.5 * (high - low)[:2].max()
+    return bool(((point > low[:2] - margin) & (point < high[:2] + margin)).all())
+
+
+def _first_box(instance: Instance) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper corner [3] of an instance in the first frame [m]."""
     points = np.concatenate([surface.vertices for surface in instance.surfaces])
-    size_m = float(np.ptp(points, axis=0).max())
-    if not _SIZE_M[0] <= size_m <= _SIZE_M[1] and instance.kind == "person":
-        raise AddonError(
-            f"person {instance.name!r} is {size_m:.3g} m large, expected "
-            f"{_SIZE_M[0]:g} to {_SIZE_M[1]:g} m; check the scene's unit scale"
-        )
+    return points.min(axis=0), points.max(axis=0)
+
+
+def _size_m(instance: Instance) -> float:
+    low, high = _first_box(instance)
+    return float((high - low).max())
+
+
+def _size_findings(instance: Instance) -> list[Finding]:
+    low, high = _first_box(instance)
+    size_m, height_m = float((high - low).max()), float(high[2] - low[2])
+    smallest, largest = _SIZE_M
+    name, remedy = instance.name, "check the unit scale"
+    if instance.kind == "person" and not smallest <= size_m <= largest:
+        message = f"is a person of {size_m:.3g} m, expected {smallest:g} to {largest:g} m"
+        return [Finding("error", name, message, remedy)]
+    if height_m > largest:
+        message = f"moves and is {height_m:.3g} m tall, expected at most {largest:g} m"
+        return [Finding("error", name, message, f"{remedy} or drop it (class Ignore)")]
+    return []
+
+
+def _shared_sources(surfaces: list[Surface], instances: Iterable[Instance]) -> list[Finding]:
+    """One object cannot carry two instance ids in a rendered mask."""
+    owner = {surface.key: item.id for item in instances for surface in item.surfaces}
+    users: dict[str, list[Surface]] = {}
+    for surface in surfaces:
+        users.setdefault(surface.source.name, []).append(surface)
+    findings = []
+    for name, shared in users.items():
+        if len({owner.get(surface.key, 0) for surface in shared}) > 1:
+            keys = ", ".join(surface.key for surface in shared[:3])
+            findings.append(
+                Finding(
+                    "error",
+                    name,
+                    f"moves and is instanced {len(shared)} times ({keys})",
+                    "make the instances real (Object > Apply > Make Instances Real) or drop some",
+                )
+            )
+    return findings

@@ -15,6 +15,7 @@ class Keeper:
 
     def __init__(self) -> None:
         self._old: list[tuple[Any, str, Any]] = []
+        self._hidden: list[bpy.types.Object] = []
 
     def remember(self, owner: Any, name: str) -> None:
         """Notes an attribute that others will set; attributes come back last noted first."""
@@ -31,8 +32,16 @@ class Keeper:
             return
         self._old.append((owner, name, old))
 
+    def unhide(self, item: bpy.types.Object) -> None:
+        """Opens the eye of an object in the outliner, which renders do not look at."""
+        if item.hide_get():
+            item.hide_set(False)
+            self._hidden.append(item)
+
     def restore(self) -> None:
         """Puts everything back, last change first."""
+        while self._hidden:
+            self._hidden.pop().hide_set(True)
         while self._old:
             owner, name, value = self._old.pop()
             setattr(owner, name, value)
@@ -65,6 +74,7 @@ def show_what_renders(keeper: Keeper, scene: bpy.types.Scene) -> None:
     for item in bpy.data.objects:
         if not item.hide_render:
             keeper.set(item, "hide_viewport", False)
+        keeper.unhide(item)
         keeper.set(item, "show_instancer_for_viewport", item.show_instancer_for_render)
         for modifier in item.modifiers:
             keeper.set(modifier, "show_viewport", modifier.show_render)

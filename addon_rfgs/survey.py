@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 
 from .errors import AddonError
+from .findings import Finding
 from .frames import file_label, unit_scale
 from .rig import armature_of
 
@@ -46,6 +47,14 @@ class Surface:
     """The armature it is skinned or parented to."""
     moving: bool = False
     """Whether some vertex moves within the scene's range."""
+    low: np.ndarray = field(default_factory=lambda: np.full(3, np.inf))
+    """Lower corner [3] of where it is within the range [m]."""
+    high: np.ndarray = field(default_factory=lambda: np.full(3, -np.inf))
+    """Upper corner [3]."""
+
+    def material(self, slot: int) -> bpy.types.Material | None:
+        """Material of a slot; faces beyond the last slot use the last, as Blender shows them."""
+        return self.materials[min(slot, len(self.materials) - 1)] if self.materials else None
 
     @property
     def object_class(self) -> str:
@@ -54,37 +63,54 @@ class Surface:
         return self.source.rfgs.object_class if chosen == "AUTO" else chosen
 
 
-def survey(scene: bpy.types.Scene) -> list[Surface]:
+def survey(
+    scene: bpy.types.Scene, moving: Collection[str] = ()
+) -> tuple[list[Surface], list[Finding]]:
     """Finds all surfaces and marks those that move within the scene's whole range.
 
     The caller has made the viewport show what renders (`state.show_what_renders`).
 
-    Raises:
-        AddonError: Topology changes from frame to frame, or something marked static moves.
+    Args:
+        scene: The scene.
+        moving: Names of objects that count as moving although they may keep still.
+
+    Returns:
+        Surfaces by key, those left out whose topology changes, and what is wrong with any.
     """
     scene.frame_set(scene.frame_start)
     surfaces = {found[0]: _first_look(*found) for found in _instances(scene)}
+    changed: dict[str, Finding] = {}
     for frame in range(scene.frame_start + 1, scene.frame_end + 1):
         scene.frame_set(frame)
         seen = set()
-        for key, evaluated, matrix, _ in _instances(scene):
+        for key, evaluated, matrix, root in _instances(scene):
             seen.add(key)
             surface = surfaces.get(key)
             if surface is None:
-                raise AddonError(_changes(key, frame))
-            if not surface.moving:
-                local = _read(surface, evaluated, frame)
-                surface.moving = _moved(surface, local, matrix, unit_scale(scene))
-        if seen != surfaces.keys():
-            raise AddonError(_changes(sorted(surfaces.keys() - seen)[0], frame))
-    ordered = [surfaces[key] for key in sorted(surfaces)]
+                changed.setdefault(key, _comes_and_goes(key, root, "appears", frame))
+            elif key not in changed:
+                local = _read(surface, evaluated)
+                if local is None:
+                    changed[key] = _other_topology(key, frame)
+                else:
+                    _follow(surface, local, matrix, unit_scale(scene))
+        for key in sorted(surfaces.keys() - seen):
+            root = surfaces[key].root
+            changed.setdefault(key, _comes_and_goes(key, root, "disappears", frame))
+    ordered = [surfaces[key] for key in sorted(surfaces.keys() - changed.keys())]
     for surface in ordered:
-        if surface.moving and surface.object_class == "STATIC":
-            raise AddonError(
-                f"object {surface.key!r} is marked static but moves; change its class or its motion"
-            )
-    _refuse_shared_sources(ordered)
-    return ordered
+        surface.moving |= bool({surface.source.name, surface.root.name} & set(moving))
+    marked = [
+        Finding("error", surface.key, "is marked static but moves", "change its class or motion")
+        for surface in ordered
+        if surface.moving and surface.object_class == "STATIC"
+    ]
+    return ordered, [*changed.values(), *marked]
+
+
+def surface_of(scene: bpy.types.Scene, item: bpy.types.Object) -> Surface:
+    """The surface of one object at the current frame."""
+    return next(_first_look(*found) for found in _instances(scene) if found[3] == item)
 
 
 def positions(scene: bpy.types.Scene, surfaces: list[Surface], frame: int) -> dict[str, np.ndarray]:
@@ -97,11 +123,12 @@ def positions(scene: bpy.types.Scene, surfaces: list[Surface], frame: int) -> di
     found = {}
     for key, evaluated, matrix, _ in _instances(scene):
         if key in wanted:
-            local = _read(wanted[key], evaluated, frame)
-            found[key] = _world(local, matrix, unit_scale(scene))
+            local = _read(wanted[key], evaluated)
+            if local is not None:
+                found[key] = _world(local, matrix, unit_scale(scene))
     missing = sorted(wanted.keys() - found.keys())
     if missing:
-        raise AddonError(_changes(missing[0], frame))
+        raise AddonError(f"{file_label()}: {_other_topology(missing[0], frame).sentence}")
     return found
 
 
@@ -135,7 +162,9 @@ def _instances(
             continue
         source = evaluated.original
         root = instance.parent.original if instance.is_instance else source
-        if source.hide_render or "IGNORE" in (source.rfgs.object_class, root.rfgs.object_class):
+        if source.hide_render or root.hide_render:
+            continue
+        if "IGNORE" in (source.rfgs.object_class, root.rfgs.object_class):
             continue
         with evaluated_mesh(evaluated) as mesh:
             if mesh is None or not len(mesh.polygons):
@@ -160,22 +189,37 @@ def _first_look(
     vertices = _world(local, matrix, unit_scale(bpy.context.scene))
     armature = armature_of(source)
     return Surface(
-        key, source, root, faces, slots, materials, corners, local, matrix, vertices, armature
+        key,
+        source,
+        root,
+        faces,
+        slots,
+        materials,
+        corners,
+        local,
+        matrix,
+        vertices,
+        armature,
+        low=vertices.min(axis=0),
+        high=vertices.max(axis=0),
     )
 
 
-def _read(surface: Surface, evaluated: bpy.types.Object, frame: int) -> np.ndarray:
+def _read(surface: Surface, evaluated: bpy.types.Object) -> np.ndarray | None:
+    """Vertices in the object's own axes, None if the topology is another."""
     with evaluated_mesh(evaluated) as mesh:
-        if _corners(mesh) != surface.corners:
-            raise AddonError(_changes(surface.key, frame))
-        return _local(mesh)
+        return _local(mesh) if _corners(mesh) == surface.corners else None
 
 
-def _moved(surface: Surface, local: np.ndarray, matrix: np.ndarray, unit: float) -> bool:
+def _follow(surface: Surface, local: np.ndarray, matrix: np.ndarray, unit: float) -> None:
+    """Notes where a surface is at a later frame."""
     if np.array_equal(matrix, surface.matrix) and np.array_equal(local, surface.local):
-        return False
-    shift = _world(local, matrix, unit) - surface.vertices
-    return bool((np.linalg.norm(shift, axis=1) > MOVING_M).any())
+        return
+    vertices = _world(local, matrix, unit)
+    surface.low = np.minimum(surface.low, vertices.min(axis=0))
+    surface.high = np.maximum(surface.high, vertices.max(axis=0))
+    shift = vertices - surface.vertices
+    surface.moving |= bool((np.linalg.norm(shift, axis=1) > MOVING_M).any())
 
 
 def _local(mesh: bpy.types.Mesh) -> np.ndarray:
@@ -219,22 +263,21 @@ def _materials(
     return found
 
 
-def _refuse_shared_sources(surfaces: list[Surface]) -> None:
-    """One object cannot carry two instance ids in a rendered mask."""
-    users: dict[str, list[Surface]] = {}
-    for surface in surfaces:
-        users.setdefault(surface.source.name, []).append(surface)
-    for name, shared in users.items():
-        if len(shared) > 1 and any(surface.moving for surface in shared):
-            raise AddonError(
-                f"object {name!r} moves and is instanced {len(shared)} times "
-                f"({', '.join(surface.key for surface in shared[:3])}); make the instances real "
-                "(Object > Apply > Make Instances Real)"
-            )
+def _comes_and_goes(key: str, root: bpy.types.Object, verb: str, frame: int) -> Finding:
+    emits = any(system.settings.type == "EMITTER" for system in root.particle_systems)
+    why = "comes from particles" if emits else "has animated visibility or an animated count"
+    return Finding(
+        "error",
+        key,
+        f"{verb} at frame {frame}, so the topology changes; it {why}",
+        "keep it throughout, choose frames in which it stays, or drop it (class Ignore)",
+    )
 
 
-def _changes(key: str, frame: int) -> str:
-    return (
-        f"object {key!r} of {file_label()} changes its topology at frame {frame}; apply or "
-        "disable the modifier that adds or removes faces, or set its class to Ignore"
+def _other_topology(key: str, frame: int) -> Finding:
+    return Finding(
+        "error",
+        key,
+        f"changes its topology at frame {frame}",
+        "apply or disable the modifier that adds or removes faces, or drop it (class Ignore)",
     )

@@ -12,7 +12,7 @@ from .survey import Surface
 #: Ray tracing drops path segments shorter than this [m].
 CLOSEST_M = 0.01
 #: Double sheets smaller than this (one side) are furniture fittings, not walls [m²].
-WALL_M2 = 0.25
+WALL_M2 = 0.5
 #: Sheets count as parallel from this cosine between their normals.
 _PARALLEL = 0.95
 #: Triangles smaller than this are not looked at [m²].
@@ -42,22 +42,39 @@ def double_sheets(surfaces: list[Surface]) -> list[Finding]:
 
 
 def double_sheet_area(surface: Surface) -> float:
-    """Area of one side of the part of a surface that has an opposite face under 1 cm away [m²]."""
+    """Area of one side of the part of a surface that is thinner than 1 cm [m²].
+
+    Looked at from inside and part by part: two bodies that touch are no double sheet.
+    """
     corners = surface.vertices[surface.faces]
     crossed = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     doubled = np.linalg.norm(crossed, axis=1)
     large = np.flatnonzero(doubled > 2 * _SMALLEST_M2)
-    if 0.5 * doubled[large].sum() < WALL_M2:
+    if 0.25 * doubled[large].sum() < WALL_M2:
         return 0.0
-    normals = crossed / np.maximum(doubled, 1e-12)[:, None]
+    # Normals point out where the volume that they enclose comes out positive.
+    volume = np.einsum("ij,ij->i", corners[:, 0] - corners[0, 0], crossed).sum()
+    inward = -np.sign(volume) * crossed / np.maximum(doubled, 1e-12)[:, None]
     tree = BVHTree.FromPolygons(surface.vertices.tolist(), surface.faces.tolist())
-    middles, both = corners.mean(axis=1), 0.0
+    part, middles, both_m2 = _parts(surface.faces), corners.mean(axis=1), 0.0
     for index in large:
-        for sign in (1.0, -1.0):
-            way = sign * normals[index]
-            start = middles[index] + 1e-5 * way
-            _, facing, _, distance = tree.ray_cast(start, way, CLOSEST_M)
-            if facing is not None and distance > 1e-4 and abs(way @ np.array(facing)) > _PARALLEL:
-                both += 0.5 * doubled[index]
-                break
-    return 0.5 * both
+        way = inward[index]
+        _, normal, hit, distance = tree.ray_cast(middles[index] + 1e-5 * way, way, CLOSEST_M)
+        # An opposite face of the same body has its back towards the ray.
+        leaving = normal is not None and -np.sign(volume) * (way @ np.array(normal)) < -_PARALLEL
+        if leaving and part[hit] == part[index] and distance > 1e-4:
+            both_m2 += 0.5 * doubled[index]
+    return 0.5 * both_m2
+
+
+def _parts(faces: np.ndarray) -> np.ndarray:
+    """Number of the connected part that each face [T, 3] belongs to, [T]."""
+    label = np.arange(faces.max() + 1)
+    while True:
+        lowest = label[faces].min(axis=1)
+        fresh = label.copy()
+        np.minimum.at(fresh, faces.ravel(), np.repeat(lowest, 3))
+        fresh = fresh[fresh]  # Labels are vertices: following them halves the way to the lowest.
+        if np.array_equal(fresh, label):
+            return label[faces[:, 0]]
+        label = fresh

@@ -67,9 +67,10 @@ class BundleFrame:
     vertices: np.ndarray
     """World positions [m], float32, shape (V, 3)."""
     joints: np.ndarray
-    """Joint positions of each person [m], float32, shape (P, 17, 3)."""
+    """Joint positions of each person [m], float32, shape (P, 17, 3); NaN where unknown."""
     segment_velocity: np.ndarray
-    """Velocity of the centre of each body segment's skin [m/s], float32, shape (P, 17, 3)."""
+    """Velocity of the centre of each body segment's skin [m/s], float32, shape (P, 17, 3); NaN
+    where joints are unknown."""
     person_instance: np.ndarray
     """Instance id of each person, int32, shape (P,)."""
     action: np.ndarray
@@ -131,7 +132,8 @@ class Bundle:
         labels = {name: arrays[name] for name in ("joints", "segment_velocity")}
         if people:
             for name, values in labels.items():
-                _expect(path, name, values, (people, NUM_JOINTS, 3))
+                known = np.where(unknown_joints(values)[:, None, None], 0.0, values)
+                _expect(path, name, known, (people, NUM_JOINTS, 3))
         joints, velocity = (
             values.astype(np.float32).reshape(people, NUM_JOINTS, 3) for values in labels.values()
         )
@@ -167,6 +169,11 @@ class Bundle:
                 vertices, faces = read_ply_mesh(path)
                 meshes.append(StaticMesh(path.stem, by_name[material], vertices, faces))
         return meshes
+
+
+def unknown_joints(joints: np.ndarray) -> np.ndarray:
+    """Which people have no joints: all NaN, as bundles write it; bool, shape (P,)."""
+    return np.isnan(joints).reshape(len(joints), -1).all(axis=1)
 
 
 def sanitised(name: str) -> str:

@@ -5,19 +5,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from dataset_factory.bundle import Bundle
 from dataset_factory.radios import SCENE_RADIO
 from rfgs_core.dataset.schema import device_pose
 from rfgs_core.errors import RfgsError
 from rfgs_core.radio import DevicePose, Radio, place_devices
 from rfgs_core.radio.check import check, check_devices
-
-#: Beyond this the ray launching settings are not converged [m].
-LARGEST_EXTENT_M = 15.0
-#: Heights of a person outside these limits mean that the unit scale is off [m].
-PERSON_HEIGHT_M = (0.3, 5.0)
 
 
 #: Placement rules in words.
@@ -60,41 +53,23 @@ def choose_devices(bundle: Bundle, radio: Radio) -> tuple[list[DevicePose], dict
 
 
 def check_scene(bundle: Bundle, devices: dict[str, list[DevicePose]], radios: list[Radio]) -> None:
-    """Refuses scenes that cannot be traced faithfully.
+    """Refuses scenes that a radio cannot be traced in faithfully.
 
     Raises:
         RfgsError: Every problem, each with its remedy, in one line.
     """
-    name = bundle.info["blend_name"]
-    problems = _size_problems(bundle)
+    problems = radio_problems(bundle, devices, radios)
+    if problems:
+        raise RfgsError(f"{bundle.info['blend_name']}: " + "; also: ".join(problems))
+
+
+def radio_problems(
+    bundle: Bundle, devices: dict[str, list[DevicePose]], radios: list[Radio]
+) -> list[str]:
+    """What keeps radios from being traced in a scene, each with its remedy."""
+    problems = []
     meshes = [(mesh.name, mesh.vertices, mesh.faces) for mesh in bundle.static_meshes()]
     for radio in radios:
         problems += check(radio, bundle.bounds_m, bundle.materials)
         problems += check_devices(radio, bundle.bounds_m, devices[radio.name], meshes)
-    if problems:
-        raise RfgsError(f"{name}: " + "; also: ".join(dict.fromkeys(problems)))
-
-
-def _size_problems(bundle: Bundle) -> list[str]:
-    if not len(bundle.topology.faces):
-        return ["no moving mesh; animate a mesh (a person walking, for example) within the frames"]
-    problems = []
-    extent = bundle.bounds_m[1] - bundle.bounds_m[0]
-    if extent.max() > LARGEST_EXTENT_M:
-        problems.append(
-            f"the scene measures {extent[0]:.1f} x {extent[1]:.1f} x {extent[2]:.1f} m, more than "
-            f"{LARGEST_EXTENT_M:g} m; set far objects to the class Ignore, or check the unit scale"
-        )
-    vertices = bundle.frame(bundle.frames[0]).vertices
-    for row in bundle.instances:
-        if not row["person"]:
-            continue
-        faces = bundle.topology.faces[bundle.topology.instance == row["id"]]
-        height = float(np.ptp(vertices[np.unique(faces), 2])) if len(faces) else 0.0
-        low, high = PERSON_HEIGHT_M
-        if not low <= height <= high:
-            problems.append(
-                f"person {row['name']!r} is {height:.2f} m tall, expected {low} to {high} m; "
-                "check the unit scale"
-            )
-    return problems
+    return list(dict.fromkeys(problems))

@@ -15,7 +15,6 @@ from rfgs_core.dataset.names import SequenceFiles
 from rfgs_core.dataset.schema import PERSON_SURFACE_M2, SequenceInfo
 from rfgs_core.dataset.splits import image_split, radio_split
 from rfgs_core.dataset.writer import write_arrays
-from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json
 from rfgs_core.radio import DevicePose, layout
 
@@ -65,14 +64,13 @@ def write_geometry(files: SequenceFiles, bundle: Bundle) -> None:
         RfgsError: A frame of the bundle does not fit its topology.
     """
     meshes = bundle.static_meshes()
-    if not meshes:
-        raise RfgsError(f"{bundle.path}: no static mesh; a scene needs at least a floor")
     offsets = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
     faces = [mesh.faces + offset for mesh, offset in zip(meshes, offsets, strict=False)]
+    # A scene without a room has an empty mesh.
     write_mesh(
         files.static_mesh,
-        np.concatenate([mesh.vertices for mesh in meshes]),
-        np.concatenate(faces).astype(np.int32),
+        np.concatenate([np.zeros((0, 3), np.float32), *(mesh.vertices for mesh in meshes)]),
+        np.concatenate([np.zeros((0, 3), np.int32), *faces]).astype(np.int32),
     )
     topology = bundle.topology
     write_arrays(

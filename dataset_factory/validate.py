@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
+from dataset_factory.bundle import unknown_joints
 from dataset_factory.labels import label_faults, mask_faults
 from dataset_factory.physics import channel_faults, energy_faults
 from rfgs_core.dataset import Sequence
@@ -194,7 +195,9 @@ def _geometry_faults(sequence: Sequence) -> Iterator[str]:
         moving, faces, instance = sequence.moving_mesh(frame)
         if faces.size and not 0 <= faces.min() <= faces.max() < len(moving):
             yield f"{file}: does not fit {sequence.files.topology.name}"
-        if not (np.isfinite(moving).all() and np.isfinite(sequence.joints(frame)).all()):
+        joints = sequence.joints(frame)
+        known = joints[~unknown_joints(joints)]
+        if not (np.isfinite(moving).all() and np.isfinite(known).all()):
             yield f"{file}: positions that are not finite"
         elif (moving < low).any() or (moving > high).any():
             yield f"{file}: vertices outside the bounds of sequence.json"

@@ -75,7 +75,8 @@ def delay_angle_figure(sequence: Sequence, radio: str, frame: int) -> Figure:
             )
             figure.colorbar(shown, ax=axis, pad=0.01).ax.tick_params(labelsize=7)
             axis.set_title(f"device {a} to {b}, {title}", fontsize=9)
-            for point in sequence.joints(frame)[:, 0]:
+            pelvis = sequence.joints(frame)[:, 0]
+            for point in pelvis[np.isfinite(pelvis).all(axis=1)]:
                 angle, length = seen_from(sequence, radio, (a, b), point)
                 axis.plot(angle, length, "x", color="#4dd2ff", ms=8, mew=2)
         row[0].set_ylabel("path length [m]")

@@ -280,7 +280,10 @@ class Sequence:
         return read_mesh(self.files.static_mesh)
 
     def joints(self, frame: int) -> Float32[np.ndarray, "person 17 3"]:
-        """Joint positions of each person [m], in the order of `rfgs_core.skeleton`."""
+        """Joint positions of each person [m], in the order of `rfgs_core.skeleton`.
+
+        All NaN for a person whose joints the scene does not tell.
+        """
         return self._geometry(frame)["joints"]
 
     def segment_velocity(self, frame: int) -> Float32[np.ndarray, "person 17 3"]:

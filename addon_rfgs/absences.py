@@ -62,13 +62,20 @@ def hide_bone_shapes(keeper: Keeper) -> list[Finding]:
 
 
 def _bone_shapes() -> dict[str, bpy.types.Object]:
-    return {
+    """Shapes of bones, and what lies with them in a collection that mostly holds such."""
+    used = {
         bone.custom_shape.name: bone.custom_shape
         for item in bpy.data.objects
         if item.type == "ARMATURE" and item.pose
         for bone in item.pose.bones
         if bone.custom_shape is not None
     }
+    found = dict(used)
+    for collection in bpy.data.collections:
+        names = {item.name for item in collection.objects if item.type not in _HELPERS}
+        if 2 * len(names & used.keys()) > len(names):
+            found.update({name: bpy.data.objects[name] for name in names})
+    return found
 
 
 def _left_out(scene: bpy.types.Scene, item: bpy.types.Object) -> Iterator[Finding]:

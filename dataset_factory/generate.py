@@ -19,6 +19,7 @@ from dataset_factory.plan import versions
 from dataset_factory.progress import progress_bar
 from dataset_factory.radios import SCENE_RADIO, scene_radio
 from dataset_factory.render import render
+from dataset_factory.scene_check import table
 from dataset_factory.sequence import describe_sequence, write_geometry
 from dataset_factory.tracing import trace
 from rfgs_core.dataset import Sequence
@@ -57,6 +58,7 @@ def generate(job: Job) -> bool:
         info = DatasetInfo(versions(), asdict(job.plan), job.plan.seed, _contents(job), [job.name])
         with job.stage("export"):
             bundle = _export(job)
+        logger.info("%s", table(read_json(bundle.path / "check.json")))
         if SCENE_RADIO in job.plan.radios:
             job = replace(job, plan=job.plan.with_radio(scene_radio(bundle)))
         devices, guesses = _choose(job, bundle)
@@ -124,7 +126,7 @@ def _export(job: Job) -> Bundle:
                 progress(done, total)
                 clock.step()
 
-            job.blender.run("export", *arguments, *frames, *poses, progress=step)
+            job.run_blender("export", *arguments, *frames, *poses, progress=step)
         read_bundle(fresh)
         fresh.rename(target)
     return read_bundle(target)

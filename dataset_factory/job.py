@@ -10,8 +10,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from dataset_factory.blender import Blender
+from dataset_factory.blender import Blender, Progress
 from dataset_factory.bundle import sanitised
+from dataset_factory.overrides import overrides_file
 from dataset_factory.pace import Clock, Pace
 from dataset_factory.plan import Plan
 from rfgs_core.dataset.names import SequenceFiles
@@ -34,6 +35,8 @@ class Job:
     """Memory that each of them may take [GB]; 0 shares the machine's."""
     scheduler: str = ""
     """Address of a Dask scheduler that traces instead; empty for this machine."""
+    overrides_label: str = "command line"
+    """Where the plan's overrides come from, for messages."""
     seconds: dict[str, float] = field(default_factory=dict)
     """Wall time per stage of this run [s]."""
     paces: dict[str, Pace] = field(default_factory=dict)
@@ -55,6 +58,15 @@ class Job:
     def files(self) -> SequenceFiles:
         """Where the sequence's files lie."""
         return SequenceFiles(self.out / self.name)
+
+    def run_blender(self, name: str, *arguments: str, progress: Progress) -> None:
+        """Runs one of the add-on's commands on the scene with the plan's overrides.
+
+        Raises:
+            RfgsError: The command failed; the message is the add-on's own.
+        """
+        with overrides_file(self.plan.overrides, self.overrides_label) as more:
+            self.blender.run(name, *arguments, *more, progress=progress)
 
     @property
     def picture_size(self) -> list[str]:

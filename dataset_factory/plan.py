@@ -53,7 +53,8 @@ class Plan:
     """Settings of the impaired channels beside the clean ones; none makes none."""
     packets_per_frame: int = 1
     """Packets or chirps of each frame; 1 leaves every radio its own number."""
-
+    overrides: dict[str, Any] = field(default_factory=dict)
+    """What the user says about the scene, in the words of the YAML file."""
     custom_radios: dict[str, dict[str, Any]] = field(default_factory=dict)
     """All fields of the radios that are no presets, by name."""
 
@@ -85,9 +86,6 @@ def make_plan(scene: Scene, radios: tuple[str, ...], frames: str, **options: Any
     if not radios:
         raise RfgsError("no radio given; add --radio wifi, --radio mmwave or both")
     chosen = chosen_radios(radios)
-    if frames and len(only := parse_frames(frames)) == 1:
-        # Inside Blender frames are always a range.
-        frames = f"{only[0]}:{only[0]}"
     limits = {"depth": (1, 3), "resolution": (16, 8192), "samples": (1, 65536), "cameras": (0, 999)}
     for name, (low, high) in limits.items():
         if not low <= options[name] <= high:
@@ -102,9 +100,20 @@ def make_plan(scene: Scene, radios: tuple[str, ...], frames: str, **options: Any
         custom_radios={
             name: asdict(radio) for name, radio in chosen.items() if name not in PRESETS
         },
-        frames=frames,
+        frames=whole_frames(frames),
         **options,
     )
+
+
+def whole_frames(frames: str) -> str:
+    """Frames as the add-on takes them: empty or a range, also where one number was given.
+
+    Raises:
+        RfgsError: The text names no frames.
+    """
+    if frames and len(only := parse_frames(frames)) == 1:
+        return f"{only[0]}:{only[0]}"
+    return frames
 
 
 def frame_runs(frames: list[int]) -> list[str]:

@@ -39,13 +39,13 @@ def render(job: Job, sequence: SequenceInfo) -> None:
                 _encode(job, rendered, cameras, frames[: done // len(cameras)])
 
             arguments = [*size, "--frames", run, "--passes"]
-            job.blender.run("groundtruth", *arguments, progress=encode)
+            job.run_blender("groundtruth", *arguments, progress=encode)
         _encode(job, rendered, cameras, frames)
     if any(not job.files.image_empty(camera).is_file() for camera in cameras):
         with progress_bar("empty room") as progress:
             frame = str(sequence.frames[0])
             arguments = [*size, "--frames", f"{frame}:{frame}", "--empty"]
-            job.blender.run("groundtruth", *arguments, progress=progress)
+            job.run_blender("groundtruth", *arguments, progress=progress)
         encode_empty(rendered, job.files, cameras)
 
 

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 #: Command name → module below `dataset_factory.cli` and its arguments dataclass.
 COMMANDS: dict[str, tuple[str, str]] = {
     "scenes": ("scenes", "ScenesArgs"),
+    "check": ("check", "CheckArgs"),
     "plan": ("plan", "PlanArgs"),
     "radios": ("radios", "RadiosArgs"),
     "generate": ("generate", "GenerateArgs"),

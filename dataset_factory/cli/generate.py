@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import tyro
 
+from dataset_factory.overrides import SceneOptions
 from rfgs_core.errors import RfgsError
 
 if TYPE_CHECKING:
@@ -63,6 +64,8 @@ class GenerateArgs:
     0.25 ms apart. The animation's last frame is left out, as nothing is known beyond it."""
     images: bool = True
     """Render pictures with Blender."""
+    options: tyro.conf.OmitArgPrefixes[SceneOptions] = field(default_factory=SceneOptions)
+    """What to make of the scene."""
     blender: Path | None = None
     """A real Blender with the add-on enabled; default: $BLENDER, else pip's bpy."""
 
@@ -85,6 +88,7 @@ def job_of(args: GenerateArgs) -> tuple[Job, Scene]:
     """
     from dataset_factory.blender import Blender
     from dataset_factory.job import Job
+    from dataset_factory.overrides import label, read_options
     from dataset_factory.plan import make_plan
     from dataset_factory.scenes import find_scene
     from rfgs_core.llvm import use_llvm
@@ -94,11 +98,12 @@ def job_of(args: GenerateArgs) -> tuple[Job, Scene]:
         raise RfgsError(f"--workers {args.workers}: expected 1 to 256")
     if not 0.0 <= args.worker_memory <= 1e4:
         raise RfgsError(f"--worker-memory {args.worker_memory}: expected GB, or 0")
-    scene = find_scene(args.scene)
+    scene, said = find_scene(args.scene), read_options(args.options)
+    frames = args.frames or str(said.pop("frames", ""))
     plan = make_plan(
         scene,
         args.radio,
-        args.frames,
+        frames,
         cameras=args.cameras,
         resolution=args.resolution,
         samples=args.samples,
@@ -108,8 +113,16 @@ def job_of(args: GenerateArgs) -> tuple[Job, Scene]:
         images=args.images,
         impairments=asdict(read_impairments(args.impairments)) if args.impairments else None,
         packets_per_frame=args.packets_per_frame,
+        overrides=said,
     )
     use_llvm()
-    blender = Blender(scene.blend, args.blender)
-    job = Job(args.out, plan, blender, args.workers, args.worker_memory, args.scheduler)
+    job = Job(
+        args.out,
+        plan,
+        Blender(scene.blend, args.blender),
+        args.workers,
+        args.worker_memory,
+        args.scheduler,
+        label(args.options),
+    )
     return job, scene

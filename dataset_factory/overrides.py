@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a user says about a scene beside its file: options, or a small YAML file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import tyro
+import yaml
+
+from rfgs_core.errors import RfgsError, RfgsFormatError
+from rfgs_core.files import write_json
+
+_Names = tyro.conf.UseAppendAction[tuple[str, ...]]
+
+
+@dataclass(frozen=True)
+class SceneOptions:
+    """What to make of a scene; what is said here goes before the file and before guesses.
+
+    NAME may be a pattern (*, ?, [abc]); repeat an option for several.
+    """
+
+    scene_config: Path | None = None
+    """YAML file with these and more: see `rfgs-factory check --help`."""
+    frame_range: str = ""
+    """First and last frame A:B of the scene, in place of the file's own."""
+    fps: float | None = None
+    """Frames per second."""
+    unit_scale: float | None = None
+    """Metres per Blender unit, 0.01 for a file drawn in centimetres."""
+    bounds: tuple[float, float, float, float, float, float] | None = None
+    """Box X0 Y0 Z0 X1 Y1 Z1 that radio sees [m]; what is static is cut there."""
+    drop: _Names = ()
+    """Object NAME to leave out, of radio and of pictures."""
+    people: _Names = ()
+    """Object NAME that is a person."""
+    vehicles: _Names = ()
+    """Object NAME that is a vehicle."""
+    moving: _Names = ()
+    """Object NAME that counts as moving although it may keep still."""
+    material: _Names = ()
+    """NAME=MATERIAL: radio material of a Blender material."""
+    object_material: _Names = ()
+    """NAME=MATERIAL: radio material of an object."""
+    ring: int | None = None
+    """So many cameras in a ring around what moves, in place of the file's own."""
+    room: str | None = None
+    """`box` builds a plain room of plasterboard around the scene."""
+
+
+def read_options(options: SceneOptions) -> dict[str, Any]:
+    """Options laid over the YAML file, in the words of the file.
+
+    Values are judged by the add-on, which knows the scene.
+
+    Raises:
+        RfgsError: There is no such file, or an option has no `=`.
+        RfgsFormatError: The file is no YAML mapping.
+    """
+    said = {} if options.scene_config is None else _read_yaml(options.scene_config)
+    for name in ("fps", "unit_scale", "room", "frame_range"):
+        value = getattr(options, name)
+        if value not in (None, ""):
+            said[name] = value
+    if options.bounds:
+        said["bounds_m"] = [list(options.bounds[:3]), list(options.bounds[3:])]
+    for name in ("drop", "people", "vehicles", "moving"):
+        more = list(getattr(options, name))
+        if more:
+            said[name] = [*_listed(said.get(name, [])), *more]
+    rules = {"materials": options.material, "object_materials": options.object_material}
+    for name, rows in rules.items():
+        if rows:
+            said[name] = {**dict(map(_rule, rows)), **_mapping(name, said.get(name))}
+    if options.ring is not None:
+        said["cameras"] = {**_mapping("cameras", said.get("cameras")), "ring": options.ring}
+    return said
+
+
+def label(options: SceneOptions) -> str:
+    """Where overrides come from, for messages."""
+    return str(options.scene_config or "command line")
+
+
+@contextmanager
+def overrides_file(said: dict[str, Any], label: str = "overrides") -> Iterator[list[str]]:
+    """Yields the add-on's arguments that hand over what was said."""
+    if not said:
+        yield []
+        return
+    with TemporaryDirectory(prefix="rfgs-") as folder:
+        file = Path(folder) / "overrides.json"
+        write_json(file, {**said, "label": label})
+        yield ["--overrides", str(file)]
+
+
+def _rule(text: str) -> tuple[str, str]:
+    name, equals, value = text.rpartition("=")
+    if not equals or not name or not value:
+        raise RfgsError(f"--material {text!r}: expected NAME=MATERIAL, as in 'Wall*=concrete'")
+    return name, value
+
+
+def _listed(value: Any) -> list[Any]:
+    return value if isinstance(value, list) else [value]
+
+
+def _mapping(name: str, value: Any) -> dict[str, Any]:
+    if value is None:
+        return {}
+    if isinstance(value, int) and name == "cameras":
+        return {"ring": value}
+    if not isinstance(value, dict):
+        raise RfgsError(f"{name}: expected keys and values, got {value!r}")
+    return value
+
+
+class _Loader(yaml.SafeLoader):
+    """YAML 1.2 scalars only: `1:30` is no number in base 60, `on` is no truth; no key twice."""
+
+
+_Loader.yaml_implicit_resolvers = {}
+for _tag, _form, _first in (
+    ("null", r"~|null|", [*"~n", ""]),
+    ("bool", r"true|false", [*"tf"]),
+    ("int", r"[-+]?[0-9]+", [*"-+0123456789"]),
+    ("float", r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?", [*"-+.0123456789"]),
+):
+    _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{_tag}", re.compile(f"({_form})$"), _first)
+
+
+def _construct_mapping(loader: _Loader, node: yaml.MappingNode) -> dict[Any, Any]:
+    pairs = [
+        (loader.construct_object(k, True), loader.construct_object(v, True)) for k, v in node.value
+    ]
+    keys = [key for key, _ in pairs]
+    for key in keys:
+        if not isinstance(key, str):
+            raise yaml.constructor.ConstructorError(
+                None, None, f"expected a name before the colon, got {key!r}", node.start_mark
+            )
+        if keys.count(key) > 1:
+            raise yaml.constructor.ConstructorError(
+                None, None, f"the key {key!r} stands twice", node.start_mark
+            )
+    return dict(pairs)
+
+
+_Loader.add_constructor("tag:yaml.org,2002:map", _construct_mapping)
+
+
+def _read_yaml(path: Path) -> dict[str, Any]:
+    try:
+        values = yaml.load(path.read_text("utf-8"), Loader=_Loader)
+    except OSError as error:
+        raise RfgsError(f"{path}: cannot be read ({error.strerror})") from error
+    except UnicodeDecodeError as error:
+        raise RfgsFormatError(f"{path}: expected a YAML text file") from error
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        line = f", line {mark.line + 1}" if mark else ""
+        reason = getattr(error, "problem", None) or "no YAML"
+        remedy = "; put names that begin with * in quotes" if "alias" in str(error) else ""
+        raise RfgsFormatError(f"{path}{line}: {reason}{remedy}") from error
+    if values is None:
+        return {}
+    if not isinstance(values, dict):
+        raise RfgsFormatError(f"{path}: expected `key: value` lines, got {values!r:.60}")
+    return values

@@ -3,8 +3,11 @@
 
 from __future__ import annotations
 
+import atexit
 import sys
 from pathlib import Path
+
+import bpy
 
 from . import register
 from .cli import USER_ERROR, run
@@ -16,10 +19,16 @@ def main(arguments: list[str]) -> int:
     if arguments[:1] in (["-h"], ["--help"]):
         return run(["--help"], program)
     if len(arguments) < 2 or arguments[0] != "--blend":
-        sys.stderr.write(f"error: expected {program} export|groundtruth|import …\n")
+        sys.stderr.write(f"error: expected {program} check|export|groundtruth|import …\n")
         return USER_ERROR
     register()
+    atexit.register(_close_file)
     return run(arguments[2:], program, Path(arguments[1]))
+
+
+def _close_file() -> None:
+    """Leaves nothing open: a scripted driver that was not run makes Blender's end wait forever."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
 
 
 if __name__ == "__main__":

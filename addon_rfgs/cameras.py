@@ -138,7 +138,8 @@ def cameras_ready(
         note = {"what": "camera", "object": "the scene", "value": f"a ring of {ring.ring}"}
         guesses.append({**note, "why": "the scene has no perspective camera"})
     made = []
-    for index, matrix in enumerate(_stands(space, ring)):
+    width, height = picture_size(scene, None)
+    for index, matrix in enumerate(_stands(space, ring, min(width, height) / max(width, height))):
         item = bpy.data.objects.new(f"RFGS guessed {index:02d}", bpy.data.cameras.new("guessed"))
         item.data.angle = np.radians(ring.fov_deg)
         matrix[:3, 3] /= unit_scale(scene)
@@ -154,15 +155,20 @@ def cameras_ready(
             bpy.data.cameras.remove(item.data)
 
 
-def _stands(space: Space, ring: Ring) -> list[np.ndarray]:
-    """Poses [4, 4] in metres of a ring around the middle of what moves, inside the walls."""
+def _stands(space: Space, ring: Ring, aspect: float) -> list[np.ndarray]:
+    """Poses [4, 4] in metres of a ring around the middle of what moves, inside the walls.
+
+    From where no radius is given, a sphere around what moves fits into the picture, whose shorter
+    side is `aspect` of the longer.
+    """
     low, high = space.movers
     centre, size = 0.5 * (low + high), float(np.linalg.norm(high - low))
-    radius = ring.radius_m or 1.2 * size
+    half_angle = np.arctan(np.tan(np.radians(ring.fov_deg / 2)) * aspect)
+    radius = ring.radius_m or 0.5 * size / np.sin(half_angle)
     poses = []
     for index in range(ring.ring):
         angle = 2 * np.pi * index / ring.ring
-        lift = 1.2 * size * (0.1 if index % 2 == 0 else 0.5)
+        lift = radius * (0.1 if index % 2 == 0 else 0.5)
         place = centre + np.array([radius * np.cos(angle), radius * np.sin(angle), lift])
         if ring.height_m is not None:
             place[2] = low[2] + ring.height_m

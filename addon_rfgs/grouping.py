@@ -7,10 +7,10 @@ import numpy as np
 
 from .survey import Surface
 
-#: Surfaces of one armature closer than this belong to one person [m].
-_NEAR_M = 0.05
-#: A part of an armature's surfaces is a body of its own from this share of the largest's size.
-_BODY_SHARE = 0.5
+#: A surface may be a body of its own from this share of the largest's extent.
+_BODY_SHARE = 0.7
+#: Bodies are apart from this share of their extent on.
+APART_SHARE = 0.3
 
 
 def instance_names(moving: list[Surface]) -> list[tuple[Surface, str]]:
@@ -31,7 +31,7 @@ def instance_names(moving: list[Surface]) -> list[tuple[Surface, str]]:
     for name, shared in rigged.items():
         groups = _bodies(shared)
         for group in groups:
-            title = name if len(groups) == 1 else _largest(group).key
+            title = name if len(groups) == 1 else group[0].key
             for surface in group:
                 names[surface.key] = title if len(shared) > 1 else surface.key
     return [(surface, names.get(surface.key, _own_name(surface))) for surface in moving]
@@ -44,36 +44,25 @@ def _own_name(surface: Surface) -> str:
 
 def _bodies(surfaces: list[Surface]) -> list[list[Surface]]:
     """Splits surfaces of one armature into bodies that stand apart from each other."""
-    groups: list[list[Surface]] = []
-    for surface in surfaces:
-        touching = [group for group in groups if any(_near(surface, other) for other in group)]
-        groups = [group for group in groups if group not in touching]
-        groups.append([surface, *(other for group in touching for other in group)])
-    size = max(_extent(_largest(group)) for group in groups)
-    bodies = [group for group in groups if _extent(_largest(group)) >= _BODY_SHARE * size]
-    for group in groups:
-        if group not in bodies:  # A hat or a shoe: part of the nearest body.
-            middle = _middle(_largest(group))
-            nearest = min(
-                bodies, key=lambda body: float(np.linalg.norm(_middle(_largest(body)) - middle))
-            )
-            nearest.extend(group)
-    return sorted(bodies, key=lambda body: _largest(body).key)
-
-
-def _near(one: Surface, other: Surface) -> bool:
-    low = np.maximum(one.vertices.min(axis=0), other.vertices.min(axis=0))
-    high = np.minimum(one.vertices.max(axis=0), other.vertices.max(axis=0))
-    return bool((low <= high + _NEAR_M).all())
+    largest = max(_extent(surface) for surface in surfaces)
+    bodies: list[list[Surface]] = []
+    for surface in sorted(surfaces, key=_extent, reverse=True):
+        distance = [
+            float(np.hypot(*(stand(surface.vertices) - stand(body[0].vertices)))) for body in bodies
+        ]
+        near = int(np.argmin(distance)) if distance else -1
+        whole = _extent(surface) >= _BODY_SHARE * largest
+        if near < 0 or (whole and distance[near] > APART_SHARE * largest):
+            bodies.append([surface])
+        else:
+            bodies[near].append(surface)
+    return bodies
 
 
 def _extent(surface: Surface) -> float:
     return float(np.ptp(surface.vertices, axis=0).max())
 
 
-def _middle(surface: Surface) -> np.ndarray:
-    return 0.5 * (surface.vertices.min(axis=0) + surface.vertices.max(axis=0))
-
-
-def _largest(group: list[Surface]) -> Surface:
-    return max(group, key=_extent)
+def stand(vertices: np.ndarray) -> np.ndarray:
+    """Where something stands, [2]; the median is not led astray by an outstretched arm."""
+    return np.median(vertices[:, :2], axis=0)

@@ -13,7 +13,7 @@ import numpy as np
 
 from .findings import Finding
 from .frames import unit_scale
-from .grouping import instance_names
+from .grouping import APART_SHARE, instance_names, stand
 from .rig import Rig, read_rig
 from .survey import Surface, evaluated_mesh, placements
 
@@ -181,7 +181,7 @@ def _size_up(instance: Instance, guesses: list[dict[str, Any]]) -> None:
 
 
 def _stands_at(instance: Instance, armature: bpy.types.Object) -> bool:
-    """Whether the armature's middle is within an instance, so that its joints are meant.
+    """Whether the armature's middle is where an instance stands, so that its joints are meant.
 
     Two characters may share one armature, and only one of them stands where its bones are.
     """
@@ -191,10 +191,9 @@ def _stands_at(instance: Instance, armature: bpy.types.Object) -> bool:
     middle = posed.matrix_world @ mathutils.Vector(
         np.mean([bone.head for bone in posed.pose.bones], axis=0)
     )
-    low, high = _first_box(instance)
-    point = np.array(middle[:2]) * unit_scale(bpy.context.scene)
-    margin = 0.5 * (high - low)[:2].max()
-    return bool(((point > low[:2] - margin) & (point < high[:2] + margin)).all())
+    vertices = np.concatenate([surface.vertices for surface in instance.surfaces])
+    apart = stand(vertices) - np.array(middle[:2]) * unit_scale(bpy.context.scene)
+    return float(np.hypot(*apart)) < APART_SHARE * _size_m(instance)
 
 
 def _first_box(instance: Instance) -> tuple[np.ndarray, np.ndarray]:

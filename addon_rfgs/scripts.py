@@ -17,11 +17,11 @@ def disabled_drivers() -> list[dict[str, Any]]:
     return [
         {
             "what": "driver",
-            "object": f"{owner.name}: {curve.data_path}",
+            "object": f"{name}: {curve.data_path}",
             "value": "disabled",
             "why": "scripts in a file never run",
         }
-        for owner in _animated()
+        for name, owner in _animated()
         for curve in owner.animation_data.drivers
         if curve.driver.type == "SCRIPTED" and not curve.driver.is_simple_expression
     ]
@@ -43,8 +43,8 @@ def disable_scripts(keeper: Keeper, scene: bpy.types.Scene) -> None:
         keeper.set(scene.cycles, "shading_system", False)
 
 
-def _animated() -> Iterator[Any]:
-    """Every data block with drivers, node trees inside materials, worlds and scenes included."""
+def _animated() -> Iterator[tuple[str, Any]]:
+    """Every animated data block and its name, that of the owner for node trees and shape keys."""
     seen = set()
     for name in dir(bpy.data):
         blocks = getattr(bpy.data, name)
@@ -59,4 +59,4 @@ def _animated() -> Iterator[Any]:
                 data = getattr(owner, "animation_data", None)
                 if data is not None and owner.as_pointer() not in seen:
                     seen.add(owner.as_pointer())
-                    yield owner
+                    yield block.name, owner

@@ -19,6 +19,8 @@ from .rig import armature_of
 MOVING_M = 1e-3
 
 _SURFACES = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
+#: Ways in which an object repeats its children in place of showing them.
+_REPEATING = {"VERTS", "FACES"}
 
 
 @dataclass
@@ -156,6 +158,7 @@ def _instances(
     """Yields key, evaluated object, world matrix and instancer of everything with faces."""
     graph = bpy.context.evaluated_depsgraph_get()
     seen: dict[str, int] = {}
+    converted: set[tuple[str, int, int]] = set()
     for instance in graph.object_instances:
         evaluated = instance.object
         if evaluated.type not in _SURFACES:
@@ -164,11 +167,20 @@ def _instances(
         root = instance.parent.original if instance.is_instance else source
         if source.hide_render or root.hide_render:
             continue
+        if root == source and source.parent and source.parent.instance_type in _REPEATING:
+            continue  # Only its copies render.
         if "IGNORE" in (source.rfgs.object_class, root.rfgs.object_class):
             continue
         with evaluated_mesh(evaluated) as mesh:
             if mesh is None or not len(mesh.polygons):
                 continue
+            # Curves and texts come twice: as themselves, and as the mesh they become.
+            size = (source.name, len(mesh.vertices), len(mesh.polygons))
+        if evaluated.type != "MESH":
+            converted.add(size)
+        elif root == source and size in converted:
+            converted.remove(size)
+            continue
         key = source.name if root == source else f"{root.name}/{source.name}"
         count = seen[key] = seen.get(key, 0) + 1
         key = key if count == 1 else f"{key}#{count}"

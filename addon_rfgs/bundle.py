@@ -60,9 +60,7 @@ def export_bundle(
     """
     sha256 = file_sha256()
     # Everything is written beside the old bundle first, so a failed export leaves that as it was.
-    with content_ready(
-        scene, frames, overrides or Overrides(), between=bool(spans_s)
-    ) as content:
+    with content_ready(scene, frames, overrides or Overrides(), between=bool(spans_s)) as content:
         refuse(file_label(), content.findings)
         with replacing_folder(folder, "bundle.json") as target:
             views, view_guesses = find_views(scene, cameras, resolution, content.ring)

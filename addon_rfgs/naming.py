@@ -36,8 +36,9 @@ def closest(name: str, known: Iterable[str]) -> str:
         "; did you mean 'wood'?"
     """
     names = sorted(known)
-    near = difflib.get_close_matches(name.strip("*?"), names, n=3, cutoff=0.5)
+    plain = {other.lower(): other for other in names}
+    near = difflib.get_close_matches(name.strip("*?").lower(), plain, n=3, cutoff=0.5)
     if near:
-        return f"; did you mean {' or '.join(map(repr, near))}?"
+        return f"; did you mean {' or '.join(repr(plain[other]) for other in near)}?"
     shown = ", ".join(names[:8]) + (", …" if len(names) > 8 else "")
     return f"; expected one of {shown}" if names else ""

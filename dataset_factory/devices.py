@@ -12,7 +12,6 @@ from rfgs_core.errors import RfgsError
 from rfgs_core.radio import DevicePose, Radio, place_devices
 from rfgs_core.radio.check import check, check_devices
 
-
 #: Placement rules in words.
 _WHERE = {"corners": "in the corners of the scene", "walls": "along the walls of the scene"}
 

@@ -75,10 +75,12 @@ def read_options(options: SceneOptions) -> dict[str, Any]:
         more = list(getattr(options, name))
         if more:
             said[name] = [*_listed(said.get(name, [])), *more]
-    rules = {"materials": options.material, "object_materials": options.object_material}
-    for name, rows in rules.items():
+    given = {"materials": options.material, "object_materials": options.object_material}
+    for name, rows in given.items():
         if rows:
-            said[name] = {**dict(map(_rule, rows)), **_mapping(name, said.get(name))}
+            # The first pattern that fits decides, so options stand first.
+            rules = dict(map(_rule, rows))
+            said[name] = {**rules, **_mapping(name, said.get(name)), **rules}
     if options.ring is not None:
         said["cameras"] = {**_mapping("cameras", said.get("cameras")), "ring": options.ring}
     return said

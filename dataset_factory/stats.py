@@ -135,7 +135,8 @@ def _labels(sequence: Sequence) -> dict[str, Any]:
         actions.update(action or "none" for action in sequence.actions(frame))
         people = zip(sequence.people(frame), sequence.joints(frame), strict=True)
         for person, joints in people:
-            tracks.setdefault(int(person), []).append(joints[0])
+            if np.isfinite(joints[0]).all():  # NaN where the scene does not tell.
+                tracks.setdefault(int(person), []).append(joints[0])
     low, high = sequence.bounds_m[:, :2]
     cells = np.maximum(np.ceil((high - low) / CELL_M), 1)
     visited = {

@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+import json
 import struct
 from pathlib import Path
 
 import bpy
+import mathutils
 import numpy as np
 import pytest
 from plyfile import PlyData, PlyElement
@@ -15,6 +17,7 @@ import addon_rfgs
 from addon_rfgs import exr, naming, ply, rig, tables
 from addon_rfgs.errors import AddonError
 from addon_rfgs.frames import chosen_frames
+from addon_rfgs.override_file import read_overrides
 
 COLUMNS = [
     *("x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2", "opacity"),
@@ -186,3 +189,43 @@ def test_material_numbers_do_not_depend_on_the_table() -> None:
     assert set(numbers) == {"AUTO", *tables.MATERIALS}
     assert len(set(numbers.values())) == len(numbers)
     assert numbers["concrete"] == 1400205171, "files saved earlier would change their meaning"
+
+
+@pytest.mark.parametrize(
+    ("said", "words"),
+    [
+        ({"materials": {"Wall": "concret"}}, ["radio material 'concret'", "'concrete'"]),
+        ({"materials": {"Wall": {"radio_material": "wood", "thicknes_m": 1}}}, ["'thickness_m'"]),
+        ({"fps": -1}, ["fps: expected a number above 0, got -1"]),
+        ({"fps": True}, ["fps: expected a number"]),
+        ({"frame_range": "9:2"}, ["frame_range: expected FIRST < LAST"]),
+        ({"frame_range": 90}, ["frame_range: expected FIRST:LAST"]),
+        ({"bounds_m": [[0, 0, 0], [1, 1]]}, ["bounds_m: expected 3 numbers"]),
+        ({"bounds_m": [[0, 0, 0], [1, -1, 1]]}, ["the lower corner first"]),
+        ({"devices": [{"name": "a"}]}, ["devices[0]: position_m is missing"]),
+        ({"devices": [{"position_m": [0, 0, 0], "role": "reciever"}]}, ["mean 'RECEIVER'"]),
+        ({"devices": [{"name": "a", "position_m": [0, 0, 0]}] * 2}, ["two devices", "'a'"]),
+        ({"cameras": {"ring": 0}}, ["1 to 99 cameras, got 0"]),
+        ({"room": "cave"}, ["room: expected none, box or material, size_m"]),
+        ({"drop": [1]}, ["drop: expected names"]),
+    ],
+)
+def test_senseless_overrides_are_refused_by_key(tmp_path: Path, said: dict, words: list) -> None:
+    file = tmp_path / "said.json"
+    file.write_text(json.dumps({**said, "label": "scene.yaml"}))
+    with pytest.raises(AddonError) as caught:
+        read_overrides(file)
+    message = str(caught.value)
+    assert message.startswith("scene.yaml: ") and all(word in message for word in words), message
+
+
+def test_devices_look_where_they_are_told(tmp_path: Path) -> None:
+    file = tmp_path / "said.json"
+    device = {"position_m": [1, 2, 3], "look_at_m": [-2, 4, 0.5]}
+    file.write_text(json.dumps({"devices": [device]}))
+    (row,) = read_overrides(file).devices
+    boresight = mathutils.Quaternion(row["quat_wxyz"]) @ mathutils.Vector((1, 0, 0))
+    expected = mathutils.Vector((-3, 2, -2.5)).normalized()
+    assert tuple(boresight) == pytest.approx(tuple(expected), abs=1e-6)
+    level = mathutils.Quaternion(row["quat_wxyz"]) @ mathutils.Vector((0, 1, 0))
+    assert level.z == pytest.approx(0, abs=1e-6)

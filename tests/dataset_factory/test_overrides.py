@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a user says about a scene: the YAML file, the options over it, and bad ones."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from dataset_factory.overrides import SceneOptions, read_options
+from rfgs_core.errors import RfgsError
+
+_FILE = """
+frames: 1:30          # a range, not 90 in base 60
+frame_range: 1:59
+drop: [Sky, "Tree*"]
+people: on            # a name, not a truth
+fps: 29.97
+materials: {"Paint*": plasterboard}
+cameras: {ring: 6, radius_m: 2}
+"""
+
+
+@pytest.fixture
+def config(tmp_path: Path) -> Path:
+    file = tmp_path / "scene.yaml"
+    file.write_text(_FILE)
+    return file
+
+
+def test_nothing_said() -> None:
+    assert read_options(SceneOptions()) == {}
+
+
+def test_scalars_are_read_as_meant(config: Path) -> None:
+    assert read_options(SceneOptions(scene_config=config)) == {
+        "frames": "1:30",
+        "frame_range": "1:59",
+        "drop": ["Sky", "Tree*"],
+        "people": "on",
+        "fps": 29.97,
+        "materials": {"Paint*": "plasterboard"},
+        "cameras": {"ring": 6, "radius_m": 2},
+    }
+
+
+def test_options_go_before_the_file_and_lists_add_up(config: Path) -> None:
+    said = read_options(
+        SceneOptions(
+            scene_config=config,
+            fps=60,
+            drop=("Lamp",),
+            people=("Anna",),
+            material=("Paint*=glass", "a=b=wood"),
+            object_material=("Wall=concrete",),
+            ring=4,
+            room="box",
+            bounds=(-1, -2, 0, 1, 2, 3),
+        )
+    )
+    assert said["fps"] == 60 and said["room"] == "box"
+    assert said["drop"] == ["Sky", "Tree*", "Lamp"] and said["people"] == ["on", "Anna"]
+    assert said["materials"] == {"Paint*": "glass", "a=b": "wood"}
+    assert said["object_materials"] == {"Wall": "concrete"}
+    assert said["cameras"] == {"ring": 4, "radius_m": 2}
+    assert said["bounds_m"] == [[-1, -2, 0], [1, 2, 3]]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("fps: 24\nfps: 30\n", ["line 1", "'fps' stands twice"]),
+        ("drop: [*Tree]\n", ["alias", "in quotes"]),
+        ("- fps\n", ["key: value"]),
+        ("fps: [24\n", ["line 2"]),
+        ("1: 2\n", ["expected a name before the colon"]),
+        ("fps: !!python/object/apply:os.system ['touch canary']\n", ["could not determine"]),
+        ("\x00", ["scene.yaml"]),
+    ],
+)
+def test_bad_files_get_one_line(tmp_path: Path, text: str, words: list[str]) -> None:
+    file = tmp_path / "scene.yaml"
+    file.write_text(text)
+    with pytest.raises(RfgsError) as caught:
+        read_options(SceneOptions(scene_config=file))
+    message = str(caught.value)
+    assert all(word in message for word in words) and "\n" not in message, message
+    assert message.startswith(str(file))
+
+
+def test_missing_file_and_missing_sign(tmp_path: Path) -> None:
+    with pytest.raises(RfgsError, match="cannot be read"):
+        read_options(SceneOptions(scene_config=tmp_path / "none.yaml"))
+    with pytest.raises(RfgsError, match="expected NAME=MATERIAL"):
+        read_options(SceneOptions(material=("concrete",)))

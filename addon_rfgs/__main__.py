@@ -7,10 +7,9 @@ import atexit
 import sys
 from pathlib import Path
 
-import bpy
-
 from . import register
 from .cli import USER_ERROR, run
+from .scripts import close_scripted_file
 
 
 def main(arguments: list[str]) -> int:
@@ -22,13 +21,8 @@ def main(arguments: list[str]) -> int:
         sys.stderr.write(f"error: expected {program} check|export|groundtruth|import …\n")
         return USER_ERROR
     register()
-    atexit.register(_close_file)
+    atexit.register(close_scripted_file)
     return run(arguments[2:], program, Path(arguments[1]))
-
-
-def _close_file() -> None:
-    """Leaves nothing open: a scripted driver that was not run makes Blender's end wait forever."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
 
 
 if __name__ == "__main__":

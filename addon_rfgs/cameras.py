@@ -19,6 +19,8 @@ from .overrides import Ring
 
 #: Cameras set up around the scene where it brings none.
 GUESSED_CAMERAS = 8
+#: Opening angle of the longer side of a made-up camera, and the widest near walls [°].
+_FOV_DEG, _WIDEST_DEG = 60.0, 105.0
 #: Cameras inside a room keep this far from its walls [m].
 _FROM_WALLS_M = 0.2
 
@@ -139,9 +141,10 @@ def cameras_ready(
         guesses.append({**note, "why": "the scene has no perspective camera"})
     made = []
     width, height = picture_size(scene, None)
-    for index, matrix in enumerate(_stands(space, ring, min(width, height) / max(width, height))):
+    aspect = min(width, height) / max(width, height)
+    for index, (matrix, fov_deg) in enumerate(_stands(space, ring, aspect)):
         item = bpy.data.objects.new(f"RFGS guessed {index:02d}", bpy.data.cameras.new("guessed"))
-        item.data.angle = np.radians(ring.fov_deg)
+        item.data.angle = np.radians(fov_deg)
         matrix[:3, 3] /= unit_scale(scene)
         item.data.clip_start, item.data.clip_end = 0.05 / unit_scale(scene), 200 / unit_scale(scene)
         item.matrix_world = mathutils.Matrix(matrix.tolist())
@@ -155,15 +158,16 @@ def cameras_ready(
             bpy.data.cameras.remove(item.data)
 
 
-def _stands(space: Space, ring: Ring, aspect: float) -> list[np.ndarray]:
-    """Poses [4, 4] in metres of a ring around the middle of what moves, inside the walls.
+def _stands(space: Space, ring: Ring, aspect: float) -> list[tuple[np.ndarray, float]]:
+    """Poses [4, 4] in metres and opening angles [°] of a ring around the middle of what moves.
 
-    From where no radius is given, a sphere around what moves fits into the picture, whose shorter
-    side is `aspect` of the longer.
+    Where neither radius nor angle are given, a sphere around what moves fits into the picture,
+    whose shorter side is `aspect` of the longer; within walls as far as a wide lens allows.
     """
     low, high = space.movers
     centre, size = 0.5 * (low + high), float(np.linalg.norm(high - low))
-    half_angle = np.arctan(np.tan(np.radians(ring.fov_deg / 2)) * aspect)
+    fov_deg = ring.fov_deg or _FOV_DEG
+    half_angle = np.arctan(np.tan(np.radians(fov_deg / 2)) * aspect)
     radius = ring.radius_m or 0.5 * size / np.sin(half_angle)
     poses = []
     for index in range(ring.ring):
@@ -175,7 +179,11 @@ def _stands(space: Space, ring: Ring, aspect: float) -> list[np.ndarray]:
         if space.walled:
             inset = np.minimum(_FROM_WALLS_M, 0.25 * (space.bounds[1] - space.bounds[0]))
             place = np.clip(place, space.bounds[0] + inset, space.bounds[1] - inset)
-        poses.append(look_at(place, centre))
+        if ring.fov_deg is None:
+            sine = min(0.5 * size / float(np.linalg.norm(place - centre)), 0.9)
+            needed = 2 * np.degrees(np.arctan(np.tan(np.arcsin(sine)) / aspect))
+            fov_deg = float(np.clip(needed, _FOV_DEG, _WIDEST_DEG))
+        poses.append((look_at(place, centre), fov_deg))
     return poses
 
 

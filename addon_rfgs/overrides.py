@@ -34,8 +34,8 @@ class Ring:
     radius_m: float | None = None
     height_m: float | None = None
     """Above the lowest point of what moves."""
-    fov_deg: float = 60.0
-    """Opening angle of the longer side."""
+    fov_deg: float | None = None
+    """Opening angle of the longer side; None takes 60, and more where walls are near."""
 
 
 @dataclass(frozen=True)

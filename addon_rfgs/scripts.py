@@ -27,6 +27,12 @@ def disabled_drivers() -> list[dict[str, Any]]:
     ]
 
 
+def close_scripted_file() -> None:
+    """Closes a file with refused drivers: with one open, Blender as a module never ends."""
+    if disabled_drivers():
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+
+
 def startup_texts() -> list[Finding]:
     """Text blocks that ask to be run when the file opens."""
     return [

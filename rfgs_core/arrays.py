@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +29,10 @@ def save_arrays(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
 
 
 def load_arrays(
-    path: Path, remedy: str, shapes: Mapping[str, Shape | None] | None = None
+    path: Path,
+    remedy: str,
+    shapes: Mapping[str, Shape | None] | None = None,
+    unknown: Collection[str] = (),
 ) -> dict[str, np.ndarray]:
     """Reads all arrays of a file.
 
@@ -38,6 +41,7 @@ def load_arrays(
         remedy: What to do about a missing or damaged file, for the message.
         shapes: Arrays that must be there. Those with a shape must have it and hold finite
             numbers; None leaves both open.
+        unknown: Arrays in which a whole row may be NaN, for what is not known.
 
     Raises:
         RfgsError: There is no such file.
@@ -58,10 +62,19 @@ def load_arrays(
         raise
     except _DAMAGE as error:
         raise RfgsFormatError(f"{path}: damaged ({error}); {remedy}") from error
-    problem = _misfit(arrays, shapes or {})
+    known = {name: _without_unknown(arrays[name]) for name in unknown if name in arrays}
+    problem = _misfit({**arrays, **known}, shapes or {})
     if problem:
         raise RfgsFormatError(f"{path}: {problem}; {remedy}")
     return arrays
+
+
+def _without_unknown(values: np.ndarray) -> np.ndarray:
+    """Values with zeros in the rows that are all NaN."""
+    if values.dtype.kind != "f" or values.ndim < 2:
+        return values
+    unknown = np.isnan(values).all(axis=tuple(range(1, values.ndim)))
+    return np.where(unknown.reshape(-1, *[1] * (values.ndim - 1)), values.dtype.type(0), values)
 
 
 def _misfit(arrays: Mapping[str, np.ndarray], shapes: Mapping[str, Shape | None]) -> str:

@@ -294,9 +294,8 @@ class Sequence:
         """
         file = self.files.geometry(frame)
         self._index(frame)
-        return load_arrays(file, _NO_GEOMETRY, {"segment_velocity": ("person", 17, 3)})[
-            "segment_velocity"
-        ]
+        name = "segment_velocity"
+        return load_arrays(file, _NO_GEOMETRY, {name: ("person", 17, 3)}, unknown=(name,))[name]
 
     def people(self, frame: int) -> Int32[np.ndarray, "person"]:
         """Instance id of each person, in the order of `joints`."""
@@ -366,7 +365,7 @@ class Sequence:
     def _geometry(self, frame: int) -> dict[str, np.ndarray]:
         self._index(frame)
         shapes = {"vertices": ("vertex", 3), "joints": ("person", 17, 3)}
-        return load_arrays(self.files.geometry(frame), _NO_GEOMETRY, shapes)
+        return load_arrays(self.files.geometry(frame), _NO_GEOMETRY, shapes, unknown=("joints",))
 
 
 def _plane(path: Path, channel: str) -> Float32[np.ndarray, "h w"]:

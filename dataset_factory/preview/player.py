@@ -35,10 +35,15 @@ def player(sequence: Sequence, has: list[str]) -> dict[str, Any]:
         "frames": frames,
         "times": [sequence.time_s(frame) for frame in frames],
         "parents": list(PARENTS),
-        "joints": [_rounded(sequence.joints(frame)[..., :2]) for frame in frames],
+        "joints": [[_skeleton(person) for person in sequence.joints(frame)] for frame in frames],
         "actions": [sequence.actions(frame) for frame in frames],
         "cameras": [_camera(sequence, row, frames) for row in cameras[:4]],
     }
+
+
+def _skeleton(joints: np.ndarray) -> list[Any]:
+    """Joints from above; none where the scene does not tell them."""
+    return _rounded(joints[:, :2]) if np.isfinite(joints).all() else []
 
 
 def plan(sequence: Sequence) -> dict[str, Any]:
@@ -81,7 +86,9 @@ def _ground(sequence: Sequence) -> str:
     low, high = sequence.bounds_m
     vertices, faces = sequence.static_mesh()
     random = np.random.default_rng(0)
-    points, _ = surface_samples(vertices, faces, PLAN_SAMPLES, random)
+    points = np.zeros((0, 3))
+    if len(faces):  # Without a room the plan is blank.
+        points, _ = surface_samples(vertices, faces, PLAN_SAMPLES, random)
     above = points[:, 2] - low[2]
     points = points[(above > PLAN_SLICE_M[0]) & (above < PLAN_SLICE_M[1])]
     cells = np.maximum(np.ceil((high - low)[:2] * PLAN_PX_PER_M / 2), 1).astype(int)

@@ -12,6 +12,7 @@ from dataset_factory.blender import Blender
 from dataset_factory.bundle import read_bundle
 from dataset_factory.devices import choose_devices, radio_problems
 from dataset_factory.overrides import overrides_file
+from dataset_factory.radios import SCENE_RADIO, scene_radio
 from rfgs_core.files import read_json
 from rfgs_core.radio import Radio
 
@@ -62,6 +63,7 @@ def table(report: dict[str, Any]) -> str:
 
 def _add_radios(report: dict[str, Any], folder: Path, radios: list[Radio]) -> None:
     bundle, devices = read_bundle(folder), {}
+    radios = [scene_radio(bundle) if radio.name == SCENE_RADIO else radio for radio in radios]
     for radio in radios:
         devices[radio.name], guess = choose_devices(bundle, radio)
         report["guesses"] += [guess] if guess else []

@@ -56,15 +56,15 @@ def run(args: CheckArgs) -> int:
     from dataset_factory.blender import Blender
     from dataset_factory.overrides import label, read_options
     from dataset_factory.plan import whole_frames
+    from dataset_factory.radios import chosen_radios
     from dataset_factory.scene_check import check_file, has_errors, table
     from dataset_factory.scenes import find_scene
     from rfgs_core.files import write_json
-    from rfgs_core.radio import preset
 
     scene = find_scene(args.scene)
     said = read_options(args.options)
     frames = whole_frames(args.frames or str(said.pop("frames", "")))
-    radios = [preset(name) for name in args.radio]
+    radios = list(chosen_radios(args.radio).values())
     blender = Blender(scene.blend, args.blender)
     report = check_file(blender, frames, said, label(args.options), radios)
     if args.json is not None and str(args.json) == "-":

@@ -133,11 +133,20 @@ def _rest(report: dict[str, Any]) -> Iterator[str]:
         if row["what"] != "radio_material":
             label = "" if row["object"] == "the scene" else f" {row['object']}"
             rows.append([f"guessed {row['what']}{label}", f"{row['value']}: {row['why']}"])
-    for row in report["findings"]:
-        label = "" if row["object"] == "the scene" else f"{row['object']} "
-        remedy = f"; {row['remedy']}" if row["remedy"] else ""
-        rows.append([row["severity"], f"{label}{row['message']}{remedy}"])
-    yield from _aligned(rows)
+    yield from _aligned([*rows, *_findings(report["findings"])])
+
+
+def _findings(found: list[dict[str, Any]]) -> Iterator[list[str]]:
+    """One line per finding; objects of which the same is to be said share one."""
+    groups: dict[tuple[str, ...], list[str]] = {}
+    for row in found:
+        key = (row["severity"], row["message"], row["remedy"])
+        groups.setdefault(key, []).append(row["object"])
+    for (severity, message, remedy), names in groups.items():
+        label = "" if names == ["the scene"] else ", ".join(names[:3]) + " "
+        if len(names) > 3:
+            label = f"{', '.join(names[:3])} and {len(names) - 3} more: each "
+        yield [severity, f"{label}{message}" + (f"; {remedy}" if remedy else "")]
 
 
 def _aligned(rows: list[list[str]]) -> list[str]:

@@ -89,3 +89,18 @@ def test_damaged_files_are_named(
     errors = [line for line in answer.stderr.splitlines() if line.startswith("error:")]
     assert len(errors) == 1 and str(file) in errors[0], answer.stderr
     assert "Traceback" not in answer.stderr
+
+
+def test_findings_of_many_objects_share_a_line() -> None:
+    same = {"severity": "info", "message": "is hidden, left out", "remedy": ""}
+    findings = [{**same, "object": f"tree_{index}"} for index in range(9)]
+    scene = {"frames": [1, 2], "frame_start": 1, "frame_end": 2, "fps": 24.0}
+    report = {
+        "file": "x.blend",
+        "scene": {**scene, "unit_scale_m": 1.0, "bounds_m": None},
+        "lights": "the scene's own",
+        "findings": findings,
+        **{name: [] for name in ("objects", "instances", "cameras", "devices", "guesses")},
+    }
+    (line,) = [line for line in table(report).splitlines() if "left out" in line]
+    assert line.split(maxsplit=1)[1].startswith("tree_0, tree_1, tree_2 and 6 more: each is hidden")

@@ -84,7 +84,8 @@ def observe(sequence: Sequence, radio: str, frame: int) -> Observations:
             f"{sequence.name}, {radio}: the antennas move within a frame, and training takes one "
             "sample per frame; choose a radio whose antennas stand still"
         )
-    elements = sequence.layout(radio)
+    # The links that exist are those the channels were stored with.
+    elements = replace(sequence.layout(radio), measured=data["measured"].values)
     links, tones = _visible(sequence.splits["rf"][radio], elements, data.sizes["subcarrier"])
     csi, static = sequence.csi(radio, frame), sequence.csi_static(radio)
     seen = links[:, :, None] & tones

@@ -134,13 +134,18 @@ def matching_objects(patterns: Iterable[str], label: str) -> list[bpy.types.Obje
 def first_match(rules: dict[str, RadioMaterial], *names: str) -> RadioMaterial | None:
     """The first rule whose pattern fits one of `names`."""
     for pattern, value in rules.items():
-        if any(fnmatchcase(name, pattern) for name in names):
+        if any(_fits(name, pattern) for name in names):
             return value
     return None
 
 
+def _fits(name: str, pattern: str) -> bool:
+    """Whether a pattern means a name; a name with brackets means itself too."""
+    return name == pattern or fnmatchcase(name, pattern)
+
+
 def _matching(pattern: str, names: Iterable[str], label: str, what: str) -> list[str]:
-    found = [name for name in names if name == pattern or fnmatchcase(name, pattern)]
+    found = [name for name in names if _fits(name, pattern)]
     if not found:
         raise AddonError(f"{label}: no {what} matches {pattern!r}{closest(pattern, names)}")
     return found

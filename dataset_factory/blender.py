@@ -42,7 +42,7 @@ class Blender:
         """Runs one of the add-on's commands to its end.
 
         Args:
-            name: `export` or `groundtruth`.
+            name: `check`, `export` or `groundtruth`.
             *arguments: Its arguments.
             progress: Called with done and total after each picture.
 

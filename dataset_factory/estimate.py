@@ -48,7 +48,10 @@ def estimate(job: Job, known_frames: str) -> Estimate:
     Raises:
         RfgsError: The scene cannot be used, or its frames are not known.
     """
-    text = job.plan.frames or known_frames
+    ranged = job.plan.overrides.get("frame_range", "")
+    if isinstance(ranged, list):
+        ranged = ":".join(map(str, ranged))
+    text = job.plan.frames or str(ranged) or known_frames
     if not text:
         raise RfgsError(f"{job.blender.blend}: give the frames to plan for, as in --frames 1:60")
     frames = list(parse_frames(text))
@@ -57,7 +60,10 @@ def estimate(job: Job, known_frames: str) -> Estimate:
         _measure(job, frames)
         known = recalled(job)
         if known is None:
-            raise RfgsError("the measured frames left no pace; use --frames with at least three")
+            raise RfgsError(
+                f"--frames {text}: too few to tell a pace; give at least "
+                f"{max(2 * job.workers - 1, 2)} frames, or fewer --workers"
+            )
     else:
         known = found
     return _scaled(known, len(frames), found is None)

@@ -51,6 +51,7 @@ def generate(job: Job) -> bool:
     """
     if not open_folder(job):
         return False
+    asked = job.plan
     begun = (job.out / "dataset.json").exists()
     logger.info("%s: %s", job.out, "continuing" if begun else "a new dataset")
     with locked(job):
@@ -86,7 +87,8 @@ def generate(job: Job) -> bool:
                 DatasetInfo(made, info.config, info.root_seed, info.has, info.sequences),
             )
     shutil.rmtree(job.work)
-    remember(job, len(sequence.frames), len(sequence.cameras), needed)
+    # Later estimates ask before they know the scene's radio.
+    remember(replace(job, plan=asked), len(sequence.frames), len(sequence.cameras), needed)
     return True
 
 

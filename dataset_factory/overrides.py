@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,9 +15,9 @@ from typing import Any
 
 import tyro
 import yaml
+from yaml.composer import ComposerError
 
 from rfgs_core.errors import RfgsError, RfgsFormatError
-from rfgs_core.files import write_json
 
 _Names = tyro.conf.UseAppendAction[tuple[str, ...]]
 
@@ -62,7 +64,7 @@ def read_options(options: SceneOptions) -> dict[str, Any]:
 
     Raises:
         RfgsError: There is no such file, or an option has no `=`.
-        RfgsFormatError: The file is no YAML mapping.
+        RfgsFormatError: The file is no YAML mapping, or a value is no text or finite number.
     """
     said = {} if options.scene_config is None else _read_yaml(options.scene_config)
     for name in ("fps", "unit_scale", "room", "frame_range"):
@@ -83,6 +85,8 @@ def read_options(options: SceneOptions) -> dict[str, Any]:
             said[name] = {**rules, **_mapping(name, said.get(name)), **rules}
     if options.ring is not None:
         said["cameras"] = {**_mapping("cameras", said.get("cameras")), "ring": options.ring}
+    for name, value in said.items():
+        _refuse_strange(f"{label(options)}: {name}", value)
     return said
 
 
@@ -99,8 +103,23 @@ def overrides_file(said: dict[str, Any], label: str = "overrides") -> Iterator[l
         return
     with TemporaryDirectory(prefix="rfgs-") as folder:
         file = Path(folder) / "overrides.json"
-        write_json(file, {**said, "label": label})
+        # Not sorted: of two patterns that fit a name, the first decides.
+        file.write_text(json.dumps({**said, "label": label}, allow_nan=False), "utf-8")
         yield ["--overrides", str(file)]
+
+
+def _refuse_strange(label: str, value: Any) -> None:
+    """Refuses what JSON cannot hand over: dates, sets, bytes, numbers without end."""
+    if isinstance(value, list):
+        for item in value:
+            _refuse_strange(label, item)
+    elif isinstance(value, dict):
+        for key, item in value.items():
+            _refuse_strange(f"{label}: {key}", item)
+    elif value is None or isinstance(value, (str, bool)):
+        return
+    elif not isinstance(value, (int, float)) or not abs(value) < math.inf or abs(value) > 1e300:
+        raise RfgsFormatError(f"{label}: expected text or a finite number, got {value!r:.60}")
 
 
 def _rule(text: str) -> tuple[str, str]:
@@ -125,7 +144,16 @@ def _mapping(name: str, value: Any) -> dict[str, Any]:
 
 
 class _Loader(yaml.SafeLoader):
-    """YAML 1.2 scalars only: `1:30` is no number in base 60, `on` is no truth; no key twice."""
+    """YAML 1.2 scalars only: `1:30` is no number in base 60, `on` is no truth; no key twice.
+
+    No aliases either: none is needed, and a few nested ones make a file of terabytes.
+    """
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        if self.check_event(yaml.AliasEvent):
+            event = self.peek_event()
+            raise ComposerError(None, None, f"found the alias {event.anchor!r}", event.start_mark)
+        return super().compose_node(parent, index)
 
 
 _Loader.yaml_implicit_resolvers = {}
@@ -155,7 +183,12 @@ def _construct_mapping(loader: _Loader, node: yaml.MappingNode) -> dict[Any, Any
     return dict(pairs)
 
 
+def _construct_int(loader: _Loader, node: yaml.ScalarNode) -> int:
+    return int(loader.construct_scalar(node))  # SafeLoader takes 010 for 8.
+
+
 _Loader.add_constructor("tag:yaml.org,2002:map", _construct_mapping)
+_Loader.add_constructor("tag:yaml.org,2002:int", _construct_int)
 
 
 def _read_yaml(path: Path) -> dict[str, Any]:
@@ -171,6 +204,8 @@ def _read_yaml(path: Path) -> dict[str, Any]:
         reason = getattr(error, "problem", None) or "no YAML"
         remedy = "; put names that begin with * in quotes" if "alias" in str(error) else ""
         raise RfgsFormatError(f"{path}{line}: {reason}{remedy}") from error
+    except (ValueError, RecursionError) as error:
+        raise RfgsFormatError(f"{path}: no usable YAML ({error})") from error
     if values is None:
         return {}
     if not isinstance(values, dict):

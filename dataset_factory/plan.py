@@ -15,7 +15,7 @@ from rfgs_core.dataset.names import SequenceFiles
 from rfgs_core.errors import RfgsError
 from rfgs_core.frames import parse_frames
 from rfgs_core.radio import PRESETS, Radio, preset
-from rfgs_core.radio.files import checked_radio
+from rfgs_core.radio.files import checked_radio, radio_values
 
 #: More packets per frame than any radio sends.
 MAX_PACKETS = 10_000
@@ -56,7 +56,7 @@ class Plan:
     overrides: dict[str, Any] = field(default_factory=dict)
     """What the user says about the scene, in the words of the YAML file."""
     custom_radios: dict[str, dict[str, Any]] = field(default_factory=dict)
-    """All fields of the radios that are no presets, by name."""
+    """All fields of the radios that are no presets, by name, as JSON holds them."""
 
     def radio(self, name: str) -> Radio:
         """One of the plan's radios, with the packets asked for."""
@@ -68,7 +68,7 @@ class Plan:
 
     def with_radio(self, radio: Radio) -> Plan:
         """The plan with another definition of one of its radios."""
-        return replace(self, custom_radios={**self.custom_radios, radio.name: asdict(radio)})
+        return replace(self, custom_radios={**self.custom_radios, radio.name: radio_values(radio)})
 
 
 def make_plan(scene: Scene, radios: tuple[str, ...], frames: str, **options: Any) -> Plan:
@@ -98,7 +98,7 @@ def make_plan(scene: Scene, radios: tuple[str, ...], frames: str, **options: Any
         blend_sha256=blend_digest(scene),
         radios=sorted(chosen),
         custom_radios={
-            name: asdict(radio) for name, radio in chosen.items() if name not in PRESETS
+            name: radio_values(radio) for name, radio in chosen.items() if name not in PRESETS
         },
         frames=whole_frames(frames),
         **options,

@@ -57,14 +57,16 @@ def scene_radio(bundle: Bundle) -> Radio:
         for row in bundle.devices
         if row["role"] != "NONE" and row["radio"] in ("any", SCENE_RADIO)
     ]
-    file = bundle.path / "bundle.json"
     if not rows:
         raise RfgsError(
             f"{bundle.info['blend_name']}: --radio {SCENE_RADIO}: no Empty has a role in the "
             f"radio {SCENE_RADIO!r} or 'any'; add Empties and set their radio properties"
         )
     if "rf" not in rows[0]:
-        raise RfgsError(f"{file}: devices hold no radio properties; export the scene again")
+        raise RfgsError(
+            f"{bundle.info['blend_name']}: --radio {SCENE_RADIO}: devices of the scene's "
+            "configuration hold no radio properties; describe the radio in a file and name that"
+        )
     first: dict[str, Any] = rows[0]["rf"]
     for row in rows[1:]:
         for name, value in first.items():

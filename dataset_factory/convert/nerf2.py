@@ -16,6 +16,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 from tqdm import tqdm
 
+from dataset_factory.bundle import sanitised
 from rfgs_core.dataset import Sequence
 from rfgs_core.dataset.pictures import write_png
 from rfgs_core.errors import RfgsError
@@ -39,10 +40,14 @@ def write(sequence: Sequence, out: Path) -> None:
         layout = sequence.layout(radio)
         if sequence.radio(radio)["rx_xyz"].ndim != 2:
             raise RfgsError(f"{sequence.name}, {radio}: antennas move, a gateway stands still")
+        folders: set[str] = set()
         for number, device in enumerate(sequence.devices(radio)):
+            folder = sanitised(device.name)
+            folder = f"{folder}_{number}" if folder in folders or not folder else folder
+            folders.add(folder)
             elements = np.flatnonzero(layout.rx_device == number)
             if len(elements) >= 2 and layout.measured[:, elements].any():
-                _write_gateway(sequence, radio, number, out / radio / device.name)
+                _write_gateway(sequence, radio, number, out / radio / folder)
                 written += 1
     if not written:
         raise RfgsError(f"{sequence.name}: no receiving device has two elements, so no spectra")

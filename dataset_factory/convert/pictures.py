@@ -56,9 +56,11 @@ def static_points(sequence: Sequence) -> tuple[np.ndarray, np.ndarray]:
     """Points on everything that stands still, coloured by the cameras of the first frame.
 
     Returns:
-        Positions (point, 3) [m] and sRGB colours (point, 3), uint8.
+        Positions (point, 3) [m] and sRGB colours (point, 3), uint8; none without a room.
     """
     vertices, faces = sequence.static_mesh()
+    if not len(faces):
+        return np.zeros((0, 3)), np.zeros((0, 3), np.uint8)
     random = np.random.default_rng(sub_seed(0, sequence.name, "static points"))
     points, _ = surface_samples(vertices, faces, POINTS, random)
     total, count = np.zeros((len(points), 3)), np.zeros(len(points))

@@ -78,11 +78,13 @@ def checked_radio(source: str, values: dict[str, Any]) -> Radio:
 
 def radio_text(radio: Radio) -> str:
     """A radio as YAML that `read_radio` takes."""
-    values = {
-        name: list(value) if isinstance(value, tuple) else value
-        for name, value in asdict(radio).items()
-    }
-    return yaml.safe_dump(values, sort_keys=False, default_flow_style=None)
+    return yaml.safe_dump(radio_values(radio), sort_keys=False, default_flow_style=None)
+
+
+def radio_values(radio: Radio) -> dict[str, Any]:
+    """All fields of a radio in JSON's types, so that they equal what is read back."""
+    values = asdict(radio)
+    return {name: list(row) if isinstance(row, tuple) else row for name, row in values.items()}
 
 
 def radio_problems(radio: Radio) -> list[str]:

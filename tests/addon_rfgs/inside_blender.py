@@ -18,6 +18,7 @@ from addon_rfgs import exr, naming, ply, rig, tables
 from addon_rfgs.errors import AddonError
 from addon_rfgs.frames import chosen_frames
 from addon_rfgs.override_file import read_overrides
+from addon_rfgs.overrides import RadioMaterial, first_match
 
 COLUMNS = [
     *("x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2", "opacity"),
@@ -229,3 +230,11 @@ def test_devices_look_where_they_are_told(tmp_path: Path) -> None:
     assert tuple(boresight) == pytest.approx(tuple(expected), abs=1e-6)
     level = mathutils.Quaternion(row["quat_wxyz"]) @ mathutils.Vector((0, 1, 0))
     assert level.z == pytest.approx(0, abs=1e-6)
+
+
+def test_names_with_brackets_mean_themselves_and_the_first_rule_decides() -> None:
+    rules = {"Paint [matt]": RadioMaterial("brick"), "Paint*": RadioMaterial("wood")}
+    assert first_match(rules, "Paint [matt]") == RadioMaterial("brick")
+    assert first_match(rules, "Paint m") == RadioMaterial("brick")
+    assert first_match(rules, "Paint") == RadioMaterial("wood")
+    assert first_match(rules, "Stone") is None

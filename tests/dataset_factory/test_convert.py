@@ -22,6 +22,7 @@ from dataset_factory.convert import FORMATS, convert
 from dataset_factory.impair import impair_dataset
 from rfgs_core.dataset import Sequence, open_dataset
 from rfgs_core.dataset.csi_store import write_csi
+from rfgs_core.dataset.mesh_ply import write_mesh
 from rfgs_core.dataset.writer import finish_dataset, write_sequence_info
 from rfgs_core.errors import RfgsError
 from rfgs_core.radio.impairments import IMPAIRMENT_PRESETS
@@ -260,3 +261,34 @@ def test_wrong_requests_are_explained(tiny_copy: Path, tmp_path: Path) -> None:
         convert(tiny_copy, "d-nerf", tmp_path / "d")
     assert not (tmp_path / "d").exists()
     assert not list(tmp_path.glob(".tmp-*"))
+
+
+def test_device_names_are_no_paths(tiny_copy: Path, tmp_path: Path) -> None:
+    file = open_dataset(tiny_copy).sequence().files.info
+    info = json.loads(file.read_text())
+    for row, name in zip(info["devices"]["wifi"], ("../../a", "AP 1", "AP_1", ""), strict=True):
+        row["name"] = name
+    file.write_text(json.dumps(info))
+    out = tmp_path / "below" / "nerf2"
+    convert(tiny_copy, "nerf2", out)
+    assert sorted(path.name for path in (out / "wifi").iterdir()) == [
+        "AP_1",
+        "AP_1_2",
+        "_3",
+        "______a",
+    ]
+    assert [path.name for path in out.iterdir()] == ["wifi"]
+
+
+@pytest.mark.parametrize("target", ["colmap", "nerfstudio"])
+def test_scenes_without_a_room_start_without_points(
+    tiny_copy: Path, tmp_path: Path, target: str
+) -> None:
+    files = open_dataset(tiny_copy).sequence().files
+    write_mesh(files.static_mesh, np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32))
+    convert(tiny_copy, target, tmp_path / "out")
+    if target == "colmap":
+        text = (tmp_path / "out" / "sparse" / "0" / "points3D.txt").read_text()
+        assert text.count("\n") == 1
+    else:
+        assert len(PlyData.read(str(tmp_path / "out" / "points.ply"))["vertex"].data) == 0

@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+import json
+import math
 from pathlib import Path
 
 import pytest
 
-from dataset_factory.overrides import SceneOptions, read_options
+from dataset_factory.overrides import SceneOptions, overrides_file, read_options
 from rfgs_core.errors import RfgsError
 
 _FILE = """
@@ -76,6 +78,12 @@ def test_options_go_before_the_file_and_lists_add_up(config: Path) -> None:
         ("1: 2\n", ["expected a name before the colon"]),
         ("fps: !!python/object/apply:os.system ['touch canary']\n", ["could not determine"]),
         ("\x00", ["scene.yaml"]),
+        ("fps: 1e400\n", ["fps: expected text or a finite number"]),
+        ("fps: 9" + "0" * 5000 + "\n", ["no usable YAML"]),
+        ("people: !!set {Anna}\n", ["people: expected text"]),
+        ("devices: [{position_m: [1, 2, !!timestamp 2020-01-01]}]\n", ["devices: position_m:"]),
+        ("drop: &a [x]\npeople: *a\n", ["line 2", "alias 'a'", "in quotes"]),
+        ("drop: " + "[" * 5000, ["no usable YAML"]),
     ],
 )
 def test_bad_files_get_one_line(tmp_path: Path, text: str, words: list[str]) -> None:
@@ -86,6 +94,32 @@ def test_bad_files_get_one_line(tmp_path: Path, text: str, words: list[str]) -> 
     message = str(caught.value)
     assert all(word in message for word in words) and "\n" not in message, message
     assert message.startswith(str(file))
+
+
+def test_whole_numbers_are_decimal(tmp_path: Path) -> None:
+    (tmp_path / "scene.yaml").write_text("fps: 08\ncameras: 010\n")
+    said = read_options(SceneOptions(scene_config=tmp_path / "scene.yaml"))
+    assert said == {"fps": 8, "cameras": 10}
+
+
+def test_numbers_without_end_are_refused_as_options() -> None:
+    with pytest.raises(RfgsError, match="command line: fps: expected"):
+        read_options(SceneOptions(fps=math.nan))
+    with pytest.raises(RfgsError, match="command line: bounds_m: expected"):
+        read_options(SceneOptions(bounds=(0, 0, 0, 1, 1, math.inf)))
+
+
+def test_rules_reach_the_scene_in_their_order(tmp_path: Path) -> None:
+    file = tmp_path / "scene.yaml"
+    file.write_text('materials: {"Wall*": brick, "*": wood}\n')
+    said = read_options(SceneOptions(scene_config=file, material=("Wallpaper=glass",)))
+    with overrides_file(said) as (_, name):
+        handed = json.loads(Path(name).read_text())
+    assert list(handed["materials"].items()) == [
+        ("Wallpaper", "glass"),
+        ("Wall*", "brick"),
+        ("*", "wood"),
+    ]
 
 
 def test_missing_file_and_missing_sign(tmp_path: Path) -> None:

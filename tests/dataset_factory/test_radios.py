@@ -10,8 +10,11 @@ from typing import Any
 
 import pytest
 
+from dataset_factory.plan import make_plan
 from dataset_factory.radios import chosen_radios, scene_radio
+from dataset_factory.scenes import find_scene
 from rfgs_core.errors import RfgsError
+from rfgs_core.files import read_json, write_json
 from rfgs_core.radio import preset
 from rfgs_core.sync import SCENE_FIELDS
 
@@ -62,3 +65,24 @@ def test_empties_that_do_not_fit_are_named() -> None:
         scene_radio(bundle(empty("a"), empty("b", power_dbm=7.0)))
     with pytest.raises(RfgsError, match=r"room\.blend: Empty 'a': freq_min_hz, freq_max_hz"):
         scene_radio(bundle(empty("a", freq_max_hz=1e9)))
+
+
+def test_a_plan_with_a_radio_of_ones_own_equals_its_stored_self(tmp_path: Path) -> None:
+    """Otherwise no such dataset could be continued."""
+    (tmp_path / "lab.yaml").write_text("like: wifi24\nheights_m: [1, 2, 3]\n")
+    (tmp_path / "room.blend").write_bytes(b"BLENDER")
+    scene = find_scene(str(tmp_path / "room.blend"))
+    names = (str(tmp_path / "lab.yaml"), "scene")
+    more: dict[str, Any] = {"cameras": 0, "resolution": 64, "samples": 1, "depth": 1, "seed": 0}
+    plan = make_plan(scene, names, "1:2", shadow="hard", images=False, **more)
+    found = plan.with_radio(replace(preset("wifi"), name="scene", tx_offset_m=(0.0, 0.1, 0.2)))
+    for wanted in (plan, found):
+        write_json(tmp_path / "plan.json", asdict(wanted))
+        assert read_json(tmp_path / "plan.json") == asdict(wanted)
+    assert plan.radio("lab") == replace(preset("wifi24"), name="lab", heights_m=(1.0, 2.0, 3.0))
+    assert found.radio("scene").tx_offset_m == (0.0, 0.1, 0.2)
+
+
+def test_devices_without_properties_make_no_radio() -> None:
+    with pytest.raises(RfgsError, match="hold no radio properties; describe the radio in a file"):
+        scene_radio(bundle({"name": "a", "radio": "any", "role": "ACCESS_POINT"}))

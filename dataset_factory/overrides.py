@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,10 +13,9 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import tyro
-import yaml
-from yaml.composer import ComposerError
 
 from rfgs_core.errors import RfgsError, RfgsFormatError
+from rfgs_core.yaml_file import read_yaml
 
 _Names = tyro.conf.UseAppendAction[tuple[str, ...]]
 
@@ -143,69 +141,8 @@ def _mapping(name: str, value: Any) -> dict[str, Any]:
     return value
 
 
-class _Loader(yaml.SafeLoader):
-    """YAML 1.2 scalars only: `1:30` is no number in base 60, `on` is no truth; no key twice.
-
-    No aliases either: none is needed, and a few nested ones make a file of terabytes.
-    """
-
-    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        if self.check_event(yaml.AliasEvent):
-            event = self.peek_event()
-            raise ComposerError(None, None, f"found the alias {event.anchor!r}", event.start_mark)
-        return super().compose_node(parent, index)
-
-
-_Loader.yaml_implicit_resolvers = {}
-for _tag, _form, _first in (
-    ("null", r"~|null|", [*"~n", ""]),
-    ("bool", r"true|false", [*"tf"]),
-    ("int", r"[-+]?[0-9]+", [*"-+0123456789"]),
-    ("float", r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?", [*"-+.0123456789"]),
-):
-    _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{_tag}", re.compile(f"({_form})$"), _first)
-
-
-def _construct_mapping(loader: _Loader, node: yaml.MappingNode) -> dict[Any, Any]:
-    pairs = [
-        (loader.construct_object(k, True), loader.construct_object(v, True)) for k, v in node.value
-    ]
-    keys = [key for key, _ in pairs]
-    for key in keys:
-        if not isinstance(key, str):
-            raise yaml.constructor.ConstructorError(
-                None, None, f"expected a name before the colon, got {key!r}", node.start_mark
-            )
-        if keys.count(key) > 1:
-            raise yaml.constructor.ConstructorError(
-                None, None, f"the key {key!r} stands twice", node.start_mark
-            )
-    return dict(pairs)
-
-
-def _construct_int(loader: _Loader, node: yaml.ScalarNode) -> int:
-    return int(loader.construct_scalar(node))  # SafeLoader takes 010 for 8.
-
-
-_Loader.add_constructor("tag:yaml.org,2002:map", _construct_mapping)
-_Loader.add_constructor("tag:yaml.org,2002:int", _construct_int)
-
-
 def _read_yaml(path: Path) -> dict[str, Any]:
-    try:
-        values = yaml.load(path.read_text("utf-8"), Loader=_Loader)
-    except OSError as error:
-        raise RfgsError(f"{path}: cannot be read ({error.strerror})") from error
-    except UnicodeDecodeError as error:
-        raise RfgsFormatError(f"{path}: expected a YAML text file") from error
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        line = f", line {mark.line + 1}" if mark else ""
-        reason = getattr(error, "problem", None) or "no YAML"
-        remedy = "; put names that begin with * in quotes" if "alias" in str(error) else ""
-        raise RfgsFormatError(f"{path}{line}: {reason}{remedy}") from error
-    except (ValueError, RecursionError) as error:
-        raise RfgsFormatError(f"{path}: no usable YAML ({error})") from error
+    values = read_yaml(path)
     if values is None:
         return {}
     if not isinstance(values, dict):

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Float64, Int
 
-from rfgs_core.radio.layout import DevicePose, layout
+from rfgs_core.radio.layout import NEAREST_ANTENNAS_M, DevicePose, layout, nearest_m
 from rfgs_core.radio.materials import MATERIALS
 from rfgs_core.radio.presets import Radio
 
@@ -56,7 +56,7 @@ def check_devices(
     devices: list[DevicePose],
     meshes: Iterable[_Mesh],
 ) -> list[str]:
-    """Lists devices that are outside the scene or inside a closed object.
+    """Lists devices that are outside the scene, inside a closed object or inside each other.
 
     Args:
         radio: The radio the devices belong to.
@@ -85,6 +85,7 @@ def check_devices(
                         f"{device.name!r} of radio {radio.name!r} are outside the scene; move or "
                         "turn the device, or use a radio with a shorter array"
                     )
+    problems += _coincident(radio, devices)
     volume = float(np.prod(np.maximum(bounds_m[1] - bounds_m[0], 1e-6)))
     for name, vertices, faces in meshes:
         if not len(faces):
@@ -100,6 +101,24 @@ def check_devices(
             for index in near[np.abs(turns) > 0.5]
         )
     return problems
+
+
+def _coincident(radio: Radio, devices: list[DevicePose]) -> list[str]:
+    """Pairs of devices of which one sends from where the other hears."""
+    antennas = layout(radio, devices)
+    found: dict[tuple[int, int], str] = {}
+    for tx, rx in antennas.device_pairs:
+        places = (
+            antennas.tx_xyz[antennas.tx_device == tx],
+            antennas.rx_xyz[antennas.rx_device == rx],
+        )
+        pair = min(tx, rx), max(tx, rx)
+        if tx != rx and pair not in found and nearest_m(*places) < NEAREST_ANTENNAS_M:
+            found[pair] = (
+                f"antennas of devices {devices[pair[0]].name!r} and {devices[pair[1]].name!r} of "
+                f"radio {radio.name!r} are in the same place; move one"
+            )
+    return list(found.values())
 
 
 def winding_number(

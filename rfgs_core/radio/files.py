@@ -3,24 +3,22 @@
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from dataclasses import MISSING, Field, asdict, fields
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
-import numpy as np
 import yaml
 
 from rfgs_core.errors import RfgsError
+from rfgs_core.files import read_json
 from rfgs_core.radio.antennas import PATTERNS, POLARIZATIONS
-from rfgs_core.radio.layout import DevicePose, layout
+from rfgs_core.radio.layout import NEAREST_ANTENNAS_M, DevicePose, layout, nearest_m
 from rfgs_core.radio.presets import PRESETS, Radio, preset
+from rfgs_core.yaml_file import read_yaml
 
 SUFFIXES = (".json", ".yaml", ".yml")
-#: Antennas closer than this have no far field to speak of, and no finite channel at zero [m].
-NEAREST_ANTENNAS_M = 1e-3
 #: Elements per device beyond which something else was meant.
 MOST_ELEMENTS = 4096
 
@@ -121,10 +119,7 @@ def _antenna_problems(radio: Radio) -> list[str]:
         few = radio.num_devices < 2
         return ["own_device_links: excluded leaves a single device no link"] if few else []
     alone = layout(radio, [DevicePose("", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))])
-    nearest = min(
-        float(np.linalg.norm(alone.rx_xyz - place, axis=1).min()) for place in alone.tx_xyz
-    )
-    if nearest < NEAREST_ANTENNAS_M:
+    if nearest_m(alone.tx_xyz, alone.rx_xyz) < NEAREST_ANTENNAS_M:
         return [
             "tx_offset_m: a transmitting element stands in a receiving one; move it, or set "
             "own_device_links to excluded"
@@ -136,16 +131,7 @@ def _mapping(path: Path) -> dict[str, Any]:
     """The mapping a file holds."""
     if path.suffix.lower() not in SUFFIXES:
         raise RfgsError(f"{path}: expected a radio in a file ending in {', '.join(SUFFIXES)}")
-    try:
-        text = path.read_text("utf-8")
-        value = json.loads(text) if path.suffix.lower() == ".json" else yaml.safe_load(text)
-    except FileNotFoundError as error:
-        raise RfgsError(f"{path}: no such file") from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise RfgsError(f"{path}: cannot be read ({error})") from error
-    except (ValueError, RecursionError, yaml.YAMLError) as error:
-        reason = " ".join(str(error).split())
-        raise RfgsError(f"{path}: no valid {path.suffix[1:].upper()} ({reason})") from error
+    value = read_json(path) if path.suffix.lower() == ".json" else read_yaml(path)
     if not isinstance(value, dict):
         raise RfgsError(f"{path}: expected fields and values, got {type(value).__name__}")
     return value
@@ -180,7 +166,7 @@ def _converted(source: str, name: str, value: Any) -> Any:
 
 
 def _number(source: str, name: str, value: Any) -> float:
-    """A finite number; YAML reads 5.8e9 as text, so that is taken too."""
+    """A finite number; one in quotes is taken too."""
     try:
         number = math.nan if isinstance(value, bool) else float(value)
     except (TypeError, ValueError, OverflowError):

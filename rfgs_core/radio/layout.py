@@ -14,6 +14,9 @@ from rfgs_core.rotations import rotation_rows
 
 Role = Literal["ACCESS_POINT", "TRANSMITTER", "RECEIVER"]
 
+#: Antennas closer than this have no far field to speak of, and no finite channel at zero [m].
+NEAREST_ANTENNAS_M = 1e-3
+
 
 @dataclass(frozen=True)
 class DevicePose:
@@ -119,6 +122,11 @@ def layout(radio: Radio, devices: list[DevicePose]) -> Layout:
         tx_site=tx_site,
         rx_site=rx_site,
     )
+
+
+def nearest_m(tx_xyz: Float64[np.ndarray, "tx 3"], rx_xyz: Float64[np.ndarray, "rx 3"]) -> float:
+    """Least distance of a transmitting and a receiving element [m]."""
+    return min(float(np.linalg.norm(rx_xyz - place, axis=1).min()) for place in tx_xyz)
 
 
 def _spacing_m(given_m: float, radio: Radio) -> float:

@@ -73,3 +73,15 @@ def test_arrays_that_reach_through_a_wall_are_named() -> None:
     problems = check_devices(preset("uwb"), BOUNDS_M, [at(0.2, 1.05, 1.2)], [])
     assert len(problems) == 1 and "3 of 16 antennas of device 'ap'" in problems[0]
     assert check_devices(preset("uwb"), BOUNDS_M, [at(0.2, 2.5, 1.2)], []) == []
+
+
+def test_devices_in_the_same_place_are_refused_where_they_hear_each_other() -> None:
+    commodity = preset("wifi_commodity")
+    devices = [replace(at(1.0, 1.0, 1.0 + 0.5 * k), name=f"ap{k}") for k in range(3)]
+    assert check_devices(commodity, BOUNDS_M, devices, []) == []
+    devices[2] = replace(devices[0], name="twin")
+    (problem,) = check_devices(commodity, BOUNDS_M, devices, [])
+    assert "devices 'ap0' and 'twin'" in problem and "move one" in problem
+    # Radars hear only themselves, and a transmitter below its receiver may have a twin.
+    assert check_devices(preset("mmwave"), BOUNDS_M, devices, []) == []
+    assert check_devices(preset("wifi"), BOUNDS_M, devices, []) == []

@@ -39,7 +39,10 @@ def test_a_file_may_start_from_a_preset(tmp_path: Path) -> None:
         ("like: lidar\n", "like: expected one of wifi"),
         ("like: [wifi]\n", "like: expected one of wifi"),
         ("like: wifi\nspeed: 3\n", "unknown field 'speed'"),
-        ("like: wifi\n3: 3\n", "unknown field '3'"),
+        ("like: wifi\n3: 3\n", "expected a name before the colon, got 3"),
+        ("like: wifi\nlike: uwb\n", "line 1: the key 'like' stands twice"),
+        ("like: wifi\nnum_subcarriers: 1:30\n", "expected a whole number, got '1:30'"),
+        ("like: wifi\nheights_m: &a [1]\ntx_offset_m: *a\n", "line 3: found the alias 'a'"),
         ("name: x\n", "field 'freq_min_hz' is missing"),
         ("like: wifi\nname: wifi\nrx_rows: 2\n", "'wifi' is a preset's name"),
         ("like: wifi\nname: a/b\n", "name: 'a/b': expected letters"),
@@ -53,7 +56,7 @@ def test_a_file_may_start_from_a_preset(tmp_path: Path) -> None:
         ("like: wifi\nown_device_links: excluded\nnum_devices: 1\n", "no link"),
         ("like: wifi\nplacement: ceiling\n", "placement: expected corners or walls"),
         ("like: wifi\nfreq_max_hz: 5e9\n", "expected an ascending band"),
-        ("like: wifi\nfreq_max_hz: .inf\n", "freq_max_hz: expected a finite number, got inf"),
+        ("like: wifi\nfreq_max_hz: .inf\n", "freq_max_hz: expected a finite number, got '.inf'"),
         ("like: wifi\npower_dbm: loud\n", "power_dbm: expected a finite number, got 'loud'"),
         ("like: wifi\nheights_m: []\n", "heights_m: expected at least one height"),
         ("like: wifi\ntx_offset_m: [0, 1]\n", "tx_offset_m: expected a list of 3 numbers"),
@@ -77,5 +80,8 @@ def test_files_that_are_not_there_or_not_text(tmp_path: Path) -> None:
     with pytest.raises(RfgsError, match=r"ending in \.json"):
         read_radio(tmp_path / "radio.txt")
     (tmp_path / "bin.json").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(RfgsError, match="cannot be read"):
+    with pytest.raises(RfgsError, match=r"bin\.json: expected JSON"):
         read_radio(tmp_path / "bin.json")
+    (tmp_path / "bin.yaml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(RfgsError, match="expected a YAML text file"):
+        read_radio(tmp_path / "bin.yaml")

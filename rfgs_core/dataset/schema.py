@@ -14,6 +14,7 @@ from jaxtyping import Float64
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.files import read_json
 from rfgs_core.radio import DevicePose, Radio
+from rfgs_core.radio.antennas import PATTERNS, POLARIZATIONS
 from rfgs_core.radio.layout import Role
 from rfgs_core.radio.presets import OwnLinks
 
@@ -170,7 +171,7 @@ def radio_from_json(path: Path, values: dict[str, Any]) -> Radio:
     """Builds a radio from the fields stored in a sequence.
 
     Raises:
-        RfgsFormatError: A field is missing, unknown or of another type.
+        RfgsFormatError: A field is missing, unknown, of another type or impossible.
     """
     fixed: dict[str, Any] = {
         key: tuple(v) if isinstance(v, list) else v for key, v in values.items()
@@ -186,9 +187,18 @@ def radio_from_json(path: Path, values: dict[str, Any]) -> Radio:
                 f"{' or '.join(links) if kind == 'OwnLinks' else spec.type}, got {value!r}"
             )
     try:
-        return Radio(**fixed)
+        radio = Radio(**fixed)
     except TypeError as error:
         raise RfgsFormatError(f"{path}: radios: {error}") from error
+    counts = ("num_subcarriers", "tx_rows", "tx_cols", "rx_rows", "rx_cols", "samples_per_frame")
+    wrong = [name for name in counts if getattr(radio, name) < 1]
+    wrong += [] if 0.0 < radio.freq_min_hz < radio.freq_max_hz else ["freq_max_hz"]
+    wrong += [] if radio.pattern in PATTERNS else ["pattern"]
+    wrong += [] if radio.polarization in POLARIZATIONS else ["polarization"]
+    if wrong:
+        value = getattr(radio, wrong[0])
+        raise RfgsFormatError(f"{path}: radio {radio.name!r}: {wrong[0]}: {value!r} is impossible")
+    return radio
 
 
 def device_pose(values: dict[str, Any]) -> DevicePose:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +15,10 @@ from torch.utils.data import DataLoader
 import rfgs_core
 from rfgs_core.dataset import open_dataset
 from rfgs_core.dataset.csi_store import chunk_file
+from rfgs_core.dataset.schema import radio_from_json
 from rfgs_core.dataset.torch_dataset import FrameDataset
 from rfgs_core.errors import RfgsError, RfgsFormatError
+from rfgs_core.radio import preset
 
 
 @pytest.fixture
@@ -236,3 +239,22 @@ def test_wrong_questions_get_one_clear_line(copy: Path, tmp_path: Path) -> None:
     edit(copy / "dataset.json", manifest_sha256="")
     with pytest.raises(RfgsError, match="unfinished"):
         open_dataset(copy)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("num_subcarriers", 0),
+        ("samples_per_frame", 0),
+        ("rx_cols", -1),
+        ("freq_min_hz", 0.0),
+        ("freq_max_hz", float("nan")),
+        ("pattern", "yagi"),
+        ("polarization", "RHCP"),
+    ],
+)
+def test_impossible_radios_are_named(tmp_path: Path, field: str, value: object) -> None:
+    values = asdict(preset("wifi"))
+    assert radio_from_json(tmp_path / "sequence.json", values) == preset("wifi")
+    with pytest.raises(RfgsFormatError, match=r"sequence\.json: radio 'wifi': .* is impossible"):
+        radio_from_json(tmp_path / "sequence.json", {**values, field: value})

@@ -45,7 +45,7 @@ class Climb:
             step_s=self.step_s / manner.cadence,
             flat_from=0.04,
             toe_off_rad=0.45 if self.rise_m > 0 else 0.70,
-            lift_m=0.045,
+            lift_m=0.06,
             bob_m=0.0,
             lean_rad=0.16 if self.rise_m > 0 else 0.03,
             pelvis_yaw_rad=0.04,

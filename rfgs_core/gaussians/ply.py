@@ -101,16 +101,6 @@ def cloud_of(
     return GaussianCloud(**arrays, f_dc=f_dc, rf_power_db=power)
 
 
-def join_clouds(first: GaussianCloud, second: GaussianCloud) -> GaussianCloud:
-    """Both clouds, rows of `first` first; the power stays only where both know it."""
-    values = {}
-    for field in fields(GaussianCloud):
-        pair = (getattr(first, field.name), getattr(second, field.name))
-        known = all(value is not None for value in pair)
-        values[field.name] = np.concatenate(pair) if known else None
-    return GaussianCloud(**values)
-
-
 def write_ply(path: Path, cloud: GaussianCloud) -> None:
     """Writes a binary little-endian PLY in one step.
 

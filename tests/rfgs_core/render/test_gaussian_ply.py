@@ -13,7 +13,7 @@ from plyfile import PlyData, PlyElement
 
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.gaussians import Gaussians
-from rfgs_core.gaussians.ply import GaussianCloud, cloud_of, join_clouds, read_ply, write_ply
+from rfgs_core.gaussians.ply import GaussianCloud, cloud_of, read_ply, write_ply
 from rfgs_core.render.bench import random_cloud
 
 
@@ -84,13 +84,6 @@ def test_grey_without_colours_and_empty_set(tmp_path: Path) -> None:
     assert len(read_ply(tmp_path / "none.ply")) == 0
     gaussians, _, _ = random_cloud(3, 32, seed=1)
     np.testing.assert_array_equal(cloud_of(gaussians).rgb, np.full((3, 3), 0.5, np.float32))
-
-
-def test_join_keeps_order_and_drops_unknown_power(cloud: GaussianCloud) -> None:
-    both = join_clouds(cloud, replace(cloud, means=cloud.means + 1, rf_power_db=None))
-    assert len(both) == 100
-    np.testing.assert_array_equal(both.means[:50], cloud.means)
-    assert both.rf_power_db is None
 
 
 @pytest.mark.parametrize("share", [0.3, 0.8, 0.999])

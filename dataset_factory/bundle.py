@@ -3,14 +3,14 @@
 
 from __future__ import annotations
 
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from plyfile import PlyData, PlyParseError
 
+from rfgs_core.arrays import load_arrays
+from rfgs_core.dataset.mesh_ply import read_mesh
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.files import inside, read_json
 
@@ -166,7 +166,7 @@ class Bundle:
                         "bundle.json"
                     )
                 material = max(fits, key=len)
-                vertices, faces = read_ply_mesh(path)
+                vertices, faces = read_mesh(path)
                 meshes.append(StaticMesh(path.stem, by_name[material], vertices, faces))
         return meshes
 
@@ -220,49 +220,13 @@ def read_bundle(path: Path) -> Bundle:
 
 
 def read_arrays(path: Path, names: tuple[str, ...]) -> dict[str, np.ndarray]:
-    """Reads named arrays of an `.npz` file; pickled objects are refused.
+    """Reads named arrays of a bundle's `.npz` file, and no others.
 
     Raises:
-        RfgsFormatError: The file is missing, damaged or lacks an array.
+        RfgsError: There is no such file.
+        RfgsFormatError: The file is damaged or lacks an array.
     """
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            missing = [name for name in names if name not in stored.files]
-            if missing:
-                raise RfgsFormatError(
-                    f"{path}: expected arrays {', '.join(names)}; missing {', '.join(missing)}"
-                )
-            return {name: stored[name] for name in names}
-    except FileNotFoundError as error:
-        raise RfgsFormatError(f"{path}: no such file; the folder is incomplete") from error
-    except (ValueError, EOFError, OSError, zipfile.BadZipFile) as error:
-        if isinstance(error, RfgsFormatError):
-            raise
-        raise RfgsFormatError(f"{path}: damaged array file ({error})") from error
-
-
-def read_ply_mesh(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Reads a triangle mesh.
-
-    Returns:
-        Vertices float32 (V, 3) and faces int32 (T, 3).
-
-    Raises:
-        RfgsFormatError: The file is missing, not a PLY, truncated or not made of triangles.
-    """
-    try:
-        ply = PlyData.read(str(path))
-        vertex = ply["vertex"].data
-        vertices = np.stack([vertex[axis] for axis in "xyz"], axis=1).astype(np.float32)
-        rows = ply["face"].data["vertex_indices"]
-        faces = np.vstack(rows).astype(np.int32) if len(rows) else np.zeros((0, 3), np.int32)
-    except FileNotFoundError as error:
-        raise RfgsFormatError(f"{path}: no such file; the folder is incomplete") from error
-    except (PlyParseError, KeyError, ValueError, OSError) as error:
-        raise RfgsFormatError(f"{path}: expected a triangle mesh in PLY ({error})") from error
-    if faces.shape[1] != 3 or (faces.size and not 0 <= faces.min() <= faces.max() < len(vertices)):
-        raise RfgsFormatError(f"{path}: expected triangles of existing vertices")
-    return vertices, faces
+    return load_arrays(path, "export the scene again", dict.fromkeys(names), others=False)
 
 
 def _check_info(file: Path, info: Any) -> None:

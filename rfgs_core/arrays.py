@@ -33,8 +33,10 @@ def load_arrays(
     remedy: str,
     shapes: Mapping[str, Shape | None] | None = None,
     unknown: Collection[str] = (),
+    *,
+    others: bool = True,
 ) -> dict[str, np.ndarray]:
-    """Reads all arrays of a file.
+    """Reads the arrays of a file.
 
     Args:
         path: The file.
@@ -42,6 +44,7 @@ def load_arrays(
         shapes: Arrays that must be there. Those with a shape must have it and hold finite
             numbers; None leaves both open.
         unknown: Arrays in which a whole row may be NaN, for what is not known.
+        others: Also read arrays that `shapes` does not name.
 
     Raises:
         RfgsError: There is no such file.
@@ -55,7 +58,8 @@ def load_arrays(
         if isinstance(stored, np.ndarray):
             raise RfgsFormatError(f"{path}: expected named arrays, found a single one; {remedy}")
         with stored:
-            arrays = {name: stored[name] for name in stored.files}
+            wanted = [name for name in stored.files if others or name in (shapes or {})]
+            arrays = {name: stored[name] for name in wanted}
     except FileNotFoundError as error:
         raise RfgsError(f"{path}: no such file; {remedy}") from error
     except RfgsFormatError:

@@ -8,6 +8,8 @@ import shutil
 from dataclasses import asdict, replace
 from typing import Any
 
+import numpy as np
+
 from dataset_factory.bundle import Bundle, read_bundle
 from dataset_factory.devices import check_scene, choose_devices
 from dataset_factory.disk import refuse_small_disk, space
@@ -35,9 +37,13 @@ from rfgs_core.dataset.writer import (
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json, write_json
 from rfgs_core.radio import DevicePose, frame_samples, layout, pose_span_s
+from rfgs_core.radio.check import too_far
 from rfgs_core.radio.impairments import impairments_from_json
 
 logger = logging.getLogger(__name__)
+
+#: Radios that tell paths of this length apart need no look at the scene's size beforehand [m].
+_ANY_SCENE_M = 100.0
 
 
 def generate(job: Job) -> bool:
@@ -114,6 +120,7 @@ def _export(job: Job) -> Bundle:
         shutil.rmtree(target, ignore_errors=True)
         write_json(plan_file, plan)
     if not (target / "bundle.json").is_file():
+        _refuse_large_scene(job)
         fresh = job.work / "bundle.new"
         shutil.rmtree(fresh, ignore_errors=True)
         logger.info("exporting the scene from Blender")
@@ -132,6 +139,27 @@ def _export(job: Job) -> Bundle:
         read_bundle(fresh)
         fresh.rename(target)
     return read_bundle(target)
+
+
+def _refuse_large_scene(job: Job) -> None:
+    """Refuses a scene too large for a radio before all of its frames are exported.
+
+    Raises:
+        RfgsError: A radio's tones are too far apart for the scene.
+    """
+    radios = [job.plan.radio(name) for name in job.plan.radios]
+    if all(radio.unambiguous_path_m > _ANY_SCENE_M for radio in radios):
+        return
+    file = job.work / "check.json"
+    asked = ["--frames", job.plan.frames] if job.plan.frames else []
+    job.run_blender("check", "--out", str(file), *asked)
+    bounds_m = read_json(file)["scene"]["bounds_m"]
+    if bounds_m is None:
+        # Nothing moves, or the like: the export says so.
+        return
+    problems = [text for radio in radios for text in too_far(radio, np.array(bounds_m))]
+    if problems:
+        raise RfgsError(f"{job.blender.blend.stem}: " + "; also: ".join(problems))
 
 
 def _choose(job: Job, bundle: Bundle) -> tuple[dict[str, list[DevicePose]], list[dict[str, Any]]]:

@@ -59,7 +59,7 @@ class Job:
         """Where the sequence's files lie."""
         return SequenceFiles(self.out / self.name)
 
-    def run_blender(self, name: str, *arguments: str, progress: Progress) -> None:
+    def run_blender(self, name: str, *arguments: str, progress: Progress | None = None) -> None:
         """Runs one of the add-on's commands on the scene with the plan's overrides.
 
         Raises:

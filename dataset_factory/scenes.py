@@ -11,6 +11,8 @@ from rfgs_core.files import inside, read_json, sha256
 
 #: First bytes of a Blender file: plain, Zstandard or gzip.
 MAGIC = (b"BLENDER", b"\x28\xb5\x2f\xfd", b"\x1f\x8b")
+#: Interactions that are traced where a scene does not need more.
+DEFAULT_DEPTH = 2
 
 
 @dataclass(frozen=True)
@@ -27,7 +29,7 @@ class Scene:
     """Frames per second, where the catalogue knows."""
     frames: str
     """Frames `A:B`, where the catalogue knows."""
-    depth: int = 2
+    depth: int = DEFAULT_DEPTH
     """Interactions that a path needs to show what moves there."""
 
 
@@ -52,7 +54,7 @@ def catalogue() -> list[Scene]:
                 description=row["description"],
                 fps=row["fps"],
                 frames=f"{row['frame_start']}:{row['frame_end']}",
-                depth=row.get("depth", 2),
+                depth=row.get("depth", DEFAULT_DEPTH),
             )
             for row in rows
         ]

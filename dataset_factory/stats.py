@@ -47,7 +47,6 @@ def _sequence(dataset: Dataset, sequence: Sequence) -> dict[str, Any]:
         "duration_s": (sequence.frames[-1] - sequence.frames[0]) / sequence.fps,
         "size_m": (sequence.bounds_m[1] - sequence.bounds_m[0]).round(3).tolist(),
         "cameras": len(sequence.cameras),
-        "trace_depth": sequence.trace_depth,
         "radios": {radio: radio_stats(sequence, radio) for radio in sequence.radios},
     }
     if "geometry" in dataset.has:
@@ -80,6 +79,7 @@ def radio_stats(sequence: Sequence, radio: str) -> dict[str, Any]:
         "tones": spec.num_subcarriers,
         "band_ghz": [spec.freq_min_hz / 1e9, spec.freq_max_hz / 1e9],
         "samples_per_frame": spec.samples_per_frame,
+        "trace_depth": sequence.trace_depth(radio),
         "level_db": {"p01": low, "median": middle, "p99": high},
         "dynamic_range_db": high - low,
         "dynamic_to_static_db": float(_db(np.median(moving))),

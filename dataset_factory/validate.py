@@ -160,7 +160,9 @@ def _frame_faults(
     elif not np.abs(value[:, measured]).any(axis=(1, 2)).all():
         yield f"{file}: frame {frame}: silent channel"
     elif (value == static).all(axis=(1, 2, 3)).any():
-        hint = "" if sequence.trace_depth > 2 else "; behind a wall only --depth 3 shows people"
+        hint = (
+            "" if sequence.trace_depth(radio) > 2 else "; behind a wall only --depth 3 shows people"
+        )
         yield f"{file}: frame {frame}: equals the static channel, nobody is in it{hint}"
     else:
         yield from energy_faults(sequence, radio, value[0], f"{file}: frame {frame}")

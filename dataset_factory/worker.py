@@ -36,7 +36,7 @@ class Worker:
 
         Args:
             job: `bundle` (folder), `sequence` (folder the channels go to), `devices` by radio,
-                `depth`, `shadow` and `seed`.
+                `depth` (radios that cannot go so deep go as deep as they can), `shadow` and `seed`.
         """
         from dataset_factory.trace.setup import prepare
 
@@ -75,12 +75,13 @@ class Worker:
 
         if self.tracer is None or self.radio != radio:
             devices = [device_pose(row) for row in self.job["devices"][radio]]
+            spec = radio_from_json(self.bundle.path, self.job["radios"][radio])
             self.radio = radio
             self.tracer = Tracer(
                 self.bundle,
-                radio_from_json(self.bundle.path, self.job["radios"][radio]),
+                spec,
                 devices,
-                depth=self.job["depth"],
+                depth=min(self.job["depth"], spec.deepest),
                 shadow=self.job["shadow"],
                 seed=self.job["seed"],
             )

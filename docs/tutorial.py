@@ -39,7 +39,7 @@ def print_contents(dataset: Dataset, sequence: Sequence, radio: str) -> None:
     print(f"{dataset.path}: holds {', '.join(dataset.has)}")
     print(f"sequence {sequence.name}: frames {sequence.frames} at {sequence.fps:g} fps")
     print(f"scene {np.ptp(sequence.bounds_m, axis=0).round(2)} m, {len(sequence.cameras)} cameras")
-    print(f"traced at depth {sequence.trace_depth}, radios {', '.join(sequence.radios)}")
+    print(f"radios {', '.join(sequence.radios)}; {radio} at depth {sequence.trace_depth(radio)}")
     # xarray: nothing is read before it is used.
     print(sequence.radio(radio))
     for number, device in enumerate(sequence.devices(radio)):

@@ -43,7 +43,8 @@ class GenerateArgs:
     """Light samples per pixel; more is less noisy and slower."""
     depth: int | None = None
     """Interactions of a path that meets a person: 1 the person alone (fast), 2 also one wall, 3
-    two (slow; needed behind a wall). Default: what the scene needs, else 2."""
+    two (slow; needed behind a wall). Default: what the scene needs, else 2; for uwb 1, which is
+    all that an ultra-wide band can have."""
     seed: int = 0
     """Root seed; the same seed gives the same bytes."""
     workers: int = 2
@@ -100,6 +101,7 @@ def job_of(args: GenerateArgs) -> tuple[Job, Scene]:
         raise RfgsError(f"--worker-memory {args.worker_memory}: expected GB, or 0")
     scene, said = find_scene(args.scene), read_options(args.options)
     frames = args.frames or str(said.pop("frames", ""))
+    _refuse_depth(scene, args)
     plan = make_plan(
         scene,
         args.radio,
@@ -126,3 +128,26 @@ def job_of(args: GenerateArgs) -> tuple[Job, Scene]:
         label(args.options),
     )
     return job, scene
+
+
+def _refuse_depth(scene: Scene, args: GenerateArgs) -> None:
+    """Refuses radios that cannot be traced as deep as was asked, or as what moves needs.
+
+    Raises:
+        RfgsError: Naming the radio and the remedy.
+    """
+    from dataset_factory.radios import SCENE_RADIO, chosen_radios
+    from dataset_factory.scenes import DEFAULT_DEPTH
+    from rfgs_core.radio.check import too_deep
+
+    for name, radio in chosen_radios(args.radio).items():
+        if name == SCENE_RADIO:
+            continue
+        if radio.ultra_wide and args.depth is not None and args.depth > radio.deepest:
+            raise RfgsError(too_deep(radio, args.depth))
+        if args.depth is None and scene.depth > max(radio.deepest, DEFAULT_DEPTH):
+            raise RfgsError(
+                f"scene {scene.name!r}: who moves there is seen at trace depth {scene.depth}, but "
+                f"radio {name!r} is traced at {radio.deepest} at most; use another radio or scene, "
+                f"or --depth {radio.deepest} for a channel without people"
+            )

@@ -87,7 +87,6 @@ def _facts(sequence: Sequence) -> list[tuple[str, str]]:
         ("Frame rate of the scene", f"{sequence.fps:g} per second"),
         ("Size", " × ".join(f"{value:.1f}" for value in size) + " m"),
         ("Cameras", str(len(sequence.cameras))),
-        ("Trace depth", str(sequence.trace_depth)),
     ]
     for name in sequence.radios:
         radio, layout = sequence.radio_spec(name), sequence.layout(name)
@@ -95,7 +94,7 @@ def _facts(sequence: Sequence) -> list[tuple[str, str]]:
             (
                 f"{name}: {radio.freq_min_hz / 1e9:g} to {radio.freq_max_hz / 1e9:g} GHz",
                 f"{layout.measured.shape[0]} TX × {layout.measured.shape[1]} RX × "
-                f"{radio.num_subcarriers} tones",
+                f"{radio.num_subcarriers} tones, traced at depth {sequence.trace_depth(name)}",
             )
         )
     return facts

@@ -34,9 +34,6 @@ NUM_SAMPLES = 300_000
 MAX_PATHS = 20_000
 #: Above this fractional bandwidth materials are evaluated at several frequencies.
 WIDE_BAND = 0.05
-#: Above this fractional bandwidth (the usual definition of ultra-wide band) paths are found once
-#: and evaluated at every frequency; below, they are traced again.
-ULTRA_WIDE_BAND = 0.2
 #: Fewest frequencies of a wide band.
 WIDE_BAND_NODES = 9
 #: Largest distance of the frequencies of an ultra-wide band [Hz]: a slab of 3 cm and √ε = 2
@@ -52,14 +49,9 @@ def node_frequencies(radio: Radio) -> np.ndarray:
     """Frequencies [Hz] between which amplitudes are interpolated, both band edges included."""
     wide = radio.bandwidth_hz / radio.centre_hz > WIDE_BAND
     count = WIDE_BAND_NODES if wide else NARROW_BAND_NODES
-    if ultra_wide(radio):
+    if radio.ultra_wide:
         count = max(count, math.ceil(radio.bandwidth_hz / NODE_SPACING_HZ) + 1)
     return np.linspace(radio.freq_min_hz, radio.freq_max_hz, count)
-
-
-def ultra_wide(radio: Radio) -> bool:
-    """Whether paths are found once and evaluated at every frequency."""
-    return radio.bandwidth_hz / radio.centre_hz > ULTRA_WIDE_BAND
 
 
 class Environment:
@@ -118,9 +110,10 @@ class Environment:
             traced = self._read(self._traced(centre_hz), group, centre_hz)
             # Walls hardly change over a narrow band.
             return replace(traced, amplitude=np.repeat(traced.amplitude, len(nodes), axis=2))
-        if not ultra_wide(self._radio):
+        if not self._radio.ultra_wide:
             return joined([self._read(self._traced(float(f)), group, float(f)) for f in nodes])
         sets = []
+        # An ultra-wide band has too many frequencies to find the paths anew at each.
         # Rays choose by the material whether to go through, so each edge finds paths of its own.
         for edge_hz in (self._radio.freq_min_hz, self._radio.freq_max_hz):
             found = self._traced(edge_hz)

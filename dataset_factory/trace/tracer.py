@@ -20,7 +20,6 @@ from dataset_factory.trace.environment import (
     Environment,
     environment_channel,
     node_frequencies,
-    ultra_wide,
 )
 from dataset_factory.trace.held import Trace, follow, mixed
 from dataset_factory.trace.movers import split_movers
@@ -39,6 +38,7 @@ from dataset_factory.trace.shadow import Shadow, coarse_mesh, transmission
 from dataset_factory.trace.steering import steer
 from rfgs_core.errors import RfgsError
 from rfgs_core.radio import Radio, frame_samples, layout, pose_span_s
+from rfgs_core.radio.check import too_deep
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.layout import DevicePose
 from rfgs_core.seeds import sub_seed
@@ -85,11 +85,8 @@ class Tracer:
         """
         if depth != 1 and depth not in BUFFER:
             raise RfgsError(f"trace depth {depth}: expected 1, 2 or 3")
-        if depth > 1 and ultra_wide(radio):
-            raise RfgsError(
-                f"radio {radio.name!r}, trace depth {depth}: people's paths by way of walls are "
-                "traced at one frequency, too few for an ultra-wide band; use --depth 1"
-            )
+        if depth > radio.deepest:
+            raise RfgsError(too_deep(radio, depth))
         check_materials(bundle, radio)
         self._bundle, self._radio, self._devices = bundle, radio, devices
         self._shadow: Shadow = shadow

@@ -162,14 +162,13 @@ class Sequence:
         return self.info.instances
 
     @property
-    def trace_depth(self) -> int:
-        """Interactions of a path that meets a person, that one included."""
-        return self.info.trace_depth
-
-    @property
     def radios(self) -> list[str]:
         """Names of the radios."""
         return sorted(self.info.radios)
+
+    def trace_depth(self, radio: str) -> int:
+        """Interactions of a radio's path that meets a person, that one included."""
+        return min(self.info.trace_depth, self.radio_spec(radio).deepest)
 
     def time_s(self, frame: int) -> float:
         """Time of a frame [s]."""

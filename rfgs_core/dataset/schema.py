@@ -96,7 +96,7 @@ class SequenceInfo:
     guesses: list[dict[str, Any]] = field(default_factory=list)
     """Every default that was guessed, with the reason."""
     trace_depth: int = 1
-    """Interactions of a path that meets a person, that one included."""
+    """Interactions of a path that meets a person, that one included; of an ultra-wide band 1."""
     shadow: str = "kirchhoff"
     """How bodies shadow paths: kirchhoff or hard."""
 

@@ -69,7 +69,7 @@ def _circumstances(scene: Scene) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "limits": limits(scene),
-        "trace_depth": run.sequence.trace_depth,
+        "trace_depth": run.sequence.trace_depth(scene.radio.name),
         "n_gaussians": len(run.gaussians(run.frames[0])),
         "train_s": run.config.get("train_s"),
         "conditions": conditions(scene),

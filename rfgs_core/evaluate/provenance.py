@@ -59,7 +59,7 @@ def _memory_gib() -> float | None:
 def conditions(scene: Scene) -> dict[str, Any]:
     """How the data came about, as far as it decides what a number means."""
     info = scene.run.sequence.info
-    depth = scene.run.sequence.trace_depth
+    depth = scene.run.sequence.trace_depth(scene.radio.name)
     if depth <= 1:
         label = (
             "clean, depth 1: single-bounce data fitted with a single-bounce model, an inverse "

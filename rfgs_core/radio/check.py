@@ -3,15 +3,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Float64, Int
 
+from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.layout import NEAREST_ANTENNAS_M, DevicePose, layout, nearest_m
 from rfgs_core.radio.materials import MATERIALS
-from rfgs_core.radio.presets import Radio
+from rfgs_core.radio.presets import PRESETS, Radio
 
 #: Multiple reflections travel further than twice the diagonal; this much is added for them [m].
 DELAY_MARGIN_M = 5.0
@@ -35,19 +37,43 @@ def check(
     Returns:
         One sentence per problem, each with its remedy; empty when all is well.
     """
-    problems = []
-    longest_m = 2.0 * float(np.linalg.norm(bounds_m[1] - bounds_m[0])) + DELAY_MARGIN_M
-    if radio.unambiguous_path_m < longest_m:
-        problems.append(
-            f"radio {radio.name!r} tells paths apart only up to {radio.unambiguous_path_m:.1f} m "
-            f"(c / subcarrier spacing), but paths in this scene reach {longest_m:.1f} m; use more "
-            "subcarriers, a narrower band or a smaller scene"
-        )
+    problems = too_far(radio, bounds_m)
     for row in materials:
         problem = _material_problem(radio, row)
         if problem:
             problems.append(problem)
     return problems
+
+
+def too_far(radio: Radio, bounds_m: Float64[np.ndarray, "2 3"]) -> list[str]:
+    """Why a scene is too large for the spacing of a radio's tones, with the remedy.
+
+    Args:
+        radio: The radio.
+        bounds_m: Minimum and maximum of the scene [m].
+
+    Returns:
+        One sentence, or none where the scene is small enough.
+    """
+    longest_m = 2.0 * float(np.linalg.norm(bounds_m[1] - bounds_m[0])) + DELAY_MARGIN_M
+    if radio.unambiguous_path_m >= longest_m:
+        return []
+    needed = math.ceil(radio.bandwidth_hz * longest_m / SPEED_OF_LIGHT)
+    fitting = [name for name, other in PRESETS.items() if other.unambiguous_path_m >= longest_m]
+    instead = [*fitting, f"a file with `like: {radio.name}` and `num_subcarriers: {needed}`"]
+    return [
+        f"radio {radio.name!r} tells paths apart only up to {radio.unambiguous_path_m:.1f} m "
+        f"(c / subcarrier spacing), but paths in this scene reach {longest_m:.1f} m; use "
+        f"{', '.join(instead)}, or smaller --bounds"
+    ]
+
+
+def too_deep(radio: Radio, depth: int) -> str:
+    """Why a radio is not traced at a depth beyond its deepest, with the remedy."""
+    return (
+        f"radio {radio.name!r}, trace depth {depth}: people's paths by way of walls are traced at "
+        f"one frequency, too few for an ultra-wide band; use --depth {radio.deepest}"
+    )
 
 
 def check_devices(

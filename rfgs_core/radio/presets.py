@@ -16,6 +16,9 @@ from rfgs_core.radio.constants import SPEED_OF_LIGHT
 OwnLinks = Literal["included", "only", "excluded"]
 Placement = Literal["corners", "walls"]
 
+#: Above this fractional bandwidth a radio is ultra-wide band (ITU-R SM.1755).
+ULTRA_WIDE_BAND = 0.2
+
 
 @dataclass(frozen=True)
 class Radio:
@@ -82,6 +85,20 @@ class Radio:
     def subcarrier_spacing_hz(self) -> float:
         """Distance between neighbouring tones [Hz]."""
         return self.bandwidth_hz / self.num_subcarriers
+
+    @property
+    def ultra_wide(self) -> bool:
+        """Whether the band is too wide for one frequency to stand for it."""
+        return self.bandwidth_hz / self.centre_hz > ULTRA_WIDE_BAND
+
+    @property
+    def deepest(self) -> int:
+        """Most interactions that a path which meets a person is traced with.
+
+        Paths by way of walls are traced at one frequency, which is too few for an ultra-wide
+        band.
+        """
+        return 1 if self.ultra_wide else 3
 
     @property
     def wavelength_m(self) -> float:

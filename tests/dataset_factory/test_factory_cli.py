@@ -40,6 +40,10 @@ def test_help_teaches(factory: Factory) -> None:
     assert one_line(factory("destroy")).startswith("error: unknown command 'destroy'")
 
 
+#: Bounds whose diagonal is 25.63 m: 2 · 25.63 + 5 = 56.27 m, 4 GHz · 56.27 m / c = 750.8 tones.
+WIDE = ["--bounds", "-8", "-8", "0", "10", "10", "3"]
+
+
 @pytest.mark.parametrize(
     ("scene", "radio", "more", "words"),
     [
@@ -50,6 +54,9 @@ def test_help_teaches(factory: Factory) -> None:
         ("room", "wifi", ["--frames", "5:"], ["--frames '5:'", "FIRST:LAST"]),
         ("room", "wifi", ["--frames", "9:1"], ["FIRST <= LAST"]),
         ("room", "wifi", ["--depth", "4"], ["--depth 4", "1 to 3"]),
+        ("room", "uwb", ["--depth", "2"], ["'uwb', trace depth 2", "ultra-wide", "use --depth 1"]),
+        ("through_wall", "uwb", [], ["trace depth 3", "'uwb' is traced at 1", "another radio"]),
+        ("room", "mmwave", WIDE, ["reach 56.3 m", "`like: mmwave`", "num_subcarriers: 751`"]),
         ("room", "wifi", ["--workers", "0"], ["--workers 0"]),
         ("room", "wifi", ["--frames", "90:95"], ["90:95"]),
         ("room", "wifi", ["--blender", "/no/blender"], ["/no/blender: no such program"]),
@@ -65,7 +72,8 @@ def test_wrong_requests(
     words: list[str],
 ) -> None:
     (tmp_path / "text.blend").write_text("this is a letter, no Blender file")
-    target = {"room": str(box_room), "nowhere": "nowhere"}.get(scene, str(tmp_path / scene))
+    target = str(tmp_path / scene) if scene.endswith(".blend") else scene
+    target = str(box_room) if scene == "room" else target
     out = str(tmp_path / "out")
     line = one_line(factory("generate", target, "--radio", radio, "--out", out, *more))
     assert all(word in line for word in words), line

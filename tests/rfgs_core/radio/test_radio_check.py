@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rfgs_core.radio import DevicePose, preset
+from rfgs_core.radio import PRESETS, DevicePose, preset
 from rfgs_core.radio.check import check, check_devices, winding_number
 
 BOUNDS_M = np.array([[0.0, 0.0, 0.0], [6.0, 5.0, 2.7]])
@@ -34,14 +34,18 @@ def test_a_closed_box_winds_once_around_its_inside() -> None:
 
 def test_presets_suit_a_living_room() -> None:
     materials = [{"name": "Wall", "radio_material": "plasterboard"}]
-    for name in ("wifi", "mmwave"):
-        assert check(preset(name), BOUNDS_M, materials) == []
+    for radio in PRESETS.values():
+        assert check(radio, BOUNDS_M, materials) == []
 
 
 def test_delays_that_alias_are_refused() -> None:
     coarse = replace(preset("wifi"), num_subcarriers=8)
     problems = check(coarse, BOUNDS_M, [])
-    assert len(problems) == 1 and "15.0 m" in problems[0] and "more subcarriers" in problems[0]
+    assert len(problems) == 1 and "15.0 m" in problems[0]
+    # 2 · |(6, 5, 2.7)| + 5 = 21.53 m; 160 MHz · 21.53 m / c = 11.5 tones.
+    assert "reach 21.5 m; use wifi, " in problems[0]
+    assert "`like: wifi` and `num_subcarriers: 12`" in problems[0]
+    assert check(replace(coarse, num_subcarriers=12), BOUNDS_M, []) == []
 
 
 @pytest.mark.parametrize(

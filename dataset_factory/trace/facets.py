@@ -89,7 +89,28 @@ def _geometry(
     return d_t + d_r, 0.5 * q_n / (4.0 * math.pi * d_t * d_r), q_t2
 
 
-@numba.njit(cache=True, parallel=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
+# Sums may be reordered in here alone: numba optimises code that it caches once more than code
+# that it runs at once, and reordered terms end in other last bits.
+@numba.njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
+def _add_tone(
+    value: tuple[np.ndarray, np.ndarray],
+    turn: tuple[np.ndarray, np.ndarray],
+    fade: np.ndarray,
+    filled: int,
+) -> tuple[float, float]:
+    """Sum of a block's phasors, real and imaginary part; moves them on to the next tone."""
+    sum_re, sum_im = 0.0, 0.0
+    for j in range(filled):
+        sum_re += value[0][j]
+        sum_im += value[1][j]
+    for j in range(filled):
+        re, im, turn_re, turn_im = value[0][j], value[1][j], turn[0][j], turn[1][j]
+        value[0][j], value[1][j] = re * turn_re - im * turn_im, re * turn_im + im * turn_re
+        turn[0][j], turn[1][j] = turn_re * fade[j], turn_im * fade[j]
+    return sum_re, sum_im
+
+
+@numba.njit(cache=True, parallel=True, fastmath={"contract", "nsz", "arcp"})
 def _facet_sum(
     points: np.ndarray,
     normals: np.ndarray,
@@ -131,15 +152,8 @@ def _facet_sum(
                 fade[filled] = math.exp(-2.0 * k_step * k_step * damping)
                 filled += 1
             for tone in range(tones):
-                sum_re, sum_im = 0.0, 0.0
-                for j in range(filled):
-                    re, im = value_re[j], value_im[j]
-                    sum_re += re
-                    sum_im += im
-                    value_re[j] = re * turn_re[j] - im * turn_im[j]
-                    value_im[j] = re * turn_im[j] + im * turn_re[j]
-                    turn_re[j] *= fade[j]
-                    turn_im[j] *= fade[j]
+                value, turn = (value_re, value_im), (turn_re, turn_im)
+                sum_re, sum_im = _add_tone(value, turn, fade, filled)
                 # The facet's constant phase: Kirchhoff's j.
                 out[tx, rx, tone] += complex(-sum_im, sum_re)
     return out

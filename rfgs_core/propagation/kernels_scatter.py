@@ -24,7 +24,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit, prange
 
-from rfgs_core.propagation.lanes import FAST_MATH, LANES, exponential, sine_cosine_of_turns
+from rfgs_core.propagation.lanes import (
+    FAST_MATH,
+    FAST_SUMS,
+    LANES,
+    exponential,
+    scratch,
+    sine_cosine_of_turns,
+    six_rows,
+    three_rows,
+)
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
 #: Tones handled in one pass over a block; chunks are padded to a multiple of it.
@@ -40,11 +49,6 @@ AMPLITUDE, SPREAD, ZR, ZI, RR, RI, E = range(7)
 UTX, UTY, UTZ, URX, URY, URZ, INV_T, INV_R, HIDE_T, HIDE_R, SEEN = range(7, 18)
 BY_AMPLITUDE, BY_DISTANCE, BY_SPREAD, MOMENTS = 18, 19, 20, 21
 ROWS = MOMENTS + 6
-
-#: Rows kept free on both sides of a block's scratch. Vector code asks at run time whether what it
-#: writes lies near what it reads, and takes the scalar way (other last bits) where it does: the
-#: heap's layout would show in the result.
-_APART = 32
 
 OPTIONS: dict[str, Any] = {"fastmath": FAST_MATH, "cache": True, "error_model": "numpy"}
 
@@ -80,42 +84,32 @@ class Plan(NamedTuple):
 
 
 @njit(**OPTIONS)
-def scratch(cloud: Cloud) -> tuple[np.ndarray, np.ndarray]:
-    """Zeroed w [ROWS, LANES] and path lengths [LANES] of one block, apart from other arrays."""
-    w = np.zeros((ROWS + 2 * _APART, LANES), dtype=cloud.shape.dtype)
-    distance = np.zeros((1 + 2 * _APART, LANES))
-    return w[_APART:-_APART], distance[_APART]
-
-
-@njit(**OPTIONS)
 def illuminate(
     cloud: Cloud, end: np.ndarray, first: int, n: int, distance: np.ndarray, w: np.ndarray
 ) -> None:
     """Path lengths, unit vectors, spread Q and 1 / (d_t d_r) of one block and link."""
-    means, real = cloud.means, w.dtype.type
+    real = w.dtype.type
+    px, py, pz = three_rows(cloud.means, first, n)
     one = real(1.0)
     for b in range(n):
-        i = first + b
         # Lengths in double for the phase; float32 is enough for directions.
-        x, y, z = end[0] - means[0, i], end[1] - means[1, i], end[2] - means[2, i]
+        x, y, z = end[0] - px[b], end[1] - py[b], end[2] - pz[b]
         length = math.sqrt(x * x + y * y + z * z)
         inverse = one / real(length)
         w[UTX, b], w[UTY, b], w[UTZ, b] = real(x) * inverse, real(y) * inverse, real(z) * inverse
         w[INV_T, b], distance[b] = inverse, length
     for b in range(n):
-        i = first + b
-        x, y, z = end[3] - means[0, i], end[4] - means[1, i], end[5] - means[2, i]
+        x, y, z = end[3] - px[b], end[4] - py[b], end[5] - pz[b]
         length = math.sqrt(x * x + y * y + z * z)
         inverse = one / real(length)
         w[URX, b], w[URY, b], w[URZ, b] = real(x) * inverse, real(y) * inverse, real(z) * inverse
         w[INV_R, b] = inverse
         distance[b] += length
-    shape = cloud.shape
+    sxx, syy, szz, sxy, sxz, syz = six_rows(cloud.shape, first, n)
     for b in range(n):
-        i = first + b
         qx, qy, qz = w[UTX, b] + w[URX, b], w[UTY, b] + w[URY, b], w[UTZ, b] + w[URZ, b]
-        mixed = qx * qy * shape[3, i] + qx * qz * shape[4, i] + qy * qz * shape[5, i]
-        squares = qx * qx * shape[0, i] + qy * qy * shape[1, i] + qz * qz * shape[2, i]
+        mixed = qx * qy * sxy[b] + qx * qz * sxz[b] + qy * qz * syz[b]
+        squares = qx * qx * sxx[b] + qy * qy * syy[b] + qz * qz * szz[b]
         w[SPREAD, b] = squares + mixed + mixed
         w[AMPLITUDE, b] = w[INV_T, b] * w[INV_R, b]
 
@@ -124,23 +118,22 @@ def illuminate(
 def see(cloud: Cloud, group: int, first: int, n: int, w: np.ndarray) -> None:
     """Multiplies the amplitude by the visibility; keeps what its gradient needs."""
     one = w.dtype.type(1.0)
-    visibility = cloud.visibility[group]
+    visibility = cloud.visibility[group, first : first + n]
     if cloud.normals.shape[1] == 0:
         for b in range(n):
             w[SEEN, b] = one
     else:
-        normals, slope = cloud.normals, w.dtype.type(-cloud.sharpness)
+        nx, ny, nz = three_rows(cloud.normals, first, n)
+        slope = w.dtype.type(-cloud.sharpness)
         for b in range(n):
-            i = first + b
-            nx, ny, nz = normals[0, i], normals[1, i], normals[2, i]
-            by_tx = slope * (nx * w[UTX, b] + ny * w[UTY, b] + nz * w[UTZ, b])
-            by_rx = slope * (nx * w[URX, b] + ny * w[URY, b] + nz * w[URZ, b])
+            by_tx = slope * (nx[b] * w[UTX, b] + ny[b] * w[UTY, b] + nz[b] * w[UTZ, b])
+            by_rx = slope * (nx[b] * w[URX, b] + ny[b] * w[URY, b] + nz[b] * w[URZ, b])
             s_t, s_r = one / (one + exponential(by_tx)), one / (one + exponential(by_rx))
             w[HIDE_T, b], w[HIDE_R, b] = one - s_t, one - s_r
             w[SEEN, b] = s_t * s_r
             w[AMPLITUDE, b] *= w[SEEN, b]
     for b in range(n):
-        w[AMPLITUDE, b] *= visibility[first + b]
+        w[AMPLITUDE, b] *= visibility[b]
 
 
 @njit(**OPTIONS)
@@ -171,9 +164,10 @@ def start_tones(tone: np.ndarray, n: int, distance: np.ndarray, w: np.ndarray) -
 @njit(**OPTIONS)
 def _gain(gain: np.ndarray, first: int, n: int, w: np.ndarray) -> None:
     """Multiplies z by amplitude and gain."""
+    gain_r, gain_i = gain[0, first : first + n], gain[1, first : first + n]
     for b in range(n):
         a, x, y = w[AMPLITUDE, b], w[ZR, b], w[ZI, b]
-        g, h = gain[0, first + b], gain[1, first + b]
+        g, h = gain_r[b], gain_i[b]
         w[ZR, b], w[ZI, b] = a * (g * x - h * y), a * (g * y + h * x)
 
 
@@ -183,7 +177,7 @@ def turn(x: float, y: float, u: float, v: float, e: float) -> Any:
     return x * u - y * v, x * v + y * u, u + u * e, v + v * e
 
 
-@njit(**OPTIONS)
+@njit(**{**OPTIONS, "fastmath": FAST_SUMS})
 def _sum_tones(
     n: int,
     zr: np.ndarray,
@@ -225,7 +219,7 @@ def scatter_forward(cloud: Cloud, plan: Plan, out: np.ndarray) -> None:
     """Writes sum_i A z kappa-coefficients, float64 out[link, order, re/im, padded tone]."""
     total = cloud.means.shape[1]
     for link in prange(plan.ends.shape[0]):
-        w, distance = scratch(cloud)
+        w, distance = scratch(ROWS, cloud.shape), scratch(1, cloud.means)[0]
         for first in range(0, total, LANES):
             n = min(LANES, total - first)
             illuminate(cloud, plan.ends[link], first, n, distance, w)

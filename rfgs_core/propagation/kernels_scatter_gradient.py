@@ -47,12 +47,11 @@ from rfgs_core.propagation.kernels_scatter import (
     E,
     Plan,
     illuminate,
-    scratch,
     see,
     start_tones,
     turn,
 )
-from rfgs_core.propagation.lanes import LANES
+from rfgs_core.propagation.lanes import LANES, scratch, six_rows, three_rows
 
 
 class CloudGradient(NamedTuple):
@@ -113,12 +112,14 @@ def _contract(
     real = w.dtype.type
     k, dk = real(WAVENUMBER * tone[2]), real(WAVENUMBER * tone[1])
     k2, kdk, dk2 = real(-0.5) * k * k, -k * dk, real(-0.5) * dk * dk
+    end = first + n
+    gain_r, gain_i = gain[0, first:end], gain[1, first:end]
+    by_gain_r, by_gain_i = by_gain[0, first:end], by_gain[1, first:end]
     for b in range(n):
-        a = w[AMPLITUDE, b]
-        g, h = gain[0, first + b], gain[1, first + b]
+        a, g, h = w[AMPLITUDE, b], gain_r[b], gain_i[b]
         x, y = w[MOMENTS, b], w[MOMENTS + 1, b]
-        by_gain[0, first + b] += a * x
-        by_gain[1, first + b] -= a * y
+        by_gain_r[b] += a * x
+        by_gain_i[b] -= a * y
         s0, t0 = g * x - h * y, g * y + h * x
         x, y = w[MOMENTS + 2, b], w[MOMENTS + 3, b]
         s1, t1 = g * x - h * y, g * y + h * x
@@ -141,59 +142,63 @@ def _chain_shape(shape: np.ndarray, first: int, n: int, w: np.ndarray, grad: Clo
 
     With u the unit vector towards an antenna at distance d: dd/dp = -u, du/dp = -(I - u u^T)/d.
     """
+    sxx, syy, szz, sxy, sxz, syz = six_rows(shape, first, n)
+    gxx, gyy, gzz, gxy, gxz, gyz = six_rows(grad.shape, first, n)
+    px, py, pz = three_rows(grad.means, first, n)
     for b in range(n):
-        i = first + b
         tx, ty, tz, it = w[UTX, b], w[UTY, b], w[UTZ, b], w[INV_T, b]
         rx, ry, rz, ir = w[URX, b], w[URY, b], w[URZ, b], w[INV_R, b]
         by_q, by_d = w[BY_SPREAD, b], w[BY_DISTANCE, b]
         scale = w[BY_AMPLITUDE, b] * w[AMPLITUDE, b]
         qx, qy, qz = tx + rx, ty + ry, tz + rz
-        grad.shape[0, i] += by_q * qx * qx
-        grad.shape[1, i] += by_q * qy * qy
-        grad.shape[2, i] += by_q * qz * qz
+        gxx[b] += by_q * qx * qx
+        gyy[b] += by_q * qy * qy
+        gzz[b] += by_q * qz * qz
         twice = by_q + by_q
-        grad.shape[3, i] += twice * qx * qy
-        grad.shape[4, i] += twice * qx * qz
-        grad.shape[5, i] += twice * qy * qz
-        x = twice * (shape[0, i] * qx + shape[3, i] * qy + shape[4, i] * qz)
-        y = twice * (shape[3, i] * qx + shape[1, i] * qy + shape[5, i] * qz)
-        z = twice * (shape[4, i] * qx + shape[5, i] * qy + shape[2, i] * qz)
+        gxy[b] += twice * qx * qy
+        gxz[b] += twice * qx * qz
+        gyz[b] += twice * qy * qz
+        x = twice * (sxx[b] * qx + sxy[b] * qy + sxz[b] * qz)
+        y = twice * (sxy[b] * qx + syy[b] * qy + syz[b] * qz)
+        z = twice * (sxz[b] * qx + syz[b] * qy + szz[b] * qz)
         x1, y1, z1 = _across(x, y, z, tx, ty, tz)
         x2, y2, z2 = _across(x, y, z, rx, ry, rz)
         near_t, near_r = scale * it - by_d, scale * ir - by_d
-        grad.means[0, i] += near_t * tx + near_r * rx - x1 * it - x2 * ir
-        grad.means[1, i] += near_t * ty + near_r * ry - y1 * it - y2 * ir
-        grad.means[2, i] += near_t * tz + near_r * rz - z1 * it - z2 * ir
+        px[b] += near_t * tx + near_r * rx - x1 * it - x2 * ir
+        py[b] += near_t * ty + near_r * ry - y1 * it - y2 * ir
+        pz[b] += near_t * tz + near_r * rz - z1 * it - z2 * ir
 
 
 @njit(**OPTIONS)
 def _chain_normals(cloud: Cloud, first: int, n: int, w: np.ndarray, grad: CloudGradient) -> None:
     """From the two sigmoids of the visibility to normals and positions."""
     slope = w.dtype.type(cloud.sharpness)
+    normal_x, normal_y, normal_z = three_rows(cloud.normals, first, n)
+    gx, gy, gz = three_rows(grad.normals, first, n)
+    px, py, pz = three_rows(grad.means, first, n)
     for b in range(n):
-        i = first + b
         tx, ty, tz, it = w[UTX, b], w[UTY, b], w[UTZ, b], w[INV_T, b]
         rx, ry, rz, ir = w[URX, b], w[URY, b], w[URZ, b], w[INV_R, b]
         scale = slope * w[BY_AMPLITUDE, b] * w[AMPLITUDE, b]
         by_t, by_r = scale * w[HIDE_T, b], scale * w[HIDE_R, b]
-        grad.normals[0, i] += by_t * tx + by_r * rx
-        grad.normals[1, i] += by_t * ty + by_r * ry
-        grad.normals[2, i] += by_t * tz + by_r * rz
-        nx, ny, nz = cloud.normals[0, i], cloud.normals[1, i], cloud.normals[2, i]
+        gx[b] += by_t * tx + by_r * rx
+        gy[b] += by_t * ty + by_r * ry
+        gz[b] += by_t * tz + by_r * rz
+        nx, ny, nz = normal_x[b], normal_y[b], normal_z[b]
         x1, y1, z1 = _across(nx, ny, nz, tx, ty, tz)
         x2, y2, z2 = _across(nx, ny, nz, rx, ry, rz)
         by_t, by_r = by_t * it, by_r * ir
-        grad.means[0, i] -= by_t * x1 + by_r * x2
-        grad.means[1, i] -= by_t * y1 + by_r * y2
-        grad.means[2, i] -= by_t * z1 + by_r * z2
+        px[b] -= by_t * x1 + by_r * x2
+        py[b] -= by_t * y1 + by_r * y2
+        pz[b] -= by_t * z1 + by_r * z2
 
 
 @njit(**OPTIONS)
 def _chain_visibility(group: int, first: int, n: int, w: np.ndarray, grad: CloudGradient) -> None:
     """From the amplitude to the weight of the link's group."""
-    target = grad.visibility[group]
+    target = grad.visibility[group, first : first + n]
     for b in range(n):
-        target[first + b] += w[BY_AMPLITUDE, b] * w[INV_T, b] * w[INV_R, b] * w[SEEN, b]
+        target[b] += w[BY_AMPLITUDE, b] * w[INV_T, b] * w[INV_R, b] * w[SEEN, b]
 
 
 @njit(parallel=True, **OPTIONS)
@@ -201,7 +206,7 @@ def scatter_backward(cloud: Cloud, plan: Plan, seed: np.ndarray, grad: CloudGrad
     """Adds to `grad`, given seed[link, order, re/im, padded tone] = G kappa^order."""
     total = cloud.means.shape[1]
     for block in prange((total + LANES - 1) // LANES):
-        w, distance = scratch(cloud)
+        w, distance = scratch(ROWS, cloud.shape), scratch(1, cloud.means)[0]
         first = block * LANES
         n = min(LANES, total - first)
         for link in range(plan.ends.shape[0]):

@@ -16,7 +16,15 @@ import numpy as np
 from numba import njit, prange
 
 from rfgs_core.propagation.fresnel import EDGE_M
-from rfgs_core.propagation.lanes import FAST_MATH, LANES, exponential, sine_cosine_of_turns
+from rfgs_core.propagation.lanes import (
+    FAST_MATH,
+    LANES,
+    exponential,
+    scratch,
+    sine_cosine_of_turns,
+    six_rows,
+    three_rows,
+)
 
 #: Below this exponent a shadow is left out: e^-18 = 1.5e-8.
 LOWEST_EXPONENT = -18.0
@@ -53,11 +61,12 @@ def _fade(x: Any) -> Any:
 
 
 @njit(inline="always", **_OPTIONS)
-def _form(shape: np.ndarray, i: int, weights: Any) -> float:
+def _form(shape: Any, i: int, weights: Any) -> float:
     """Bilinear form of a packed covariance, given the weights of its six entries."""
     a, b, c, d, e, f = weights
-    diagonal = a * shape[0, i] + b * shape[1, i] + c * shape[2, i]
-    return diagonal + d * shape[3, i] + e * shape[4, i] + f * shape[5, i]
+    xx, yy, zz, xy, xz, yz = shape
+    diagonal = a * xx[i] + b * yy[i] + c * zz[i]
+    return diagonal + d * xy[i] + e * xz[i] + f * yz[i]
 
 
 @njit(**_OPTIONS)
@@ -73,13 +82,13 @@ def _project(
 ) -> None:
     """Offsets, kappa, fade and projected covariances of one block and leg."""
     ax, ay, az, ux, uy, uz, fx, fy, fz, sx, sy, sz, length, before, behind = leg
-    means, real = screens.means, w.dtype.type
+    px, py, pz = three_rows(screens.means, first, n)
+    alpha, real = screens.alpha[first : first + n], w.dtype.type
     zero, end, per_edge = real(0.0), real(length), real(1.0 / EDGE_M)
     scale = real(wavelength_m / (2 * np.pi * max(before + length + behind, 1e-300)))
     before, behind = real(before), real(behind)
     for b in range(n):
-        i = first + b
-        x, y, z = means[0, i] - ax, means[1, i] - ay, means[2, i] - az
+        x, y, z = px[b] - ax, py[b] - ay, pz[b] - az
         w[_X, b] = x * fx + y * fy + z * fz
         w[_Y, b] = x * sx + y * sy + z * sz
         t = real(x * ux + y * uy + z * uz)
@@ -91,7 +100,7 @@ def _project(
         fall, fall_slope = _fade((end - t) * per_edge)
         w[_EDGE, b] = rise * fall
         w[_EDGE_SLOPE, b] = per_edge * (rise_slope * fall - rise * fall_slope)
-        w[_ALPHA, b] = screens.alpha[i]
+        w[_ALPHA, b] = alpha[b]
 
 
 @njit(**_OPTIONS)
@@ -100,10 +109,9 @@ def _spread(screens: Screens, leg: np.ndarray, first: int, n: int, w: np.ndarray
     f2, s2 = _weights(leg[6:9], leg[6:9]), _weights(leg[9:12], leg[9:12])
     fs, half = _weights(leg[6:9], leg[9:12]), w.dtype.type(-0.5)
     tiny = w.dtype.type(_TINY)
+    shape = six_rows(screens.shape, first, n)
     for b in range(n):
-        i = first + b
-        xx, yy = _form(screens.shape, i, f2), _form(screens.shape, i, s2)
-        xy = _form(screens.shape, i, fs)
+        xx, yy, xy = _form(shape, b, f2), _form(shape, b, s2), _form(shape, b, fs)
         w[_XX, b], w[_YY, b], w[_XY, b] = xx, yy, xy
         w[_DET, b] = abs(xx * yy - xy * xy)
     for b in range(n):
@@ -117,16 +125,35 @@ def _spread(screens: Screens, leg: np.ndarray, first: int, n: int, w: np.ndarray
 @njit(**_OPTIONS)
 def _compact(n: int, w: np.ndarray, index: np.ndarray) -> int:
     """Moves the Gaussians that shadow the leg to the left; returns how many there are."""
+    count = 0
+    for b in range(n):
+        count += (w[_EDGE, b] > 0.0) & (w[_LOG, b] > LOWEST_EXPONENT)
+    if count == n:
+        return n
     kept = 0
     for b in range(n):
         if w[_EDGE, b] > 0.0 and w[_LOG, b] > LOWEST_EXPONENT:
             index[kept] = b
             kept += 1
-    if kept < n:
-        for row in range(_ROWS):
-            for m in range(kept):
-                w[row, m] = w[row, index[m]]
+    for row in range(_ROWS):
+        for m in range(kept):
+            w[row, m] = w[row, index[m]]
     return kept
+
+
+@njit(**_OPTIONS)
+def _expand(kept: int, n: int, w: np.ndarray, index: np.ndarray) -> None:
+    """Moves what `_compact` kept back to its place; everything else becomes zero."""
+    if kept == n:
+        return
+    for row in range(_ROWS):
+        m = kept - 1
+        for b in range(n - 1, -1, -1):
+            if m >= 0 and index[m] == b:
+                w[row, b] = w[row, m]
+                m -= 1
+            else:
+                w[row, b] = 0.0
 
 
 @njit(inline="always", **_OPTIONS)
@@ -182,10 +209,10 @@ def shadow_forward(
     """Writes T, float64 out[path, re/im]; `legs` as `LegFrames.table` lays them out."""
     total = screens.means.shape[1]
     for path in prange(legs.shape[0]):
-        w = np.zeros((_ROWS, LANES), dtype=screens.alpha.dtype)
+        w = scratch(_ROWS, screens.alpha)
         index = np.zeros(LANES, dtype=np.int64)
-        tr = np.ones(LANES, dtype=screens.alpha.dtype)
-        ti = np.zeros(LANES, dtype=screens.alpha.dtype)
+        tr, ti = scratch(1, screens.alpha)[0], scratch(1, screens.alpha)[0]
+        tr[:] = 1.0
         for first in range(0, total, LANES):
             n = min(LANES, total - first)
             _project(screens, legs[path], wavelength_m, first, n, w)
@@ -235,27 +262,29 @@ def _differentiate(n: int, w: np.ndarray, seed: np.ndarray) -> None:
 
 
 @njit(**_OPTIONS)
-def _chain(leg: np.ndarray, first: int, n: int, w: np.ndarray, at: np.ndarray, grad: Any) -> None:
+def _chain(leg: np.ndarray, first: int, n: int, w: np.ndarray, grad: Any) -> None:
     """From the leg's axes back to positions, covariances and opacities."""
     real = w.dtype.type
     ux, uy, uz = real(leg[3]), real(leg[4]), real(leg[5])
     fx, fy, fz = real(leg[6]), real(leg[7]), real(leg[8])
     sx, sy, sz = real(leg[9]), real(leg[10]), real(leg[11])
     two = real(2.0)
+    alpha = grad.alpha[first : first + n]
+    px, py, pz = three_rows(grad.means, first, n)
+    gxx, gyy, gzz, gxy, gxz, gyz = six_rows(grad.shape, first, n)
     for b in range(n):
-        i = first + at[b]
         x, y, xx, yy, xy = w[_X, b], w[_Y, b], w[_XX, b], w[_YY, b], w[_XY, b]
         t = w[_KAPPA, b] * w[_SLOPE, b] + w[_EDGE, b] * w[_EDGE_SLOPE, b]
-        grad.alpha[i] += w[_ALPHA, b]
-        grad.means[0, i] += x * fx + y * sx + t * ux
-        grad.means[1, i] += x * fy + y * sy + t * uy
-        grad.means[2, i] += x * fz + y * sz + t * uz
-        grad.shape[0, i] += xx * fx * fx + yy * sx * sx + xy * fx * sx
-        grad.shape[1, i] += xx * fy * fy + yy * sy * sy + xy * fy * sy
-        grad.shape[2, i] += xx * fz * fz + yy * sz * sz + xy * fz * sz
-        grad.shape[3, i] += two * (xx * fx * fy + yy * sx * sy) + xy * (fx * sy + fy * sx)
-        grad.shape[4, i] += two * (xx * fx * fz + yy * sx * sz) + xy * (fx * sz + fz * sx)
-        grad.shape[5, i] += two * (xx * fy * fz + yy * sy * sz) + xy * (fy * sz + fz * sy)
+        alpha[b] += w[_ALPHA, b]
+        px[b] += x * fx + y * sx + t * ux
+        py[b] += x * fy + y * sy + t * uy
+        pz[b] += x * fz + y * sz + t * uz
+        gxx[b] += xx * fx * fx + yy * sx * sx + xy * fx * sx
+        gyy[b] += xx * fy * fy + yy * sy * sy + xy * fy * sy
+        gzz[b] += xx * fz * fz + yy * sz * sz + xy * fz * sz
+        gxy[b] += two * (xx * fx * fy + yy * sx * sy) + xy * (fx * sy + fy * sx)
+        gxz[b] += two * (xx * fx * fz + yy * sx * sz) + xy * (fx * sz + fz * sx)
+        gyz[b] += two * (xx * fy * fz + yy * sy * sz) + xy * (fy * sz + fz * sy)
 
 
 @njit(parallel=True, **_OPTIONS)
@@ -265,7 +294,7 @@ def shadow_backward(
     """Adds to `grad`, given real seed[path, re/im] = conj(dL/dT) T."""
     total = screens.means.shape[1]
     for block in prange((total + LANES - 1) // LANES):
-        w = np.zeros((_ROWS, LANES), dtype=screens.alpha.dtype)
+        w = scratch(_ROWS, screens.alpha)
         index = np.zeros(LANES, dtype=np.int64)
         first = block * LANES
         n = min(LANES, total - first)
@@ -276,4 +305,5 @@ def shadow_backward(
             _spread(screens, legs[path], first, n, w)
             kept = _compact(n, w, index)
             _differentiate(kept, w, seed[path])
-            _chain(legs[path], first, kept, w, index, grad)
+            _expand(kept, n, w, index)
+            _chain(legs[path], first, n, w, grad)

@@ -17,21 +17,56 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import types
+from numba import njit, types
 from numba.extending import overload
 
-#: Compiler freedom of all kernels. Signed zeros, infinities and NaN are of no use here;
-#: `reassoc` lets sums over Gaussians become vector sums, in an order fixed at compile time.
-FAST_MATH = {"nnan", "ninf", "nsz", "arcp", "contract", "reassoc"}
+#: Compiler freedom of all kernels. Signed zeros, infinities and NaN are of no use here.
+FAST_MATH = {"nnan", "ninf", "nsz", "arcp", "contract"}
+#: Where a sum over Gaussians shall become a vector sum, in an order fixed at compile time. Not
+#: elsewhere: numba optimises code that it caches once more than code that it runs at once, and
+#: terms that may be reordered then end in other last bits.
+FAST_SUMS = FAST_MATH | {"reassoc"}
 
 #: Gaussians per block: about thirty rows of this many float32 numbers stay in the L1 cache.
 LANES = 128
+
+#: Rows kept free on both sides of a block's scratch. Vector code asks at run time whether what it
+#: writes lies near what it reads, and takes the scalar way (other last bits) where it does: the
+#: heap's layout would show in the result.
+_APART = 32
 
 _OPTIONS: Any = {"fastmath": FAST_MATH, "error_model": "numpy"}
 _F = np.float32
 _LOG2_E = _F(1.4426950408889634)
 _LN_2 = _F(0.6931471805599453)
 _LOWEST = _F(-87.0)
+
+
+@njit(**_OPTIONS)
+def scratch(rows: int, like: np.ndarray) -> np.ndarray:
+    """Zeroed [rows, LANES] for one block in the precision of `like`, apart from other arrays."""
+    return np.zeros((rows + 2 * _APART, LANES), dtype=like.dtype)[_APART:-_APART]
+
+
+@njit(inline="always", **_OPTIONS)
+def three_rows(table: np.ndarray, first: int, n: int) -> tuple[np.ndarray, ...]:
+    """Views of n columns of a table's three rows.
+
+    An index that is a sum may be negative for all the compiler knows, and then counts from the
+    end: vector code fetches such values one by one. Within a view it loads them in one go.
+    """
+    end = first + n
+    return table[0, first:end], table[1, first:end], table[2, first:end]
+
+
+@njit(inline="always", **_OPTIONS)
+def six_rows(table: np.ndarray, first: int, n: int) -> tuple[np.ndarray, ...]:
+    """Views of n columns of a table's six rows, as `three_rows`."""
+    end = first + n
+    return (
+        *(table[0, first:end], table[1, first:end], table[2, first:end]),
+        *(table[3, first:end], table[4, first:end], table[5, first:end]),
+    )
 
 
 def exponential(x: float) -> float:

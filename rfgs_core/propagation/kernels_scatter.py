@@ -51,6 +51,7 @@ BY_AMPLITUDE, BY_DISTANCE, BY_SPREAD, MOMENTS = 18, 19, 20, 21
 ROWS = MOMENTS + 6
 
 OPTIONS: dict[str, Any] = {"fastmath": FAST_MATH, "cache": True, "error_model": "numpy"}
+_SUM_OPTIONS: dict[str, Any] = OPTIONS | {"fastmath": FAST_SUMS}
 
 
 class Cloud(NamedTuple):
@@ -177,7 +178,7 @@ def turn(x: float, y: float, u: float, v: float, e: float) -> Any:
     return x * u - y * v, x * v + y * u, u + u * e, v + v * e
 
 
-@njit(**{**OPTIONS, "fastmath": FAST_SUMS})
+@njit(**_SUM_OPTIONS)
 def _sum_tones(
     n: int,
     zr: np.ndarray,

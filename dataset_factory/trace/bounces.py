@@ -20,6 +20,7 @@ from sionna.rt.rcs import ConstantCPM, ConstantRCS, RCSSolver, ScatteringModel, 
 
 from dataset_factory.trace.direct import PosedPoints
 from dataset_factory.trace.environment import measured_pairs
+from dataset_factory.trace.legs import LegCandidates
 from dataset_factory.trace.paths import SENSING, PathSet, empty, merged, path_set
 from dataset_factory.trace.scene import add_antennas, centres
 from rfgs_core.radio import Layout
@@ -47,10 +48,12 @@ class JoiningSolver(RCSSolver):
     without a measured link.
     """
 
-    def __init__(self, measured: np.ndarray) -> None:
-        """Takes which pairs of sites are measured, bool, shape (tx, rx)."""
+    def __init__(self, measured: np.ndarray, depth: int) -> None:
+        """Takes which pairs of sites are measured, bool, shape (tx, rx), and the depth."""
         super().__init__(deterministic=True)
         self._measured = measured
+        if depth == 2:
+            self._candidate_generator = LegCandidates()
 
     def _pair_legs(
         self, from_tx_paths: Any, to_rx_paths: Any, max_depth: int
@@ -92,7 +95,7 @@ class Bounces:
         """
         self._scene, self._layout = scene, layout
         self._depth, self._seed = depth, seed
-        self._solver = JoiningSolver(measured_pairs(layout))
+        self._solver = JoiningSolver(measured_pairs(layout), depth)
         self._rcs, self._cpm = ConstantRCS(1.0), ConstantCPM()
         mi_scene: Any = scene.mi_scene
         low = np.array(mi_scene.bbox().min, dtype=np.float64).ravel()

@@ -182,20 +182,22 @@ def _add_block(
         out: Channel of the link, shape (subcarrier,).
     """
     left, share = tones
+    # Rows of their own: one index that cannot be negative, so the loop becomes vector code.
+    phasor_re, phasor_im, turn_re, turn_im = phasor[0], phasor[1], turn[0], turn[1]
     for f in range(len(left)):
-        low = gain[left[f]]
-        high = gain[min(left[f] + 1, len(gain) - 1)]
+        low, high = gain[left[f]], gain[min(left[f] + 1, len(gain) - 1)]
+        low_re, low_im, high_re, high_im = low[0], low[1], high[0], high[1]
         part = share[f]
         rest = 1.0 - part
         sum_re, sum_im = 0.0, 0.0
-        for j in range(phasor.shape[1]):
-            re, im = phasor[0, j], phasor[1, j]
-            a_re = rest * low[0, j] + part * high[0, j]
-            a_im = rest * low[1, j] + part * high[1, j]
+        for j in range(len(phasor_re)):
+            re, im = phasor_re[j], phasor_im[j]
+            a_re = rest * low_re[j] + part * high_re[j]
+            a_im = rest * low_im[j] + part * high_im[j]
             sum_re += a_re * re - a_im * im
             sum_im += a_re * im + a_im * re
-            phasor[0, j] = re * turn[0, j] - im * turn[1, j]
-            phasor[1, j] = re * turn[1, j] + im * turn[0, j]
+            phasor_re[j] = re * turn_re[j] - im * turn_im[j]
+            phasor_im[j] = re * turn_im[j] + im * turn_re[j]
         out[f] += complex(sum_re, sum_im)
 
 

@@ -59,7 +59,8 @@ class Lane:
 
         Returns:
             The answer of the process and its `memory_bytes` after the frame, or `error` with
-            the reason; `crash` if it is not the user's mistake.
+            the reason; `crash` if it is not the user's mistake. The next frame gets another
+            process after an error.
         """
         reason = ""
         for _ in range(_ATTEMPTS):
@@ -71,6 +72,10 @@ class Lane:
                 if self._ended:
                     break
             else:
+                if "error" in reply:
+                    # A process that has not begun would take the next frame for its job.
+                    self._drop()
+                    return reply
                 return {**reply, "memory_bytes": self._recycle()}
         return {"error": f"{reason} (tried twice)", "crash": True}
 

@@ -19,8 +19,8 @@ GB = 10**9
 #: A process that speaks the protocol of `dataset_factory.worker` and misbehaves on request.
 MISBEHAVING = """
 import json, os, signal, sys, time
-sys.stdin.readline()
-print(json.dumps({"ready": True}), flush=True)
+refused = "refuse" in json.loads(sys.stdin.readline())
+print(json.dumps({"error": "no such scene"} if refused else {"ready": True}), flush=True)
 marks = os.environ["MARKS"]
 hoard = []
 for line in sys.stdin:
@@ -125,6 +125,16 @@ def test_a_lane_that_has_ended_starts_nothing(tmp_path: Path, misbehaving: Path)
     lane.end()
     assert "error" in lane.trace(Task("wifi", 2).request)
     assert lane.started == 1
+
+
+def test_a_process_that_could_not_begin_is_not_asked_again(
+    tmp_path: Path, misbehaving: Path
+) -> None:
+    lane = Lane({"refuse": True}, tmp_path / "log", Limits(GB))
+    answers = [lane.trace(Task("wifi", frame).request) for frame in (1, 2)]
+    lane.end()
+    assert answers == [{"error": "no such scene"}] * 2
+    assert asked(misbehaving) == []
 
 
 def test_workers_share_the_memory_of_the_machine() -> None:

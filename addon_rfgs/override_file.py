@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
@@ -16,6 +17,9 @@ from .naming import closest
 from .overrides import Overrides, RadioMaterial, Ring, Room
 from .tables import MATERIALS
 
+#: What Blender holds without a word about it: it cuts other numbers off.
+_FPS = (0.001, 32767)
+_LAST_FRAME = 1_048_574
 _ROLES = ("ACCESS_POINT", "TRANSMITTER", "RECEIVER")
 
 
@@ -64,14 +68,24 @@ def _positive(label: str, value: Any) -> float:
     return float(value)
 
 
+def _fps(label: str, value: Any) -> float:
+    if not _is_number(value) or not _FPS[0] <= value <= _FPS[1]:
+        raise AddonError(f"{label}: expected a number from {_FPS[0]} to {_FPS[1]}, got {value!r}")
+    return float(value)
+
+
 def _frame_range(label: str, value: Any) -> tuple[int, int]:
-    parts = value.split(":") if isinstance(value, str) else value
-    try:
-        first, last = (int(part) for part in parts)
-    except (TypeError, ValueError) as error:
-        raise AddonError(f"{label}: expected FIRST:LAST, got {value!r}") from error
+    parts = value
+    if isinstance(value, str):
+        match = re.fullmatch(r"(-?[0-9]{1,9}):(-?[0-9]{1,9})", value)
+        parts = [int(part) for part in match.groups()] if match else None
+    if not isinstance(parts, list) or len(parts) != 2 or {type(part) for part in parts} != {int}:
+        raise AddonError(f"{label}: expected FIRST:LAST, got {value!r:.60}")
+    first, last = parts
     if last <= first:
-        raise AddonError(f"{label}: expected FIRST < LAST, got {value!r}")
+        raise AddonError(f"{label}: expected FIRST < LAST, got {value!r:.60}")
+    if first < 0 or last > _LAST_FRAME:
+        raise AddonError(f"{label}: expected frames of 0 to {_LAST_FRAME}, got {value!r:.60}")
     return first, last
 
 
@@ -195,7 +209,7 @@ def _boresight(place: tuple[float, ...], target: tuple[float, ...]) -> tuple[flo
 
 _READERS: dict[str, Callable[[str, Any], Any]] = {
     "frame_range": _frame_range,
-    "fps": _positive,
+    "fps": _fps,
     "unit_scale": _positive,
     "bounds_m": _bounds,
     "drop": _patterns,

@@ -17,6 +17,9 @@ import tyro
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.yaml_file import read_yaml
 
+#: Keys whose order counts; kept as rows, as equal mappings may differ in their order.
+_RULES = ("materials", "object_materials")
+
 _Names = tyro.conf.UseAppendAction[tuple[str, ...]]
 
 
@@ -58,12 +61,14 @@ class SceneOptions:
 def read_options(options: SceneOptions) -> dict[str, Any]:
     """Options laid over the YAML file, in the words of the file.
 
-    Values are judged by the add-on, which knows the scene.
+    Values are judged by the add-on, which knows the scene. Rules about materials come as rows of
+    pattern and material: of two that fit the first decides, so their order is part of a plan.
 
     Raises:
         RfgsError: There is no such file, or an option has no `=`.
         RfgsFormatError: The file is no YAML mapping, or a value is no text or finite number.
     """
+    source = label(options)
     said = {} if options.scene_config is None else _read_yaml(options.scene_config)
     for name in ("fps", "unit_scale", "room", "frame_range"):
         value = getattr(options, name)
@@ -80,11 +85,14 @@ def read_options(options: SceneOptions) -> dict[str, Any]:
         if rows:
             # The first pattern that fits decides, so options stand first.
             rules = dict(map(_rule, rows))
-            said[name] = {**rules, **_mapping(name, said.get(name)), **rules}
+            said[name] = {**rules, **_mapping(source, name, said.get(name)), **rules}
+    for name in _RULES:
+        if name in said:
+            said[name] = [list(rule) for rule in _mapping(source, name, said[name]).items()]
     if options.ring is not None:
-        said["cameras"] = {**_mapping("cameras", said.get("cameras")), "ring": options.ring}
+        said["cameras"] = {**_mapping(source, "cameras", said.get("cameras")), "ring": options.ring}
     for name, value in said.items():
-        _refuse_strange(f"{label(options)}: {name}", value)
+        _refuse_strange(f"{source}: {name}", value)
     return said
 
 
@@ -101,8 +109,9 @@ def overrides_file(said: dict[str, Any], label: str = "overrides") -> Iterator[l
         return
     with TemporaryDirectory(prefix="rfgs-") as folder:
         file = Path(folder) / "overrides.json"
+        rules = {name: dict(said[name]) for name in _RULES if name in said}
         # Not sorted: of two patterns that fit a name, the first decides.
-        file.write_text(json.dumps({**said, "label": label}, allow_nan=False), "utf-8")
+        file.write_text(json.dumps({**said, **rules, "label": label}, allow_nan=False), "utf-8")
         yield ["--overrides", str(file)]
 
 
@@ -131,13 +140,13 @@ def _listed(value: Any) -> list[Any]:
     return value if isinstance(value, list) else [value]
 
 
-def _mapping(name: str, value: Any) -> dict[str, Any]:
+def _mapping(source: str, name: str, value: Any) -> dict[str, Any]:
     if value is None:
         return {}
     if isinstance(value, int) and name == "cameras":
         return {"ring": value}
     if not isinstance(value, dict):
-        raise RfgsError(f"{name}: expected keys and values, got {value!r}")
+        raise RfgsError(f"{source}: {name}: expected keys and values, got {value!r:.60}")
     return value
 
 

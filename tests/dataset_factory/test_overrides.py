@@ -5,12 +5,18 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
 
+from dataset_factory.job import Job
 from dataset_factory.overrides import SceneOptions, overrides_file, read_options
+from dataset_factory.plan import refuse_other_plan, versions
 from rfgs_core.errors import RfgsError
+
+MakeJob = Callable[..., Job]
 
 _FILE = """
 frames: 1:30          # a range, not 90 in base 60
@@ -41,7 +47,7 @@ def test_scalars_are_read_as_meant(config: Path) -> None:
         "drop": ["Sky", "Tree*"],
         "people": "on",
         "fps": 29.97,
-        "materials": {"Paint*": "plasterboard"},
+        "materials": [["Paint*", "plasterboard"]],
         "cameras": {"ring": 6, "radius_m": 2},
     }
 
@@ -62,8 +68,8 @@ def test_options_go_before_the_file_and_lists_add_up(config: Path) -> None:
     )
     assert said["fps"] == 60 and said["room"] == "box"
     assert said["drop"] == ["Sky", "Tree*", "Lamp"] and said["people"] == ["on", "Anna"]
-    assert said["materials"] == {"Paint*": "glass", "a=b": "wood"}
-    assert said["object_materials"] == {"Wall": "concrete"}
+    assert said["materials"] == [["Paint*", "glass"], ["a=b", "wood"]]
+    assert said["object_materials"] == [["Wall", "concrete"]]
     assert said["cameras"] == {"ring": 4, "radius_m": 2}
     assert said["bounds_m"] == [[-1, -2, 0], [1, 2, 3]]
 
@@ -83,6 +89,7 @@ def test_options_go_before_the_file_and_lists_add_up(config: Path) -> None:
         ("people: !!set {Anna}\n", ["people: expected text"]),
         ("devices: [{position_m: [1, 2, !!timestamp 2020-01-01]}]\n", ["devices: position_m:"]),
         ("drop: &a [x]\npeople: *a\n", ["line 2", "alias 'a'", "in quotes"]),
+        ("materials: [[Wall, brick]]\n", ["materials: expected keys and values"]),
         ("drop: " + "[" * 5000, ["no valid YAML"]),
     ],
 )
@@ -120,6 +127,19 @@ def test_rules_reach_the_scene_in_their_order(tmp_path: Path) -> None:
         ("Wall*", "brick"),
         ("*", "wood"),
     ]
+
+
+def test_rules_in_another_order_are_another_plan(make_job: MakeJob, tmp_path: Path) -> None:
+    plans = []
+    for rules in ('{"Wall*": brick, "*": wood}', '{"*": wood, "Wall*": brick}'):
+        file = tmp_path / "scene.yaml"
+        file.write_text(f"materials: {rules}\n")
+        said = read_options(SceneOptions(scene_config=file))
+        plans.append(replace(make_job(tmp_path).plan, overrides=said))
+    stored = json.loads(json.dumps(asdict(plans[0]), sort_keys=True))
+    refuse_other_plan(tmp_path, plans[0], stored, versions())
+    with pytest.raises(RfgsError, match="was made with overrides = "):
+        refuse_other_plan(tmp_path, plans[1], stored, versions())
 
 
 def test_missing_file_and_missing_sign(tmp_path: Path) -> None:

@@ -89,7 +89,9 @@ def run_on_cluster(
             return future
 
         of_future: dict[Any, Task] = {}
-        running = as_completed([submit(task) for task in islice(waiting, _room(client))])
+        # Enough that no thread waits.
+        first = islice(waiting, _AHEAD * _threads(client))
+        running = as_completed([submit(task) for task in first])
         for future in running:
             task = of_future.pop(future.key)
             reply = _answer(future, task, address)
@@ -99,6 +101,17 @@ def run_on_cluster(
             for following in islice(waiting, 1):
                 running.add(submit(following))
     return {name: round(value, 3) for name, value in sorted(seconds.items())}
+
+
+def threads(address: str) -> int:
+    """How many frames a cluster traces at the same time.
+
+    Raises:
+        MissingToolError: Dask is not installed.
+        RfgsError: There is no such cluster.
+    """
+    with _connected(address) as client:
+        return _threads(client)
 
 
 class _Store:
@@ -157,10 +170,9 @@ def _connected(address: str) -> Iterator[Client]:
                 client.run(_close_places)
 
 
-def _room(client: Client) -> int:
-    """Tasks to hand in at once: enough that no thread waits."""
-    threads: Any = client.nthreads()
-    return _AHEAD * max(sum(threads.values()), 1)
+def _threads(client: Client) -> int:
+    of_worker: Any = client.nthreads()
+    return max(sum(of_worker.values()), 1)
 
 
 def _answer(future: Future, task: Task, address: str) -> dict[str, Any]:

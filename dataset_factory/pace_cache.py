@@ -43,7 +43,7 @@ def _file(job: Job) -> Path:
     """Where the pace of jobs like this one lies; frames, seed and folder do not count."""
     plan = {key: value for key, value in asdict(job.plan).items() if key not in ("frames", "seed")}
     machine = [platform.node(), platform.processor(), platform.machine(), os.cpu_count()]
-    what = [plan, job.workers, str(job.blender.program), versions(), machine]
+    what = [plan, job.workers, job.scheduler, str(job.blender.program), versions(), machine]
     key = hashlib.sha256(json.dumps(what, sort_keys=True, default=str).encode()).hexdigest()
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     return cache / "rfgs" / "paces" / f"{key[:32]}.json"

@@ -9,7 +9,7 @@ from typing import Any
 from tqdm import tqdm
 
 from dataset_factory.bundle import Bundle
-from dataset_factory.cluster import run_on_cluster
+from dataset_factory.cluster import run_on_cluster, threads
 from dataset_factory.job import Job
 from dataset_factory.pace import Clock
 from dataset_factory.plan import missing_channels
@@ -32,6 +32,8 @@ def trace(job: Job, bundle: Bundle, sequence: SequenceInfo) -> None:
     if not tasks:
         return
     request = _request(job, bundle, sequence)
+    if job.scheduler:
+        job.workers = threads(job.scheduler)
     pace = _Paces(job)
     with tqdm(total=len(tasks), desc="trace", unit="frame") as bar:
 
@@ -85,6 +87,5 @@ class _Paces:
         self._clock.step()
 
     def note(self) -> None:
-        """Keeps the pace of the last radio; a cluster's says nothing about this machine."""
-        if not self._job.scheduler:
-            self._job.note_pace(f"trace {self._radio}", self._clock)
+        """Keeps the pace of the last radio."""
+        self._job.note_pace(f"trace {self._radio}", self._clock)

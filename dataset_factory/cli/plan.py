@@ -14,17 +14,20 @@ class PlanArgs(GenerateArgs):
     """Prints the frames, disk and time that `generate` would take; nothing is kept.
 
     Takes the arguments of `generate`. The time comes from an earlier run with these settings on
-    this machine; where there is none, a few frames are made in a temporary folder, which takes
-    a minute or two. Exit code 2 if the disk is too small.
+    this machine, or on this cluster with as many threads; where there is none, a few frames are
+    made in a temporary folder, which takes a minute or two. Exit code 2 if the disk is too small.
     """
 
 
 def run(args: PlanArgs) -> int:
     """Prints the estimate."""
+    from dataset_factory.cluster import threads
     from dataset_factory.disk import gigabytes, refuse_small_disk
     from dataset_factory.estimate import estimate
 
     job, scene = job_of(args)
+    if job.scheduler:
+        job.workers = threads(job.scheduler)
     found = estimate(job, scene.frames)
     measured = "a few frames made just now" if found.measured_now else "an earlier run"
     stages = ", ".join(f"{name} {_minutes(value)}" for name, value in found.seconds.items())
@@ -34,7 +37,7 @@ def run(args: PlanArgs) -> int:
         f"frames  {found.frames}, {found.cameras} cameras, {job.workers} workers\n"
         f"disk    {gigabytes(found.disk_bytes)} at most\n"
         f"time    {_minutes(total)}: {stages}\n"
-        f"        measured on this machine: {measured}\n"
+        f"        measured on {job.scheduler or 'this machine'}: {measured}\n"
     )
     refuse_small_disk(job, found.disk_bytes)
     return 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -21,6 +22,7 @@ from rfgs_core.errors import RfgsError
 pytest.importorskip("distributed", reason="the extra 'cluster' is not installed")
 
 MakeJob = Callable[..., Job]
+Factory = Callable[..., subprocess.CompletedProcess[str]]
 Bytes = Callable[[Path], dict[str, bytes]]
 
 
@@ -71,6 +73,22 @@ def test_one_worker_two_workers_and_a_cluster_that_loses_one_give_the_same_bytes
     one, two, spread = (data_of(folder) for folder in folders)
     assert one == two
     assert one == spread
+
+
+@pytest.mark.slow
+def test_plan_tells_the_pace_of_a_cluster(
+    factory: Factory, box_room: Path, cluster: Any, tmp_path: Path
+) -> None:
+    arguments = ["plan", str(box_room), "--radio", "wifi", "--frames", "1:4", "--no-images"]
+    arguments += ["--depth", "1", "--out", str(tmp_path / "out")]
+    arguments += ["--scheduler", cluster.scheduler_address]
+    cache = {"XDG_CACHE_HOME": str(tmp_path / "cache")}
+    answers = [factory(*arguments, **cache) for _ in range(2)]
+    assert [answer.returncode for answer in answers] == [0, 0], answers[0].stderr
+    assert "frames  4, 0 cameras, 2 workers" in answers[0].stdout
+    assert f"measured on {cluster.scheduler_address}: a few frames" in answers[0].stdout
+    assert f"measured on {cluster.scheduler_address}: an earlier run" in answers[1].stdout
+    assert "trace wifi" in answers[1].stdout
 
 
 @pytest.mark.slow

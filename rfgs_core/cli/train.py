@@ -10,6 +10,7 @@ from typing import Annotated
 
 import tyro
 
+from rfgs_core.dataset.observed import Observed
 from rfgs_core.train.config import Objective, Recipe, TrainConfig
 
 
@@ -33,6 +34,9 @@ class TrainArgs:
     """Frames A:B[:STEP] (inclusive), or one number; all when left out."""
     objective: Objective = "csi"
     """csi: the propagation model; paper: eq. 4-7 of the paper; both: their sum."""
+    channel: Observed = "clean"
+    """clean: the traced channel; impaired: what `rfgs-factory impair` made of it. The empty room
+    stays clean, since its capture can be averaged."""
     recipe: Recipe = "rfgs"
     """rfgs: our start, rates and steps; paper: the paper's numbers."""
     seed: int = 0
@@ -56,6 +60,7 @@ def run(args: TrainArgs) -> int:
     from rfgs_core.seeds import sub_seed
 
     config = TrainConfig.of_recipe(args.recipe, args.objective, args.seed)
+    config = replace(config, channel=args.channel)
     if args.iterations is not None:
         if args.iterations < 0:
             raise RfgsError(f"--iterations {args.iterations}: expected at least 0")

@@ -49,8 +49,8 @@ class Evidence:
         grid: Grid,
         voxels: int,
     ) -> Evidence:
-        """Evidence of one frame: everything that is not visible becomes NaN."""
-        visible = held_out.visible
+        """Evidence of one frame: everything that is held out or lost becomes NaN."""
+        visible = held_out.visible & np.isfinite(csi)
         hidden = np.complex64(complex(np.nan, np.nan))
         return Evidence(
             delta=np.where(visible, csi - csi_static, hidden).astype(np.complex64),

@@ -45,7 +45,7 @@ def start_on_surface(
 
 
 def _fit_from_surface(run: EvaluatedRun, config: TrainConfig, frame: int) -> FrameState:
-    observations = observe(run.sequence, run.config["radio"], frame)
+    observations = observe(run.sequence, run.config["radio"], frame, config.channel)
     state = start_on_surface(run, observations, config, frame)
     if config.objective != "paper":
         state = solve_reflectivity(observations, state, config)

@@ -5,12 +5,14 @@ from __future__ import annotations
 
 import os
 import platform
+from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 from rfgs_core.evaluate.scene import Scene
+from rfgs_core.radio.impairments import Impairments
 
 PACKAGES = ("rfgs", "torch", "numpy", "numba", "scipy", "sionna-rt", "mitsuba", "bpy")
 
@@ -60,17 +62,18 @@ def conditions(scene: Scene) -> dict[str, Any]:
     """How the data came about, as far as it decides what a number means."""
     info = scene.run.sequence.info
     depth = scene.run.sequence.trace_depth(scene.radio.name)
+    kind = "clean" if scene.run.channel == "clean" else "impaired"
     if depth <= 1:
         label = (
-            "clean, depth 1: single-bounce data fitted with a single-bounce model, an inverse "
+            f"{kind}, depth 1: single-bounce data fitted with a single-bounce model, an inverse "
             "crime; not a headline result"
         )
     else:
         walls = "one wall bounce" if depth == 2 else f"up to {depth - 1} wall bounces"
-        label = f"clean, depth {depth}: what people scatter arrives directly and over {walls}"
+        label = f"{kind}, depth {depth}: what people scatter arrives directly and over {walls}"
     return {
         "label": label,
-        "impairments": "none",
+        "impairments": _impairments(scene),
         "shadow": info.shadow,
         "scene": info.scene,
         "sequence": scene.run.sequence.name,
@@ -83,6 +86,15 @@ def conditions(scene: Scene) -> dict[str, Any]:
         "seed": scene.run.config.get("seed"),
         "prior": "the person's position is not given; search is over the whole scene",
     }
+
+
+def _impairments(scene: Scene) -> str:
+    """What imperfect radios did to the channel that was fitted."""
+    if scene.run.channel == "clean":
+        return "none"
+    chosen = asdict(scene.run.sequence.impairments(scene.radio.name).settings)
+    plain = asdict(Impairments())
+    return ", ".join(f"{name} {chosen[name]}" for name in chosen if chosen[name] != plain[name])
 
 
 def limits(scene: Scene) -> dict[str, float | None]:

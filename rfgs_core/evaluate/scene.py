@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from jaxtyping import Complex, Float, Float32, Float64
 
+from rfgs_core.dataset.observed import Observed, observed_csi
 from rfgs_core.dataset.reader import Sequence
 from rfgs_core.errors import RfgsError
 from rfgs_core.evaluate.controls.gaussian_process import krige, krige_level
@@ -35,6 +36,11 @@ class EvaluatedRun(Protocol):
     @property
     def config(self) -> dict[str, Any]:
         """What was asked for: radio, sequence, frames, objective and seed."""
+        ...
+
+    @property
+    def channel(self) -> Observed:
+        """Which channel the run was fitted to."""
         ...
 
     @property
@@ -107,13 +113,13 @@ class Scene:
         return Scene(run, radio, layout, held_out, grid, voxels, static, environment)
 
     def csi(self, frame: int) -> Complex[np.ndarray, "tx rx subcarrier"]:
-        """True channel of a frame."""
+        """True channel of a frame: predictions are held against it, whatever was observed."""
         return self.run.sequence.csi(self.radio.name, frame)
 
     def evidence(self, frame: int, score: Float[np.ndarray, "x y z"]) -> Evidence:
         """What controls may see of a frame, and where the method's own `score` is centred."""
         evidence = Evidence.hide(
-            self.csi(frame),
+            observed_csi(self.run.sequence, self.radio.name, frame, self.run.channel),
             self.csi_static,
             self.held_out,
             self.layout,

@@ -7,7 +7,7 @@ import os
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import torch
@@ -15,6 +15,7 @@ from jaxtyping import Complex64
 
 from rfgs_core.arrays import Shape, load_arrays
 from rfgs_core.dataset import Sequence, open_dataset
+from rfgs_core.dataset.observed import Observed
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.files import read_json
 from rfgs_core.gaussians import FEATURE_DIM, Gaussians
@@ -43,6 +44,11 @@ class Run:
     def frames(self) -> list[int]:
         """Frames the run was trained on."""
         return list(self.config["frames"])
+
+    @property
+    def channel(self) -> Observed:
+        """Which channel the run was fitted to."""
+        return self.config["channel"]
 
     @property
     def sequence(self) -> Sequence:
@@ -101,7 +107,7 @@ class Run:
 
     def predict(self, frame: int) -> Complex64[np.ndarray, "tx rx subcarrier"]:
         """Predicted csi − csi_static on every measured link, held-out ones included."""
-        observations = observe(self.sequence, self.config["radio"], frame)
+        observations = observe(self.sequence, self.config["radio"], frame, self.channel)
         everything = np.ones(len(observations.freq_hz), dtype=bool)
         channel = Channel.of(observations, observations.layout.measured, everything)
         with torch.no_grad():
@@ -149,6 +155,11 @@ def open_run(path: Path) -> Run:
         raise RfgsFormatError(
             f"{path / 'config.json'}: expected entries {', '.join(missing)}, which are missing; "
             "train again"
+        )
+    if config.setdefault("channel", "clean") not in get_args(Observed):
+        raise RfgsFormatError(
+            f"{path / 'config.json'}: channel: expected one of {', '.join(get_args(Observed))}, "
+            f"found {config['channel']!r}; train again"
         )
     frames = config["frames"]
     if (

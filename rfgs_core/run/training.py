@@ -85,7 +85,7 @@ def fit_frame(
     run: Run, frame: int, config: TrainConfig, before: FrameState | None, bar: Any
 ) -> FrameState:
     """Runs all stages on one frame."""
-    observations = observe(run.sequence, run.config["radio"], frame)
+    observations = observe(run.sequence, run.config["radio"], frame, config.channel)
     seed = sub_seed(config.seed, run.config["sequence"], run.config["radio"], frame, "fit")
     state = start_frame(observations, config, seed, before)
     bar.update(1)

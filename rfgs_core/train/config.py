@@ -6,6 +6,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from rfgs_core.dataset.observed import Observed
+
 Objective = Literal["paper", "csi", "both"]
 Recipe = Literal["rfgs", "paper"]
 
@@ -16,6 +18,8 @@ class TrainConfig:
 
     objective: Objective = "csi"
     """paper: eq. 4–7; csi: the propagation model; both: their sum."""
+    channel: Observed = "clean"
+    """clean: the traced channel; impaired: what imperfect radios make of it."""
     recipe: Recipe = "rfgs"
     """rfgs: our start, rates and steps; paper: the paper's numbers (sections 3.2–3.6)."""
     num_gaussians: int = 6000

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Bool, Complex64, Float64, Int64
 
+from rfgs_core.dataset.observed import Observed, observed_csi
 from rfgs_core.encode.matched_filter import device_pairs
 from rfgs_core.errors import RfgsError
 from rfgs_core.radio import Layout
@@ -71,8 +72,10 @@ def _visible(
     return links, tones
 
 
-def observe(sequence: Sequence, radio: str, frame: int) -> Observations:
-    """Reads one frame at its own time and hides what is held out.
+def observe(
+    sequence: Sequence, radio: str, frame: int, channel: Observed = "clean"
+) -> Observations:
+    """Reads one frame at its own time and hides what is held out, and links that lost a packet.
 
     Raises:
         RfgsError: The channel holds values that are not finite, or its antennas move within a
@@ -87,7 +90,9 @@ def observe(sequence: Sequence, radio: str, frame: int) -> Observations:
     # The links that exist are those the channels were stored with.
     elements = replace(sequence.layout(radio), measured=data["measured"].values)
     links, tones = _visible(sequence.splits["rf"][radio], elements, data.sizes["subcarrier"])
-    csi, static = sequence.csi(radio, frame), sequence.csi_static(radio)
+    csi, static = observed_csi(sequence, radio, frame, channel), sequence.csi_static(radio)
+    if channel == "impaired":
+        links &= ~np.isnan(csi).all(axis=2)
     seen = links[:, :, None] & tones
     for name, values in (("csi", csi), ("csi_static", static)):
         if not np.isfinite(values[seen]).all():

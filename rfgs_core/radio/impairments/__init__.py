@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from rfgs_core.radio.impairments.apply import impair, restore
 from rfgs_core.radio.impairments.draw import Draw, draw_impairments
+from rfgs_core.radio.impairments.receiver import amplitude
 from rfgs_core.radio.impairments.settings import (
     IMPAIRMENT_PRESETS,
     Impairments,
@@ -16,6 +17,7 @@ __all__ = [
     "IMPAIRMENT_PRESETS",
     "Draw",
     "Impairments",
+    "amplitude",
     "draw_impairments",
     "impair",
     "impairments_from_json",

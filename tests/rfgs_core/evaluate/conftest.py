@@ -13,6 +13,7 @@ import pytest
 import torch
 
 from rfgs_core.dataset import Sequence, open_dataset
+from rfgs_core.dataset.observed import Observed
 from rfgs_core.dataset.splits import radio_split
 from rfgs_core.evaluate.evidence import Evidence
 from rfgs_core.evaluate.geometry import reference_points
@@ -35,6 +36,7 @@ class SurfaceRun:
     shift_m: np.ndarray = field(default_factory=lambda: np.zeros(3))
     frames: list[int] = field(default_factory=lambda: [1, 2])
     config: dict[str, Any] = field(default_factory=lambda: {"radio": "wifi", "train_s": 1.5})
+    channel: Observed = "clean"
 
     def gaussians(self, frame: int) -> Gaussians:
         vertices, faces, _ = self.sequence.moving_mesh(frame)

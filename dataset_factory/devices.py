@@ -3,14 +3,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
+
+import numpy as np
 
 from dataset_factory.bundle import Bundle
 from dataset_factory.radios import SCENE_RADIO
 from rfgs_core.dataset.schema import device_pose
 from rfgs_core.errors import RfgsError
-from rfgs_core.radio import DevicePose, Radio, place_devices
-from rfgs_core.radio.check import check, check_devices
+from rfgs_core.radio import DevicePose, Radio, frame_samples, layout, place_devices
+from rfgs_core.radio.check import check, check_devices, enclosed
 
 #: Placement rules in words.
 _WHERE = {"corners": "in the corners of the scene", "walls": "along the walls of the scene"}
@@ -40,7 +43,7 @@ def choose_devices(bundle: Bundle, radio: Radio) -> tuple[list[DevicePose], dict
                     "an Empty another role"
                 )
         return own, None
-    placed = place_devices(radio, bundle.bounds_m)
+    placed = _clear_of_furniture(radio, place_devices(radio, bundle.bounds_m), bundle)
     guess = {
         "what": "devices",
         "object": radio.name,
@@ -49,6 +52,30 @@ def choose_devices(bundle: Bundle, radio: Radio) -> tuple[list[DevicePose], dict
         + " or ".join(repr(name) for name in sorted(names)),
     }
     return placed, guess
+
+
+def _clear_of_furniture(
+    radio: Radio, devices: list[DevicePose], bundle: Bundle
+) -> list[DevicePose]:
+    """Moves placed devices to another of the radio's heights where furniture stands at theirs."""
+    meshes = bundle.static_meshes()
+
+    def hidden(device: DevicePose) -> tuple[int, int]:
+        """Whether the device, and how many of its antennas, are inside objects."""
+        antennas = layout(radio, [device])
+        points = np.concatenate([[device.position_m], antennas.tx_xyz, antennas.rx_xyz])
+        inside = np.zeros(len(points), dtype=bool)
+        for mesh in meshes:
+            inside |= enclosed(points, bundle.bounds_m, mesh.vertices, mesh.faces)
+        return int(inside[0]), int(inside.sum())
+
+    clear = []
+    for device in devices:
+        x, y, own_m = device.position_m
+        heights_m = [float(bundle.bounds_m[0, 2]) + height for height in radio.heights_m]
+        choices = [replace(device, position_m=(x, y, z)) for z in (own_m, *heights_m)]
+        clear.append(min(choices, key=hidden))
+    return clear
 
 
 def check_scene(bundle: Bundle, devices: dict[str, list[DevicePose]], radios: list[Radio]) -> None:
@@ -69,6 +96,10 @@ def radio_problems(
     problems = []
     meshes = [(mesh.name, mesh.vertices, mesh.faces) for mesh in bundle.static_meshes()]
     for radio in radios:
+        try:
+            frame_samples(radio, bundle.fps)
+        except RfgsError as error:
+            problems.append(str(error))
         problems += check(radio, bundle.bounds_m, bundle.materials)
         problems += check_devices(radio, bundle.bounds_m, devices[radio.name], meshes)
     return list(dict.fromkeys(problems))

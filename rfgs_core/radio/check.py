@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Float64, Int
+from jaxtyping import Bool, Float, Float64, Int
 
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.layout import NEAREST_ANTENNAS_M, DevicePose, layout, nearest_m
@@ -112,21 +112,39 @@ def check_devices(
                         "turn the device, or use a radio with a shorter array"
                     )
     problems += _coincident(radio, devices)
-    volume = float(np.prod(np.maximum(bounds_m[1] - bounds_m[0], 1e-6)))
     for name, vertices, faces in meshes:
-        if not len(faces):
-            continue
-        low, high = vertices.min(axis=0), vertices.max(axis=0)
-        if np.prod(high - low) > ROOM_FRACTION * volume:
-            continue
-        near = np.flatnonzero(((points > low) & (points < high)).all(axis=1))
-        turns = winding_number(points[near], vertices, faces)
         problems.extend(
             f"device {devices[index].name!r} of radio {radio.name!r} is inside {name!r}; move it "
             "out of the object"
-            for index in near[np.abs(turns) > 0.5]
+            for index in np.flatnonzero(enclosed(points, bounds_m, vertices, faces))
         )
     return problems
+
+
+def enclosed(
+    points: Float64[np.ndarray, "point 3"],
+    bounds_m: Float64[np.ndarray, "2 3"],
+    vertices: Float[np.ndarray, "vertex 3"],
+    faces: Int[np.ndarray, "face 3"],
+) -> Bool[np.ndarray, "point"]:
+    """Which points are inside a closed mesh; the room itself encloses none.
+
+    Args:
+        points: Places [m].
+        bounds_m: Minimum and maximum of the scene [m].
+        vertices: Vertices of the mesh [m].
+        faces: Its triangles.
+    """
+    inside = np.zeros(len(points), dtype=bool)
+    if not len(faces):
+        return inside
+    volume = float(np.prod(np.maximum(bounds_m[1] - bounds_m[0], 1e-6)))
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    if np.prod(high - low) > ROOM_FRACTION * volume:
+        return inside
+    near = np.flatnonzero(((points > low) & (points < high)).all(axis=1))
+    inside[near] = np.abs(winding_number(points[near], vertices, faces)) > 0.5
+    return inside
 
 
 def _coincident(radio: Radio, devices: list[DevicePose]) -> list[str]:

@@ -200,11 +200,13 @@ def _cards(metrics: dict[str, Any]) -> list[Card]:
         for name, part in metrics["controls"].items()
         if part["rf"]["element_snr_db"] is not None
     }
-    best = max(known, key=lambda name: known[name])
     mine = rf["element_snr_db"]
-    tone = "" if mine is None else "won" if mine > known[best] else "lost"
-    note = f"best control: {best} {show(known[best], 1)} dB"
-    cards.append(Card(f"{show(mine, 1)} dB", "SNR, unseen elements", note, tone))
+    # Arrays of two columns have none to hold out.
+    if known and mine is not None:
+        best = max(known, key=lambda name: known[name])
+        tone = "won" if mine > known[best] else "lost"
+        note = f"best control: {best} {show(known[best], 1)} dB"
+        cards.append(Card(f"{show(mine, 1)} dB", "SNR, unseen elements", note, tone))
     train_s = metrics["train_s"]
     time = f"trained in {train_s:.0f} s" if train_s is not None else "training time not recorded"
     cards.append(Card(f"{metrics['n_gaussians']:,}".replace(",", " "), "Gaussians", time))

@@ -75,7 +75,12 @@ class Run:
         """
         path = self.path / "gaussians" / f"{frame:06d}.features.npz"
         if not path.exists():
-            raise RfgsError(f"{self.path} holds no frame {frame}; it has {self.frames}")
+            known = frame in self.frames
+            raise RfgsError(
+                f"{self.path}: frame {frame} is not trained yet; run the same `rfgs train` again"
+                if known
+                else f"{self.path} holds no frame {frame}; it has {self.frames}"
+            )
         return load_arrays(path, _REMEDY, _ATTRIBUTES)
 
     def gaussians(self, frame: int) -> Gaussians:

@@ -70,7 +70,8 @@ def power_maps(observations: Observations) -> list[PowerMap]:
     """Delay–angle power of every pair of a transmitting and a receiving device.
 
     Transmitting elements add to the aperture within a device; between devices each makes a
-    map of its own.
+    map of its own. A pair that nothing changes, say behind furniture, has no map: it tells no
+    direction, and its ratio of measured to expected power would be zero over zero.
     """
     window = np.hamming(len(observations.freq_hz)) * observations.tones
     window = window / window.sum()
@@ -87,6 +88,8 @@ def power_maps(observations: Observations) -> list[PowerMap]:
             size = OVERSAMPLING * len(window)
             profile = np.fft.ifft(observations.delta[t, r] * window, n=size, axis=1) * size
             power = np.abs(beams @ profile).T ** 2
+            if not power.any():
+                continue
             maps.append(PowerMap(power.astype(np.float32), beams, tx_xyz, rx_xyz))
     return maps
 

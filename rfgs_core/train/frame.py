@@ -10,6 +10,7 @@ import torch
 from jaxtyping import Complex, Float, Float64, Int64
 from torch import Tensor
 
+from rfgs_core.errors import RfgsError
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.seeds import sub_seed
@@ -137,7 +138,15 @@ def start_frame(
 
     From frame to frame all Gaussians move along with their body; the third that the new
     channel supports least is drawn anew and gets new track numbers.
+
+    Raises:
+        RfgsError: Nobody changes the channel.
     """
+    if not observations.delta.any():
+        raise RfgsError(
+            "the channel of this frame is that of the empty scene, nobody is in it; choose other "
+            "--frames, or generate the dataset with a larger --depth"
+        )
     rng = np.random.default_rng(seed)
     maps = pair_maps(observations)
     near = None if before is None else before.axes_xy

@@ -24,6 +24,15 @@ from addon_rfgs.bundle import export_bundle
 from addon_rfgs.cli import open_blend
 from addon_rfgs.errors import AddonError
 
+#: Every property of an Empty's radio, none at its default.
+OWN_RADIO = {
+    "freq_min_ghz": 2.4, "freq_max_ghz": 2.48, "num_subcarriers": 16,
+    "tx_rows": 2, "tx_cols": 2, "rx_rows": 2, "rx_cols": 3, "tx_spacing_m": 0.07,
+    "rx_spacing_m": 0.06, "tx_offset_m": (0.0, 0.05, -0.2), "own_device_links": "excluded",
+    "isolation_db": 12.5, "power_dbm": 7.25, "noise_figure_db": 5.5, "pattern": "hw_dipole",
+    "polarization": "VH",
+}  # fmt: skip
+
 #: A Mixamo skeleton: bone, parent, head, tail [m]; left is +x.
 BONES = [
     ("Hips", None, (0, 0, 1.0), (0, 0, 1.1)),
@@ -253,6 +262,18 @@ def vehicles() -> None:
             root.keyframe_insert("location", frame=frame)
 
 
+def own_radio() -> None:
+    """Two more Empties, whose properties describe a radio of their own."""
+    room()
+    for index, x in enumerate((-1.2, 1.4)):
+        point = bpy.data.objects.new(f"box{index}", None)
+        point.location, point.rotation_euler = (x, -1.0, 1.5), (0, 0, pi * index)
+        point.rfgs.role, point.rfgs.radio = "ACCESS_POINT", "scene"
+        for name, value in OWN_RADIO.items():
+            setattr(point.rfgs.rf, name, value)
+        bpy.context.scene.collection.objects.link(point)
+
+
 def big() -> None:
     """A person of 20,000 vertices over 60 frames."""
     room()
@@ -263,7 +284,7 @@ def big() -> None:
 
 SCENES: tuple[Callable[[], None], ...] = (
     room, unit_scale, mirrored, instanced, instanced_moving, topology, still, static_moves,
-    no_range, no_mesh, driver, vehicles, big,
+    no_range, no_mesh, driver, vehicles, own_radio, big,
 )  # fmt: skip
 
 

@@ -12,6 +12,7 @@ from rfgs_core.cli.compare import CompareArgs
 from rfgs_core.cli.compare import run as compare
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.report import write_demo_report, write_run_report
+from rfgs_core.report.build import _cards
 from rfgs_core.report.tables import metric_tables, show, text_table
 
 HEADINGS = (
@@ -63,6 +64,15 @@ def test_report_before_evaluation_says_what_to_do(surface_run) -> None:
     surface_run.path.joinpath("config.json").write_text("{}")
     with pytest.raises(RfgsError, match="rfgs eval"):
         write_run_report(surface_run)
+
+
+def test_radios_without_unseen_elements_have_no_card_of_them(evaluated_run) -> None:
+    """Arrays of two columns hold none out, so nobody is measured on any."""
+    metrics = json.loads((evaluated_run.path / "metrics.json").read_text())
+    assert any(card.label == "SNR, unseen elements" for card in _cards(metrics))
+    for part in (metrics, *metrics["controls"].values()):
+        part["rf"]["element_snr_db"] = None
+    assert not any(card.label == "SNR, unseen elements" for card in _cards(metrics))
 
 
 def test_tables_mark_the_best_and_say_who_wins(evaluated_run) -> None:

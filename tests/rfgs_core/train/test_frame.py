@@ -12,7 +12,9 @@ import pytest
 import torch
 
 from rfgs_core.dataset import open_dataset
+from rfgs_core.errors import RfgsError
 from rfgs_core.train.channel import Channel
+from rfgs_core.train.config import TrainConfig
 from rfgs_core.train.delay_power import DelayPowerModel
 from rfgs_core.train.frame import (
     fit_power,
@@ -45,6 +47,22 @@ def test_visibility_is_the_propagation_models_own(observations) -> None:
         assert row == pytest.approx(expected**2, rel=1e-5)
     both = visibility(np.repeat(point, 2, axis=0), np.array([[1.0, 0, 0], [-1.0, 0, 0]]), model)
     assert (both[:, 0] != both[:, 1]).all()
+
+
+def test_a_frame_without_anybody_is_refused(observations) -> None:
+    silent = observations.with_delta(np.zeros_like(observations.delta))
+    with pytest.raises(RfgsError, match=r"nobody is in it; choose other --frames.*--depth"):
+        start_frame(silent, TrainConfig(), seed=0, before=None)
+
+
+def test_a_pair_that_nothing_changes_leaves_powers_finite(observations) -> None:
+    """Furniture may hide a person from one pair of devices."""
+    delta = observations.delta.copy()
+    pair, names = observations.pairs
+    delta[pair == 1] = 0.0
+    silent = observations.with_delta(delta)
+    state = start_frame(silent, TrainConfig(num_gaussians=64), seed=0, before=None)
+    assert len(names) > 1 and torch.isfinite(state.power).all() and (state.power > 0).all()
 
 
 def test_noise_is_a_share_of_each_pairs_mean_power(observations) -> None:

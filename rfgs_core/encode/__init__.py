@@ -3,6 +3,20 @@
 
 from __future__ import annotations
 
-from rfgs_core.encode.matched_filter import matched_filter_features, matched_filter_map
+from rfgs_core.encode.matched_filter import (
+    MATCHED_FILTER,
+    MatchedFilter,
+    matched_filter_features,
+    matched_filter_map,
+)
+from rfgs_core.encode.protocol import Encoder, FrameChannel, unit_rms
 
-__all__ = ["matched_filter_features", "matched_filter_map"]
+__all__ = [
+    "MATCHED_FILTER",
+    "Encoder",
+    "FrameChannel",
+    "MatchedFilter",
+    "matched_filter_features",
+    "matched_filter_map",
+    "unit_rms",
+]

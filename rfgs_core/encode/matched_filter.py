@@ -13,8 +13,9 @@ from __future__ import annotations
 
 import numba
 import numpy as np
-from jaxtyping import Bool, Complex, Float, Int
+from jaxtyping import Bool, Complex, Float, Float32, Float64, Int
 
+from rfgs_core.encode.protocol import FEATURES, FrameChannel, unit_rms
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
 #: Delay-profile samples per resolution cell 1/B; 16 keeps the linear reading within 0.5 %.
@@ -87,29 +88,48 @@ def _back_project(profiles, centre_k, samples_per_m, tx_xyz, rx_xyz, links, poin
                 )
 
 
+def oversampled_profiles(
+    csi: Complex[np.ndarray, "link *channel tone"],
+    freq_hz: Float[np.ndarray, "subcarrier"],
+    tones: Int[np.ndarray, "tone"] | None = None,
+) -> tuple[np.ndarray, float, float]:
+    """Delay profiles of some tones, `OVERSAMPLING` samples per resolution cell of the whole band.
+
+    Args:
+        csi: Channel at the tones.
+        freq_hz: All tones of the radio [Hz], equally spaced.
+        tones: Which of them `csi` holds; None for all.
+
+    Returns:
+        Profiles (…, sample), divided by the number of tones and relative to the middle one,
+        whose wave number [rad/m] follows, and profile samples per metre of path.
+    """
+    tones = np.arange(len(freq_hz)) if tones is None else tones
+    size = OVERSAMPLING * len(freq_hz)
+    offset = int(tones[len(tones) // 2])
+    spectrum = np.zeros((*csi.shape[:-1], size), dtype=np.complex64)
+    spectrum[..., (tones - offset) % size] = csi
+    # ifft carries exp(+j2π n m / size): the profile at delay m / (size · Δf).
+    profiles = np.fft.ifft(spectrum, axis=-1) * size / len(tones)
+    centre_k = 2.0 * np.pi * float(freq_hz[offset]) / SPEED_OF_LIGHT
+    spacing_hz = float(freq_hz[1] - freq_hz[0])
+    return profiles, centre_k, spacing_hz * size / SPEED_OF_LIGHT
+
+
 def _band_profiles(
     csi: Complex[np.ndarray, "link subcarrier"],
     freq_hz: Float[np.ndarray, "subcarrier"],
     num_bands: int,
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """Oversampled delay profiles per sub-band.
-
-    Returns:
-        Profiles (link, band, sample), wave number of each band's centre [rad/m], and profile
-        samples per metre of path.
-    """
-    spacing = float(freq_hz[1] - freq_hz[0])
-    size = OVERSAMPLING * len(freq_hz)
-    profiles = np.zeros((csi.shape[0], num_bands, size), dtype=np.complex64)
+    """Profiles (link, band, sample) of each sub-band, as `images` takes them."""
+    samples_per_m = 0.0
+    profiles = np.zeros((len(csi), num_bands, OVERSAMPLING * len(freq_hz)), dtype=np.complex64)
     centre_k = np.zeros(num_bands)
     for band, tones in enumerate(np.array_split(np.arange(len(freq_hz)), num_bands)):
-        offset = int(tones[len(tones) // 2])
-        spectrum = np.zeros((csi.shape[0], size), dtype=np.complex64)
-        spectrum[:, (tones - offset) % size] = csi[:, tones]
-        # ifft carries exp(+j2π n m / size): the profile at delay m / (size · Δf).
-        profiles[:, band] = np.fft.ifft(spectrum, axis=1) * size / len(tones)
-        centre_k[band] = 2.0 * np.pi * float(freq_hz[offset]) / SPEED_OF_LIGHT
-    return profiles, centre_k, spacing * size / SPEED_OF_LIGHT
+        profiles[:, band], centre_k[band], samples_per_m = oversampled_profiles(
+            csi[:, tones], freq_hz, tones
+        )
+    return profiles, centre_k, samples_per_m
 
 
 def matched_filter(
@@ -136,10 +156,38 @@ def matched_filter(
         Mean over the links and tones of a pair, shape (pair, band, N).
     """
     tx_index, rx_index = np.nonzero(pair >= 0)
+    profiles = _band_profiles(csi[tx_index, rx_index], freq_hz, num_bands)
+    return images(*profiles, tx_xyz, rx_xyz, pair, points)
+
+
+def images(
+    profiles: Complex[np.ndarray, "link channel sample"],
+    centre_k: Float[np.ndarray, "channel"],
+    samples_per_m: float,
+    tx_xyz: Float[np.ndarray, "tx 3"],
+    rx_xyz: Float[np.ndarray, "rx 3"],
+    pair: Int[np.ndarray, "tx rx"],
+    points: Float[np.ndarray, "N 3"],
+) -> Complex[np.ndarray, "pair channel N"]:
+    """Reads delay profiles at the path lengths of points and adds the links of each pair.
+
+    Args:
+        profiles: One per link with `pair >= 0` (in row-major order) and channel, as
+            `oversampled_profiles` gives them.
+        centre_k: Wave number that each channel's profiles refer to [rad/m].
+        samples_per_m: Profile samples per metre of path.
+        tx_xyz: Transmitting elements [m].
+        rx_xyz: Receiving elements [m].
+        pair: Which sum a link belongs to; negative links are left out.
+        points: Where to evaluate [m].
+
+    Returns:
+        Mean over the links of a pair.
+    """
+    tx_index, rx_index = np.nonzero(pair >= 0)
     link_pair = pair[tx_index, rx_index].astype(np.int64)
-    profiles, centre_k, samples_per_m = _band_profiles(csi[tx_index, rx_index], freq_hz, num_bands)
     num_pairs = int(link_pair.max()) + 1
-    out = np.zeros((num_pairs, num_bands, 2, len(points)), dtype=np.float32)
+    out = np.zeros((num_pairs, len(centre_k), 2, len(points)), dtype=np.float32)
     # The first sample again at the end: reading between the last two needs no wrap.
     profiles = np.concatenate([profiles, profiles[..., :1]], axis=2)
     split = np.stack([profiles.real, profiles.imag], axis=2)
@@ -210,9 +258,36 @@ def matched_filter_features(
     The entries are ordered by frequency, which gives the paper's gradient across frequency
     bins (section 3.5) a meaning. Scaled so that the RMS of ‖φ‖ over `points` is one.
     """
+    return unit_rms(_sub_band_amplitudes(csi, tx_xyz, rx_xyz, pair, freq_hz, points, num_features))
+
+
+def _sub_band_amplitudes(
+    csi: Complex[np.ndarray, "tx rx subcarrier"],
+    tx_xyz: Float[np.ndarray, "tx 3"],
+    rx_xyz: Float[np.ndarray, "rx 3"],
+    pair: Int[np.ndarray, "tx rx"],
+    freq_hz: Float[np.ndarray, "subcarrier"],
+    points: Float[np.ndarray, "N 3"],
+    num_features: int,
+) -> Float[np.ndarray, "N feature"]:
+    """Root of the mean power over pairs in each sub-band."""
     bands = min(num_features, len(freq_hz))
     power = np.abs(matched_filter(csi, tx_xyz, rx_xyz, pair, freq_hz, points, bands)) ** 2
     # A radio with fewer tones than features has its sub-bands repeated, still in order.
-    features = np.sqrt(power.mean(axis=0)).T[:, np.arange(num_features) * bands // num_features]
-    rms = np.sqrt(np.mean(np.sum(features**2, axis=1)))
-    return (features / max(float(rms), 1e-30)).astype(np.float32)
+    return np.sqrt(power.mean(axis=0)).T[:, np.arange(num_features) * bands // num_features]
+
+
+class MatchedFilter:
+    """The default encoder: `matched_filter_features` before they are scaled."""
+
+    def __call__(
+        self, seen: FrameChannel, points: Float64[np.ndarray, "N 3"]
+    ) -> Float32[np.ndarray, "N 32"]:
+        """Amplitude of each of 32 sub-bands, see `Encoder`."""
+        elements, (pair, _) = seen.layout, seen.pairs
+        geometry = (elements.tx_xyz, elements.rx_xyz, pair, seen.freq_hz, points)
+        return _sub_band_amplitudes(seen.delta, *geometry, FEATURES).astype(np.float32)
+
+
+#: It has no settings, so one is enough.
+MATCHED_FILTER = MatchedFilter()

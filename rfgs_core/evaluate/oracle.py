@@ -10,6 +10,7 @@ import torch
 from jaxtyping import Float32
 from tqdm import tqdm
 
+from rfgs_core.encode import MATCHED_FILTER
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.evaluate.geometry import surface_samples
 from rfgs_core.evaluate.grid import splat_gaussians
@@ -34,7 +35,7 @@ def start_on_surface(
     gaussians = gaussians_at(points, normals)
     power = fit_power(observations, gaussians, config)
     head = new_head(observations, config, power)
-    features = head.without_readings(encode(observations, points).features)
+    features = head.without_readings(encode(observations, points, MATCHED_FILTER).features)
     return FrameState(
         gaussians=replace(gaussians, features=features),
         power=power,

@@ -41,6 +41,8 @@ class TrainConfig:
     """Sample points per Adam step of the paper's loss (section 3.6)."""
     grid_side: int = 64
     """Voxels per side of the paper's sample grid (section 3.2)."""
+    refine_levels: int = 2
+    """How often sample points are refined around energy (the paper: not at all)."""
     unexplained: float = 0.5
     """Share of each device pair's power that the model is not asked to explain."""
     seed: int = 0
@@ -51,6 +53,11 @@ class TrainConfig:
         """Settings of a recipe."""
         if recipe == "paper":
             return TrainConfig(
-                objective=objective, recipe=recipe, seed=seed, iterations=10_000, power_steps=0
+                objective=objective,
+                recipe=recipe,
+                seed=seed,
+                iterations=10_000,
+                power_steps=0,
+                refine_levels=0,
             )
         return TrainConfig(objective=objective, recipe=recipe, seed=seed)

@@ -10,6 +10,7 @@ import torch
 from jaxtyping import Complex, Float, Float64, Int64
 from torch import Tensor
 
+from rfgs_core.encode import MATCHED_FILTER, Encoder
 from rfgs_core.errors import RfgsError
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
@@ -132,7 +133,11 @@ def new_head(
 
 
 def start_frame(
-    observations: Observations, config: TrainConfig, seed: int, before: FrameState | None
+    observations: Observations,
+    config: TrainConfig,
+    seed: int,
+    before: FrameState | None,
+    encoder: Encoder = MATCHED_FILTER,
 ) -> FrameState:
     """Locates the bodies and draws Gaussians; a later frame keeps the earlier one's.
 
@@ -158,7 +163,7 @@ def start_frame(
     gaussians = gaussians_at(points, outward_normals(points, axes_xy))
     power = fit_power(observations, gaussians, config)
     head = before.head if before is not None else new_head(observations, config, power)
-    features = head.without_readings(encode(observations, points).features)
+    features = head.without_readings(encode(observations, points, encoder).features)
     gaussians = replace(gaussians, features=features)
     return FrameState(gaussians, power, head, axes_xy, track_id)
 

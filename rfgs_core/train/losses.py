@@ -24,7 +24,7 @@ class SamplePoints:
     xyz: Float[Tensor, "N 3"]
     """Positions p_k [m]."""
     features: Float[Tensor, "N 32"]
-    """φ(p_k); a constant, so that both sides of eq. 6 cannot shrink to zero together."""
+    """φ(p_k), which the losses take as a constant."""
 
     def rows(self, chosen: Int64[Tensor, "batch"]) -> SamplePoints:
         """Some of the points."""
@@ -43,7 +43,7 @@ def position_loss(
     gaussians: Gaussians, points: SamplePoints, nearest: Int64[Tensor, "N"]
 ) -> Float[Tensor, ""]:
     """Eq. 5: Σ_k ‖φ(p_k)‖ ‖μ_nn(k) − p_k‖²."""
-    weight = torch.linalg.norm(points.features, dim=1)
+    weight = torch.linalg.norm(points.features.detach(), dim=1)
     offset = gaussians.means[nearest] - points.xyz
     return torch.sum(weight * torch.sum(offset**2, dim=1))
 
@@ -51,8 +51,11 @@ def position_loss(
 def feature_loss(
     gaussians: Gaussians, points: SamplePoints, nearest: Int64[Tensor, "N"]
 ) -> Float[Tensor, ""]:
-    """Eq. 6: Σ_k ‖f_nn(k) − φ(p_k)‖²."""
-    return torch.sum((gaussians.features[nearest] - points.features) ** 2)
+    """Eq. 6: Σ_k ‖f_nn(k) − φ(p_k)‖².
+
+    The gradient stops at φ: an encoder that could move would fall to zero with the Gaussians.
+    """
+    return torch.sum((gaussians.features[nearest] - points.features.detach()) ** 2)
 
 
 def regularisation_loss(gaussians: Gaussians) -> Float[Tensor, ""]:

@@ -13,6 +13,7 @@ from jaxtyping import Complex, Float
 from torch import Tensor
 
 from rfgs_core.arrays import load_arrays, save_arrays
+from rfgs_core.encode import MATCHED_FILTER, Encoder
 from rfgs_core.errors import RfgsError
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.seeds import sub_seed
@@ -47,12 +48,14 @@ class Task:
     """Sample points of the paper's losses; None without them."""
 
     @staticmethod
-    def of(observations: Observations, config: TrainConfig, seed: int) -> Task:
+    def of(observations: Observations, config: TrainConfig, seed: int, encoder: Encoder) -> Task:
         """Gathers what the objective needs."""
         points = None
         if config.objective != "csi":
             rng = np.random.default_rng(seed)
-            points = sample_points(observations, config.grid_side, rng)
+            points = sample_points(
+                observations, config.grid_side, rng, encoder, config.refine_levels
+            )
         target = target_of(observations)
         return Task(
             Channel.of(observations, observations.links, observations.tones),
@@ -97,6 +100,7 @@ def refine(
     seed: int,
     checkpoint: Path | None = None,
     on_step: Callable[[float, int], None] | None = None,
+    encoder: Encoder = MATCHED_FILTER,
 ) -> FrameState:
     """Descends the objective of `config` for `config.iterations` steps.
 
@@ -107,11 +111,12 @@ def refine(
         seed: Seed of batches and line points.
         checkpoint: File to resume from and to save to; None keeps nothing.
         on_step: Called with loss and number of Gaussians after each step.
+        encoder: φ of the sample points.
 
     Raises:
         RfgsError: The loss is not a number.
     """
-    task = Task.of(observations, config, seed)
+    task = Task.of(observations, config, seed, encoder)
     rates = LearningRates() if config.recipe == "paper" else CHANNEL_RATES
     trained, first = _resume(checkpoint, state.gaussians, rates)
     density = PaperDensity(DensityRule())

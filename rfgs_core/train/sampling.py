@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sample points of the paper's losses: a voxel grid and points along the links (section 3.2)."""
+"""Sample points of the paper's losses (section 3.2).
+
+A voxel grid, points along the links, and finer points where the energy is.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 import torch
-from jaxtyping import Float64
+from jaxtyping import Float, Float64
 
-from rfgs_core.encode.matched_filter import matched_filter_features
-from rfgs_core.gaussians import FEATURE_DIM
+from rfgs_core.encode import Encoder, unit_rms
 from rfgs_core.train.losses import SamplePoints
 from rfgs_core.train.observations import Observations
 
@@ -39,24 +41,66 @@ def line_points(observations: Observations, rng: np.random.Generator) -> Float64
     return np.concatenate(lines) if lines else np.zeros((0, 3))
 
 
-def encode(observations: Observations, points: Float64[np.ndarray, "N 3"]) -> SamplePoints:
-    """Matched-filter features φ at `points`, RMS of ‖φ‖ one."""
-    pair, _ = observations.pairs
-    features = matched_filter_features(
-        observations.delta,
-        observations.layout.tx_xyz,
-        observations.layout.rx_xyz,
-        pair,
-        observations.freq_hz,
-        points,
-        FEATURE_DIM,
-    )
+def finer_points(
+    centres: Float64[np.ndarray, "N 3"],
+    energy: Float[np.ndarray, "N"],
+    count: int,
+    cell_m: Float64[np.ndarray, "3"],
+) -> Float64[np.ndarray, "M 3"]:
+    """Centres of the eight parts of the `count` cells that hold most energy, at most all.
+
+    Args:
+        centres: Centres of cells [m].
+        energy: ‖φ‖² at the centres.
+        count: How many cells to split; those without energy stay whole.
+        cell_m: Edges of a cell [m].
+    """
+    strongest = np.argsort(-energy, kind="stable")[:count]
+    strongest = strongest[energy[strongest] > 0.0]
+    corners = np.stack(np.meshgrid(*[[-0.25, 0.25]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    return (centres[strongest, None] + corners * cell_m).reshape(-1, 3)
+
+
+def encode(
+    observations: Observations, points: Float64[np.ndarray, "N 3"], encoder: Encoder
+) -> SamplePoints:
+    """Features φ at `points`, RMS of ‖φ‖ one."""
+    features = unit_rms(encoder(observations, points))
     return SamplePoints(torch.from_numpy(points).float(), torch.from_numpy(features))
 
 
-def sample_points(observations: Observations, side: int, rng: np.random.Generator) -> SamplePoints:
-    """Grid and line points with their features, as the paper's losses take them."""
-    points = np.concatenate(
-        [voxel_points(observations.bounds_m, side), line_points(observations, rng)]
+def sample_points(
+    observations: Observations,
+    side: int,
+    rng: np.random.Generator,
+    encoder: Encoder,
+    levels: int = 0,
+) -> SamplePoints:
+    """Grid and line points with their features, and finer points where the energy is.
+
+    Each level splits cells of the level before into eight: of the grid's side³ cells the 64th
+    part with most energy, then the eighth part of the new ones. A level thus adds an eighth of
+    the grid's points and halves their spacing.
+
+    Args:
+        observations: Channel of the frame.
+        side: Voxels per side of the grid.
+        rng: Draws the line points; nothing else is random.
+        encoder: φ.
+        levels: How often to refine; 0 is the paper's own sampling.
+    """
+    grid = voxel_points(observations.bounds_m, side)
+    points = [np.concatenate([grid, line_points(observations, rng)])]
+    features = [encoder(observations, points[0])]
+    centres, energy = grid, np.sum(features[0][: len(grid)] ** 2, axis=1)
+    cell_m = (observations.bounds_m[1] - observations.bounds_m[0]) / side
+    for _ in range(levels):
+        centres = finer_points(centres, energy, max(1, len(grid) // 64), cell_m)
+        cell_m = 0.5 * cell_m
+        points.append(centres)
+        features.append(encoder(observations, centres))
+        energy = np.sum(features[-1] ** 2, axis=1)
+    return SamplePoints(
+        torch.from_numpy(np.concatenate(points)).float(),
+        torch.from_numpy(unit_rms(np.concatenate(features))),
     )
-    return encode(observations, points)

@@ -15,7 +15,6 @@ from rfgs_core.dataset.names import SequenceFiles
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import write_json
 from rfgs_core.train.observations import observe
-from rfgs_core.train.sampling import encode, line_points, sample_points, voxel_points
 
 
 def test_held_out_entries_are_zero_and_the_rest_is_the_data(tiny_dataset: Path) -> None:
@@ -62,42 +61,3 @@ def test_visible_nan_is_refused_and_hidden_nan_is_not_read(own_dataset: Path) ->
     poison(one)
     with pytest.raises(RfgsError, match=r"csi of frame 1 \(tiny, wifi\) holds NaN or infinity"):
         observe(sequence, "wifi", 1)
-
-
-def test_voxels_fill_the_bounds() -> None:
-    bounds_m = np.array([[-1.0, 0.0, 2.0], [1.0, 4.0, 3.0]])
-    points = voxel_points(bounds_m, 4)
-    assert points.shape == (64, 3)
-    np.testing.assert_allclose(points[0], [-0.75, 0.5, 2.125])
-    np.testing.assert_allclose(points[-1], [0.75, 3.5, 2.875])
-    np.testing.assert_allclose(points.mean(axis=0), bounds_m.mean(axis=0))
-
-
-def test_line_points_lie_between_devices(make_observations) -> None:
-    observations = make_observations()
-    points = line_points(observations, np.random.default_rng(0))
-    # 12 ordered pairs of different devices with 64 points each.
-    assert points.shape == (768, 3)
-    start = observations.layout.tx_xyz[0]
-    end = observations.layout.rx_xyz[observations.layout.rx_device == 1].mean(axis=0)
-    along = end - start
-    share = (points[:64] - start) @ along / (along @ along)
-    np.testing.assert_allclose(points[:64], start + share[:, None] * along, atol=1e-12)
-    assert (np.floor(share * 64) == np.arange(64)).all()
-
-
-def test_a_radar_has_no_lines(make_observations) -> None:
-    from rfgs_core.radio import preset
-
-    observations = make_observations(radio=preset("mmwave"))
-    assert line_points(observations, np.random.default_rng(0)).shape == (0, 3)
-
-
-def test_sample_points_carry_features(tiny_dataset: Path) -> None:
-    observations = observe(open_dataset(tiny_dataset).sequence(), "wifi", 1)
-    points = sample_points(observations, 5, np.random.default_rng(0))
-    assert len(points.xyz) == 125 + 64 * 10
-    norm = (points.features.double() ** 2).sum(dim=1).mean().item()
-    assert norm == pytest.approx(1.0, rel=1e-5)
-    again = encode(observations, points.xyz.double().numpy())
-    np.testing.assert_allclose(again.features, points.features, rtol=0.02, atol=1e-4)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -63,7 +64,12 @@ def table(report: dict[str, Any]) -> str:
 
 def _add_radios(report: dict[str, Any], folder: Path, radios: list[Radio]) -> None:
     bundle, devices = read_bundle(folder), {}
-    radios = [scene_radio(bundle) if radio.name == SCENE_RADIO else radio for radio in radios]
+    radios = [
+        replace(scene_radio(bundle), samples_per_frame=radio.samples_per_frame)
+        if radio.name == SCENE_RADIO
+        else radio
+        for radio in radios
+    ]
     for radio in radios:
         devices[radio.name], guess = choose_devices(bundle, radio)
         report["guesses"] += [guess] if guess else []

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 import sys
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import tyro
@@ -41,6 +41,9 @@ class CheckArgs:
     """Name from `rfgs-factory scenes`, or path of a .blend file."""
     radio: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
     """Radio to check materials and devices for; repeat the option for several."""
+    packets_per_frame: int = 1
+    """Channels per frame, as for `generate`: whether so many fit between two frames. The last
+    frame, which `generate` leaves out then, is listed all the same."""
     frames: str = ""
     """Blender frames A:B[:STEP] (inclusive), or one number; default: all."""
     options: tyro.conf.OmitArgPrefixes[SceneOptions] = field(default_factory=SceneOptions)
@@ -65,6 +68,8 @@ def run(args: CheckArgs) -> int:
     said = read_options(args.options)
     frames = whole_frames(args.frames or str(said.pop("frames", "")))
     radios = list(chosen_radios(args.radio).values())
+    if args.packets_per_frame != 1:
+        radios = [replace(radio, samples_per_frame=args.packets_per_frame) for radio in radios]
     blender = Blender(scene.blend, args.blender)
     report = check_file(blender, frames, said, label(args.options), radios)
     if args.json is not None and str(args.json) == "-":

@@ -149,5 +149,5 @@ def _refuse_depth(scene: Scene, args: GenerateArgs) -> None:
             raise RfgsError(
                 f"scene {scene.name!r}: who moves there is seen at trace depth {scene.depth}, but "
                 f"radio {name!r} is traced at {radio.deepest} at most; use another radio or scene, "
-                f"or --depth {radio.deepest} for a channel without people"
+                f"or --depth {radio.deepest} for what people scatter without a wall on the way"
             )

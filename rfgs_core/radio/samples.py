@@ -47,7 +47,9 @@ def frame_samples(radio: Radio, fps: float) -> FrameSamples:
     """
     count, frame_s = radio.samples_per_frame, 1.0 / fps
     interval_s = radio.sample_interval_s or frame_s / max(count, 1)
-    if count < 1 or interval_s < 0.0 or count * interval_s > frame_s * (1.0 + 1e-9):
+    # A single sample has no interval to fit in.
+    too_long = count > 1 and count * interval_s > frame_s * (1.0 + 1e-9)
+    if count < 1 or interval_s < 0.0 or too_long:
         raise RfgsError(
             f"radio {radio.name!r}: {count} samples per frame, {interval_s * 1e3:g} ms apart, do "
             f"not fit a frame of {frame_s * 1e3:g} ms; ask for at least 1 and at most "

@@ -46,6 +46,13 @@ def test_faults_of_the_scene_and_of_the_radio_end_with_1(
     assert "no moving mesh" in error["message"] and error["remedy"]
 
 
+def test_packets_that_do_not_fit_a_frame_are_found(factory: Factory, box_room: Path) -> None:
+    """401 chirps of 0.25 ms are longer than a tenth of a second."""
+    answer = factory("check", str(box_room), "--radio", "mmwave", "--packets-per-frame", "401")
+    assert answer.returncode == 1
+    assert "401 samples per frame, 0.25 ms apart, do not fit a frame of 100 ms" in answer.stdout
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [

@@ -118,6 +118,8 @@ def test_moving_antennas_have_places_per_sample(
 def test_samples_start_at_the_frame_and_fit_into_it() -> None:
     wifi, radar = preset("wifi"), replace(preset("mmwave"), samples_per_frame=64)
     assert frame_samples(wifi, 10.0).offset_s.tolist() == [0.0]
+    # A single chirp fits any frame, however short against the interval it would have.
+    assert frame_samples(preset("mmwave"), 5000.0).offset_s.tolist() == [0.0]
     packets = frame_samples(replace(wifi, samples_per_frame=5), 10.0).offset_s
     assert np.allclose(packets, [0.0, 0.02, 0.04, 0.06, 0.08])
     assert np.allclose(np.diff(frame_samples(radar, 10.0).offset_s), 0.25e-3)

@@ -15,6 +15,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "export": ("export", "ExportArgs"),
     "report": ("report", "ReportArgs"),
     "compare": ("compare", "CompareArgs"),
+    "study": ("study", "StudyArgs"),
     "bench": ("bench", "BenchArgs"),
 }
 

@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
+
+from rfgs_core.cli.calls import call
 
 RADIOS = ("wifi", "mmwave")
 
@@ -83,18 +84,6 @@ def keep_settings(args: DemoArgs) -> None:
     write_json(path, asked)
 
 
-def _call(*command: str | Path) -> None:
-    """Runs one of our own commands with this Python; its error line has been printed."""
-    from rfgs_core.errors import RfgsError
-
-    arguments = [sys.executable, "-m", *map(str, command)]
-    code = subprocess.run(arguments, check=False).returncode
-    if code == 130:
-        raise KeyboardInterrupt
-    if code:
-        raise RfgsError(f"`python -m {' '.join(map(str, command))}` failed (exit code {code})")
-
-
 def _scene_file(scene: str) -> Path:
     """The .blend of a scene of ours or of the user's own."""
     own = Path(__file__).resolve().parents[2] / "blender_scenes" / f"{scene}.blend"
@@ -103,7 +92,7 @@ def _scene_file(scene: str) -> Path:
 
 def _generate(args: DemoArgs, dataset: Path) -> None:
     radios = [word for radio in RADIOS for word in ("--radio", radio)]
-    _call(
+    call(
         "dataset_factory", "generate", args.scene, *radios,
         *("--frames", args.frames, "--out", dataset, "--seed", str(args.seed)),
         *("--cameras", str(args.cameras), "--resolution", str(args.resolution)),
@@ -113,7 +102,7 @@ def _generate(args: DemoArgs, dataset: Path) -> None:
 
 def _inspect(args: DemoArgs, run: Path) -> None:
     target = args.out / "inspect.blend"
-    _call(
+    call(
         "addon_rfgs", "--blend", _scene_file(args.scene), "import", run,
         "--out", target, "--picture", args.out / "inspect.png",
     )  # fmt: skip
@@ -132,19 +121,19 @@ def run(args: DemoArgs) -> int:
     stages.run(
         "validate",
         dataset / "dataset.json",
-        lambda: _call("dataset_factory", "validate", dataset),
+        lambda: call("dataset_factory", "validate", dataset),
     )
-    stages.run("preview", dataset / "log", lambda: _call("dataset_factory", "preview", dataset))
+    stages.run("preview", dataset / "log", lambda: call("dataset_factory", "preview", dataset))
     for radio, folder in runs.items():
         train = ("rfgs_core.cli", "train", dataset, "--radio", radio, "--out", folder)
         seed = ("--seed", str(args.seed))
-        stages.run(f"train {radio}", folder / "shader.npz", lambda c=(*train, *seed): _call(*c))
+        stages.run(f"train {radio}", folder / "shader.npz", lambda c=(*train, *seed): call(*c))
         evaluate = ("rfgs_core.cli", "eval", folder)
-        stages.run(f"evaluate {radio}", folder / "metrics.json", lambda c=evaluate: _call(*c))
+        stages.run(f"evaluate {radio}", folder / "metrics.json", lambda c=evaluate: call(*c))
         stages.run(
             f"report {radio}",
             folder / "report.html",
-            lambda f=folder: _call("rfgs_core.cli", "report", f),
+            lambda f=folder: call("rfgs_core.cli", "report", f),
         )
     picture = args.out / "inspect.png"
     stages.run("back to Blender", picture, lambda: _inspect(args, runs[RADIOS[-1]]))

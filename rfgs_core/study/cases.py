@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a study consists of: its scenes, conditions and radios, and where each case lies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rfgs_core.dataset.observed import Observed
+from rfgs_core.errors import RfgsError
+
+
+@dataclass(frozen=True)
+class StudyScene:
+    """One scene of ours and the part of it that the study looks at."""
+
+    frames: str
+    """Four evenly spaced frames A:B:STEP."""
+    least_depth: int = 1
+    """Bounces without which people would not be heard at all."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """How the channels come about."""
+
+    label: str
+    """In words."""
+    depth: int
+    """Bounces of the paths that meet people."""
+    channel: Observed
+    """Which channel is fitted."""
+
+
+SCENES: dict[str, StudyScene] = {
+    "living_room_walk": StudyScene("10:55:15"),
+    "two_crossing": StudyScene("10:64:18"),
+    # Nothing is heard of people behind a wall unless waves pass it on both ways.
+    "through_wall": StudyScene("10:70:20", least_depth=3),
+    "office_sit_stand": StudyScene("10:85:25"),
+}
+
+CONDITIONS: dict[str, Condition] = {
+    "clean": Condition("clean, direct paths only: an inverse crime", 1, "clean"),
+    "impaired": Condition("thermal noise, 10 bits, phase noise (`lab`)", 1, "impaired"),
+    "walls": Condition("clean, up to two wall bounces", 3, "clean"),
+}
+
+#: An ultra-wide band is traced at depth 1 only, so that it has no case with walls.
+RADIOS: dict[str, tuple[str, ...]] = {
+    "wifi": ("clean", "impaired", "walls"),
+    "mmwave": ("clean", "impaired", "walls"),
+    "uwb": ("clean", "impaired"),
+}
+
+#: Impairments that every dataset of the study carries beside its clean channels.
+IMPAIRMENTS = "lab"
+
+
+@dataclass(frozen=True)
+class Case:
+    """One training and its evaluation."""
+
+    scene: str
+    """Name of the scene."""
+    condition: str
+    """Name of the condition."""
+    radio: str
+    """Name of the radio."""
+    seed: int
+    """Root seed of the training; the data have seed 0 in every case."""
+
+    @property
+    def depth(self) -> int:
+        """Bounces of the paths that meet people."""
+        return max(CONDITIONS[self.condition].depth, SCENES[self.scene].least_depth)
+
+    @property
+    def dataset(self) -> Path:
+        """Folder of the dataset within the study; seeds and channels share one."""
+        return Path("data") / f"{self.scene}-{self.radio}-depth{self.depth}"
+
+    @property
+    def run(self) -> Path:
+        """Folder of the run within the study."""
+        return Path("runs") / f"{self.scene}-{self.condition}-{self.radio}-seed{self.seed}"
+
+    def generate(self, out: Path) -> tuple[str, ...]:
+        """Arguments of the command that makes the dataset."""
+        return (
+            *("dataset_factory", "generate", self.scene, "--radio", self.radio),
+            *("--frames", SCENES[self.scene].frames, "--depth", str(self.depth)),
+            *("--no-images", "--impairments", IMPAIRMENTS),
+            *("--out", str(out / self.dataset)),
+        )
+
+    def train(self, out: Path) -> tuple[str, ...]:
+        """Arguments of the command that trains; pictures play no part in the study."""
+        return (
+            *("rfgs_core.cli", "train", str(out / self.dataset), "--radio", self.radio),
+            *("--channel", CONDITIONS[self.condition].channel, "--seed", str(self.seed)),
+            *("--no-shader", "--out", str(out / self.run)),
+        )
+
+    def evaluate(self, out: Path) -> tuple[str, ...]:
+        """Arguments of the command that evaluates."""
+        return "rfgs_core.cli", "eval", str(out / self.run)
+
+
+def cases(
+    scenes: Sequence[str], conditions: Sequence[str], radios: Sequence[str], seeds: int
+) -> list[Case]:
+    """All cases, those of one dataset beside each other.
+
+    Raises:
+        RfgsError: A scene, condition or radio is unknown, or nothing is left to do.
+    """
+    for kind, asked, known in (
+        ("scene", scenes, SCENES),
+        ("condition", conditions, CONDITIONS),
+        ("radio", radios, RADIOS),
+    ):
+        for name in asked:
+            if name not in known:
+                raise RfgsError(f"{kind} {name!r}: expected some of {', '.join(known)}")
+    if seeds < 1:
+        raise RfgsError(f"--seeds {seeds}: expected at least 1")
+    chosen = [
+        Case(scene, condition, radio, seed)
+        for scene in scenes
+        for radio in radios
+        for condition in conditions
+        if condition in RADIOS[radio]
+        for seed in range(seeds)
+    ]
+    if not chosen:
+        raise RfgsError(f"no case: {', '.join(radios)} is not traced under {', '.join(conditions)}")
+    return chosen

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the metrics of a study's cases say together: means over seeds, and marks set before."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rfgs_core.study.cases import Case
+
+#: Controls whose best F10 the method's is held against.
+RIVALS = ("matched_filter", "clean", "omp")
+#: Share of the best rival's error 1 − F10 that is to be cut, or of its gap to the ceiling closed.
+CUT_MARK = {"wifi": 0.5, "mmwave": 0.4, "uwb": 0.4}
+#: Largest distance between the true centroid and the predicted one [m].
+CENTROID_MARK_M = {"wifi": 0.25, "mmwave": 0.10, "uwb": 0.10}
+#: F-scores in which the template is to be beaten.
+TEMPLATE_MARKS = {"wifi": ("f10",), "mmwave": ("f05", "f10"), "uwb": ("f05", "f10")}
+#: Least share of frames with the centroid within half a metre.
+TRACKED_MARK = 0.95
+#: Decibels above linear interpolation that held-out elements are to reach.
+ELEMENT_MARK_DB = 6.0
+
+_OWN = ("f05", "f10", "centroid_m", "tracked")
+
+
+@dataclass(frozen=True)
+class Row:
+    """One scene, condition and radio: means over its seeds."""
+
+    scene: str
+    condition: str
+    radio: str
+    seeds: int
+    """Seeds that are finished."""
+    values: dict[str, float | None]
+    """Means by name; None where no seed has a value."""
+    spread_f10: float
+    """Largest less smallest F10 over the seeds."""
+    best_rival: str
+    """Which of `RIVALS` has the best F10."""
+    marks: dict[str, bool | None]
+    """Whether each mark is reached; None where it cannot be told."""
+
+
+def summarise(results: Iterable[tuple[Case, Mapping[str, Any]]]) -> list[Row]:
+    """Groups finished cases by scene, condition and radio, in the order they come in.
+
+    Args:
+        results: Cases and their `metrics.json`.
+    """
+    groups: dict[tuple[str, str, str], list[Mapping[str, Any]]] = {}
+    for case, metrics in results:
+        groups.setdefault((case.scene, case.condition, case.radio), []).append(metrics)
+    return [_row(*names, rows) for names, rows in groups.items()]
+
+
+def _mean(values: Iterable[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return float(np.mean(known)) if known else None
+
+
+def _control(rows: list[Mapping[str, Any]], name: str, group: str, key: str) -> float | None:
+    return _mean(((row["controls"].get(name) or {}).get(group) or {}).get(key) for row in rows)
+
+
+def _row(scene: str, condition: str, radio: str, rows: list[Mapping[str, Any]]) -> Row:
+    values = {key: _mean(row["geometry"].get(key) for row in rows) for key in _OWN}
+    rivals = {name: _control(rows, name, "geometry", "f10") for name in RIVALS}
+    best_rival = max(RIVALS, key=lambda name: rivals[name] or 0.0)
+    values["rival_f10"] = rivals[best_rival]
+    values["oracle_f10"] = _control(rows, "oracle_init", "geometry", "f10")
+    for key in ("f05", "f10"):
+        values[f"template_{key}"] = _control(rows, "template", "geometry", key)
+    values["cut"] = _share(values["f10"], values["rival_f10"], 1.0)
+    values["gap"] = _share(values["f10"], values["rival_f10"], values["oracle_f10"])
+    values["element_snr_db"] = _mean(row["rf"].get("element_snr_db") for row in rows)
+    for name in ("linear", "gaussian_process"):
+        values[f"{name}_snr_db"] = _control(rows, name, "rf", "element_snr_db")
+    f10 = [row["geometry"]["f10"] for row in rows if row["geometry"].get("f10") is not None]
+    spread = max(f10) - min(f10) if f10 else 0.0
+    return Row(
+        *(scene, condition, radio, len(rows), values, spread, best_rival, _marks(radio, values))
+    )
+
+
+def _share(own: float | None, rival: float | None, ceiling: float | None) -> float | None:
+    """How far from the rival's score to the ceiling; None without room between the two."""
+    if own is None or rival is None or ceiling is None or ceiling <= rival:
+        return None
+    return (own - rival) / (ceiling - rival)
+
+
+def _marks(radio: str, values: Mapping[str, float | None]) -> dict[str, bool | None]:
+    """The marks, each reached or not."""
+
+    def above(name: str, mark: float | None) -> bool | None:
+        value = values[name]
+        return None if value is None or mark is None else value > mark
+
+    def better(name: str, control: str, lead: float) -> bool | None:
+        other = values[control]
+        return above(name, None if other is None else other + lead)
+
+    shares = [share for share in (values["cut"], values["gap"]) if share is not None]
+    centroid_m = values["centroid_m"]
+    return {
+        "cut": max(shares) >= CUT_MARK[radio] if shares else None,
+        **{f"template_{key}": better(key, f"template_{key}", 0.0) for key in TEMPLATE_MARKS[radio]},
+        "centroid": None if centroid_m is None else centroid_m < CENTROID_MARK_M[radio],
+        "tracked": above("tracked", TRACKED_MARK),
+        "linear": better("element_snr_db", "linear_snr_db", ELEMENT_MARK_DB),
+        "gaussian_process": better("element_snr_db", "gaussian_process_snr_db", 0.0),
+    }

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The study asks for every case once, and its marks say what the metrics say."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rfgs_core.cli.calls import call
+from rfgs_core.errors import RfgsError
+from rfgs_core.study import CONDITIONS, RADIOS, SCENES, Case, cases, study_table, summarise
+
+
+def metrics(f10: float, **changes: float) -> dict[str, Any]:
+    """Metrics of a case: matched filter at 0.5, CLEAN at 0.6, template at 0.7, ceiling at 0.9."""
+    geometry = {"f05": 0.6, "f10": f10, "centroid_m": 0.08, "tracked": 1.0}
+    rf = {"element_snr_db": 9.0}
+    for name, value in changes.items():
+        (rf if name in rf else geometry)[name] = value
+
+    def control(f10: float | None, snr_db: float | None = None) -> dict[str, Any]:
+        own = {"f05": 0.5, "f10": f10} if f10 is not None else {"f05": None, "f10": None}
+        return {"geometry": own, "rf": {"element_snr_db": snr_db}}
+
+    controls = {
+        "matched_filter": control(0.5),
+        "clean": control(0.6),
+        "omp": control(None),
+        "template": control(0.7),
+        "oracle_init": control(0.9),
+        "linear": control(None, 2.0),
+        "gaussian_process": control(None, 9.5),
+    }
+    return {"geometry": geometry, "rf": rf, "controls": controls}
+
+
+def test_every_case_once_and_seeds_share_a_dataset() -> None:
+    chosen = cases(list(SCENES), list(CONDITIONS), list(RADIOS), 3)
+    assert len(chosen) == len(set(chosen)) == len({case.run for case in chosen})
+    assert len(chosen) == 4 * 3 * (3 + 3 + 2)
+    assert not [case for case in chosen if case.radio == "uwb" and case.condition == "walls"]
+    # Clean and impaired channels stand in one dataset; behind a wall all cases need depth 3.
+    folders = {case.dataset for case in chosen if case.scene == "living_room_walk"}
+    assert len(folders) == 5
+    assert {case.depth for case in chosen if case.scene == "through_wall"} == {3}
+
+
+def test_unknown_names_and_empty_choices_are_refused() -> None:
+    with pytest.raises(RfgsError, match="scene 'kitchen': expected some of living_room_walk"):
+        cases(["kitchen"], ["clean"], ["wifi"], 1)
+    with pytest.raises(RfgsError, match="no case: uwb is not traced under walls"):
+        cases(["living_room_walk"], ["walls"], ["uwb"], 1)
+    with pytest.raises(RfgsError, match="expected at least 1"):
+        cases(["living_room_walk"], ["clean"], ["wifi"], 0)
+
+
+def test_marks_follow_from_means_over_seeds() -> None:
+    wifi = [Case("living_room_walk", "clean", "wifi", seed) for seed in range(2)]
+    (row,) = summarise([(wifi[0], metrics(0.80)), (wifi[1], metrics(0.84))])
+    assert row.seeds == 2 and row.best_rival == "clean"
+    assert row.values["f10"] == pytest.approx(0.82)
+    assert row.spread_f10 == pytest.approx(0.04)
+    # From CLEAN's 0.6: 0.22 of 0.4 cut, 0.22 of 0.3 to the ceiling closed.
+    assert row.values["cut"] == pytest.approx(0.55)
+    assert row.values["gap"] == pytest.approx(0.22 / 0.3)
+    assert row.marks == {
+        "cut": True,
+        "template_f10": True,
+        "centroid": True,
+        "tracked": True,
+        "linear": True,
+        "gaussian_process": False,
+    }
+
+
+def test_marks_differ_by_radio_and_a_lower_ceiling_counts() -> None:
+    case = Case("two_crossing", "walls", "mmwave", 0)
+    (row,) = summarise([(case, metrics(0.73, centroid_m=0.12, tracked=0.9, f05=0.4))])
+    # A third of the error, but 43 % of the way to the ceiling: the share that counts is the gap's.
+    assert row.values["cut"] == pytest.approx(0.13 / 0.4)
+    assert row.marks["cut"] is True
+    assert row.marks["template_f05"] is False and row.marks["template_f10"] is True
+    assert row.marks["centroid"] is False and row.marks["tracked"] is False
+    (low,) = summarise([(case, metrics(0.55))])
+    assert low.marks["cut"] is False
+
+
+def test_the_table_names_what_is_missed() -> None:
+    case = Case("living_room_walk", "clean", "wifi", 0)
+    text = study_table(summarise([(case, metrics(0.61, element_snr_db=3.0))]))
+    (line,) = [line for line in text.splitlines() if line.startswith("| living_room_walk")]
+    assert line.endswith("| cut, template f10, linear, gaussian process |")
+    assert "0.600 (clean)" in line and "an inverse crime" in text
+    assert line.count("|") == text.splitlines()[0].count("|")
+
+
+def test_a_failed_command_is_named() -> None:
+    with pytest.raises(RfgsError, match=r"rfgs_core.cli eval nowhere` failed \(exit code 2\)"):
+        call("rfgs_core.cli", "eval", Path("nowhere"))

@@ -23,6 +23,7 @@ from rfgs_core.dataset import open_dataset
 from rfgs_core.errors import RfgsError
 
 MakeJob = Callable[..., Job]
+Factory = Callable[..., subprocess.CompletedProcess[str]]
 Bytes = Callable[[Path], dict[str, bytes]]
 
 
@@ -174,3 +175,28 @@ def test_killed_again_and_again_ends_in_the_same_bytes(
     generate(make_job(out))
     assert data_of(out) == data_of(box_dataset)
     assert os.listdir(out / "log")
+
+
+@pytest.mark.slow
+def test_a_stopped_run_with_a_radio_of_ones_own_ends_in_the_same_bytes(
+    box_room: Path, factory: Factory, data_of: Bytes, tmp_path: Path
+) -> None:
+    radio = tmp_path / "lab.yaml"
+    radio.write_text("like: wifi24\nheights_m: [1, 2]\npolarization: VH\nrx_rows: 2\n")
+    common = ["generate", str(box_room), "--radio", str(radio), "--frames", "1:4", "--no-images"]
+    common += ["--depth", "1", "--workers", "1", "--out"]
+    whole, stopped = tmp_path / "whole", tmp_path / "stopped"
+    done = stopped / "box_room/radio/lab/done"
+    command = [sys.executable, "-m", "dataset_factory", *common, str(stopped)]
+    with (tmp_path / "log").open("w") as stream:
+        process = subprocess.Popen(command, stderr=stream, stdout=subprocess.DEVNULL)
+    while process.poll() is None and not (done / "000001").exists():
+        time.sleep(0.005)
+    process.kill()
+    process.wait()
+    assert (done / "000001").exists() and not (stopped / "MANIFEST.sha256").exists()
+    for out in (stopped, whole):
+        run = factory(*common, str(out))
+        assert run.returncode == 0, run.stderr
+    assert data_of(stopped) == data_of(whole)
+    assert open_dataset(stopped).sequence().radio_spec("lab").heights_m == (1.0, 2.0)

@@ -192,12 +192,12 @@ def can_denoise() -> bool:
 
 
 def _render(scene: bpy.types.Scene, stem: Path, samples: int, passes: bool) -> None:
-    with kept_sampling(scene) as keeper:
+    with kept_sampling() as keeper:
         keeper.set(scene.cycles, "samples", samples)
         keeper.set(scene.cycles, "use_denoising", can_denoise())
         render_to(scene, stem.with_name(stem.name + ".png"))
     if passes:
-        with kept_sampling(scene) as keeper:
+        with kept_sampling() as keeper:
             keeper.set(scene.cycles, "samples", 1)
             keeper.set(scene.cycles, "use_denoising", False)
             keeper.set(scene.cycles, "pixel_filter_type", "BOX")
@@ -212,7 +212,7 @@ def _render(scene: bpy.types.Scene, stem: Path, samples: int, passes: bool) -> N
 
 
 @contextmanager
-def kept_sampling(scene: bpy.types.Scene) -> Iterator[Keeper]:
+def kept_sampling() -> Iterator[Keeper]:
     """Yields a keeper for one render's settings."""
     keeper = Keeper()
     try:

@@ -129,7 +129,7 @@ def _choose_camera(
     cameras = _cameras(scene)
     if wanted:
         return cameras[wanted]
-    points = _shown_points(scene, imported, display)
+    points = _shown_points(imported, display)
     scores = {name: _score(scene, item, points) for name, item in cameras.items()}
     best = max(sorted(scores), key=lambda name: scores[name], default=None)
     if best is not None and scores[best] > 0:
@@ -145,7 +145,7 @@ def _choose_camera(
     return camera
 
 
-def _shown_points(scene: bpy.types.Scene, imported: Imported, display: Display) -> np.ndarray:
+def _shown_points(imported: Imported, display: Display) -> np.ndarray:
     """World positions [M, 3] of some Gaussians of the current frame, what moves before what not."""
     moving = [item for item in imported.objects if item.animation_data]
     for items in ([item for item in moving if not item.hide_viewport], imported.objects):

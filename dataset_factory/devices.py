@@ -84,12 +84,12 @@ def check_scene(bundle: Bundle, devices: dict[str, list[DevicePose]], radios: li
     Raises:
         RfgsError: Every problem, each with its remedy, in one line.
     """
-    problems = radio_problems(bundle, devices, radios)
+    problems = scene_problems(bundle, devices, radios)
     if problems:
         raise RfgsError(f"{bundle.info['blend_name']}: " + "; also: ".join(problems))
 
 
-def radio_problems(
+def scene_problems(
     bundle: Bundle, devices: dict[str, list[DevicePose]], radios: list[Radio]
 ) -> list[str]:
     """What keeps radios from being traced in a scene, each with its remedy."""

@@ -11,7 +11,7 @@ from typing import Any
 
 from dataset_factory.blender import Blender
 from dataset_factory.bundle import read_bundle
-from dataset_factory.devices import choose_devices, radio_problems
+from dataset_factory.devices import choose_devices, scene_problems
 from dataset_factory.overrides import overrides_file
 from dataset_factory.radios import SCENE_RADIO, scene_radio
 from rfgs_core.files import read_json
@@ -77,7 +77,7 @@ def _add_radios(report: dict[str, Any], folder: Path, radios: list[Radio]) -> No
         name: [{"name": row.name, "position_m": list(row.position_m)} for row in rows]
         for name, rows in devices.items()
     }
-    problems = radio_problems(bundle, devices, radios)
+    problems = scene_problems(bundle, devices, radios)
     report["findings"] = [
         {"severity": "error", "object": "the scene", "message": problem, "remedy": ""}
         for problem in problems

@@ -13,6 +13,7 @@ from tqdm import tqdm
 
 from rfgs_core.dataset import Dataset, Sequence, open_dataset
 from rfgs_core.dataset.impaired_store import has_impaired
+from rfgs_core.radio.levels import decibels
 
 #: Arrivals weaker than this relative to a link's strongest do not count for its spread [dB].
 SPREAD_RANGE_DB = 20.0
@@ -67,7 +68,7 @@ def radio_stats(sequence: Sequence, radio: str) -> dict[str, Any]:
         csi = sequence.csi(radio, frame)[layout.measured].astype(np.complex128)
         moving.append((np.abs(csi - static) ** 2).sum() / (np.abs(static) ** 2).sum())
         levels.append((np.abs(csi) ** 2).mean(axis=-1))
-    level_db = _db(np.concatenate(levels))
+    level_db = decibels(np.concatenate(levels))
     low, middle, high = np.percentile(level_db, [1, 50, 99])
     spread_ns = 1e9 * delay_spread_s(static, spec.subcarrier_spacing_hz)
     found = {
@@ -82,7 +83,7 @@ def radio_stats(sequence: Sequence, radio: str) -> dict[str, Any]:
         "trace_depth": sequence.trace_depth(radio),
         "level_db": {"p01": low, "median": middle, "p99": high},
         "dynamic_range_db": high - low,
-        "dynamic_to_static_db": float(_db(np.median(moving))),
+        "dynamic_to_static_db": float(decibels(np.median(moving, keepdims=True))[0]),
         "delay_spread_ns": {
             "median": float(np.median(spread_ns)),
             "p90": float(np.percentile(spread_ns, 90)),
@@ -156,10 +157,6 @@ def _labels(sequence: Sequence) -> dict[str, Any]:
 def _length_m(track: list[np.ndarray]) -> float:
     steps = np.diff(np.stack(track), axis=0)
     return round(float(np.linalg.norm(steps, axis=1).sum()), 3)
-
-
-def _db(power: np.ndarray | np.floating) -> np.ndarray:
-    return 10.0 * np.log10(np.maximum(power, 1e-30))
 
 
 def _rounded(value: Any) -> Any:

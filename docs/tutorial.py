@@ -27,6 +27,7 @@ from rfgs_core.dataset.torch_dataset import FrameDataset
 from rfgs_core.errors import RfgsError
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.layout import rotation
+from rfgs_core.radio.levels import decibels
 from rfgs_core.render.cameras import Camera
 from rfgs_core.skeleton import PARENTS
 
@@ -116,13 +117,13 @@ def draw_channel(axes: list[Axes], sequence: Sequence, radio: str, frame: int) -
     tx, rx = layout.tx_device == pair[0], layout.rx_device == pair[1]
     links = csi[np.ix_(tx, rx)]
     extent = (*band, links.shape[1] - 0.5, -0.5)
-    axes[0].imshow(_db(np.abs(links[0]) ** 2), aspect="auto", extent=extent)
+    axes[0].imshow(decibels(np.abs(links[0]) ** 2), aspect="auto", extent=extent)
     axes[0].set(title=f"|csi| [dB], device {pair[0]} to {pair[1]}")
     axes[0].set(xlabel="frequency [GHz]", ylabel="receiving element")
 
     for value, name in ((csi, "csi"), (static, "csi_static"), (csi - static, "difference")):
         response, length_m = delay_profile(sequence, radio, value[np.ix_(tx, rx)])
-        axes[1].plot(length_m, _db((np.abs(response) ** 2).mean(axis=(0, 1))), label=name)
+        axes[1].plot(length_m, decibels((np.abs(response) ** 2).mean(axis=(0, 1))), label=name)
     direct_m = np.linalg.norm(layout.tx_xyz[tx].mean(axis=0) - layout.rx_xyz[rx].mean(axis=0))
     axes[1].axvline(float(direct_m), color="black", ls=":", label="straight line")
     longest_m = 2.0 * float(np.linalg.norm(np.ptp(sequence.bounds_m, axis=0)))
@@ -132,7 +133,7 @@ def draw_channel(axes: list[Axes], sequence: Sequence, radio: str, frame: int) -
     axes[1].legend(fontsize=7)
 
     power, angle_deg, length_m = delay_angle(sequence, radio, csi - static, pair)
-    level, extent = _db(power).T, (angle_deg[0], angle_deg[-1], length_m[0], length_m[-1])
+    level, extent = decibels(power).T, (angle_deg[0], angle_deg[-1], length_m[0], length_m[-1])
     axes[2].imshow(level, origin="lower", aspect="auto", extent=extent, vmin=level.max() - 30.0)
     for pelvis in sequence.joints(frame)[:, 0]:
         angle, length = seen_from(sequence, radio, pair, pelvis)
@@ -175,7 +176,7 @@ def draw_over_time(axis: Axes, sequence: Sequence, radio: str) -> None:
         change = (batch["csi"] - batch["csi_static"]).abs().square().sum(dim=(1, 2, 3))
         ratios += (change / batch["csi_static"].abs().square().sum(dim=(1, 2, 3))).tolist()
         times_s += batch["time_s"].tolist()
-    axis.plot(times_s, _db(np.array(ratios)), "o-")
+    axis.plot(times_s, decibels(np.array(ratios)), "o-")
     axis.set(title="what moves / what stands still [dB]", xlabel="time [s]")
 
 
@@ -203,10 +204,6 @@ def tour(path: Path, radio: str | None, out: Path) -> None:
         print(f"frame {frame}: person with instance id {person}: {action or 'unknown action'}")
     figure.savefig(out, dpi=100)
     print(f"{out}: written")
-
-
-def _db(power: np.ndarray) -> np.ndarray:
-    return 10.0 * np.log10(np.maximum(power, 1e-30))
 
 
 if __name__ == "__main__":

@@ -4,13 +4,11 @@
 from __future__ import annotations
 
 import importlib
-import os
-import shutil
-import uuid
 from pathlib import Path
 
 from rfgs_core.dataset import Sequence, open_dataset
 from rfgs_core.errors import RfgsError
+from rfgs_core.files import replacing_folder
 
 #: Format → module below this package, and what a dataset must hold for it.
 FORMATS: dict[str, tuple[str, tuple[str, ...]]] = {
@@ -44,16 +42,8 @@ def convert(path: Path, target: str, out: Path, sequence_name: str | None = None
         raise RfgsError(f"{out}: exists already; choose another --out")
     if out.resolve().is_relative_to(path.resolve()):
         raise RfgsError(f"{out}: inside the dataset itself; choose another --out")
-    out.parent.mkdir(parents=True, exist_ok=True)
-    temporary = out.with_name(f".tmp-{uuid.uuid4().hex[:8]}-{out.name}")
-    try:
-        temporary.mkdir()
+    with replacing_folder(out) as temporary:
         _write(module, sequence, temporary)
-        if out.exists():
-            out.rmdir()
-        os.replace(temporary, out)
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
 
 
 def _write(module: str, sequence: Sequence, out: Path) -> None:

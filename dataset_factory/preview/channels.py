@@ -10,6 +10,7 @@ from rfgs_core.dataset import Sequence
 from rfgs_core.radio import Layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.layout import rotation
+from rfgs_core.radio.levels import decibels
 
 #: Interpolation of delays between the band's own bins.
 OVERSAMPLING = 8
@@ -169,8 +170,3 @@ def _listening_pairs(layout: Layout) -> list[tuple[int, int]]:
     for a, b in sorted(layout.device_pairs, key=lambda pair: (pair[0] - pair[1] - 1) % count):
         chosen.setdefault(b, (a, b))
     return [chosen[b] for b in sorted(chosen)]
-
-
-def decibels(power: np.ndarray) -> np.ndarray:
-    """Power in dB, at least -300."""
-    return 10.0 * np.log10(np.maximum(power, 1e-30))

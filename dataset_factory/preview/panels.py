@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from dataset_factory.preview.channels import decibels, delay_angle, delay_profile, seen_from
+from dataset_factory.preview.channels import delay_angle, delay_profile, seen_from
 from rfgs_core.dataset import Sequence
 from rfgs_core.encode.micro_doppler import micro_doppler
+from rfgs_core.radio.levels import decibels
 
 #: Dynamic range of the images [dB].
 RANGE_DB = 30.0

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from dataset_factory.preview.channels import decibels, delay_angle, seen_from
+from dataset_factory.preview.channels import delay_angle, seen_from
 from dataset_factory.preview.panels import (
     Watch,
     amplitude_panel,
@@ -20,6 +20,7 @@ from dataset_factory.preview.panels import (
 )
 from dataset_factory.preview.pictures import over_backdrop
 from rfgs_core.dataset import Sequence
+from rfgs_core.radio.levels import decibels
 
 #: Left and right end of the time axis in every strip, as shares of its width.
 MARGINS = (0.085, 0.93)

@@ -15,9 +15,9 @@ from dataset_factory.bundle import Bundle
 from dataset_factory.trace.movers import Movers
 from rfgs_core.errors import RfgsError
 from rfgs_core.radio import Layout, Radio
+from rfgs_core.radio.check import material_problems
 from rfgs_core.radio.constants import VACUUM_PERMITTIVITY
 from rfgs_core.radio.layout import DevicePose, rotation
-from rfgs_core.radio.materials import MATERIALS
 from rfgs_core.radio.tissue import normal_reflection, skin_conductivity, skin_permittivity
 
 #: Transmitting and receiving sites that are traced together.
@@ -32,21 +32,8 @@ def check_materials(bundle: Bundle, radio: Radio) -> None:
     Raises:
         RfgsError: Naming the material, its band and the radio's.
     """
-    for row in bundle.materials:
-        name = row["radio_material"]
-        if name not in MATERIALS:
-            raise RfgsError(
-                f"{bundle.path}: material {row['name']!r} has the unknown radio material "
-                f"{name!r}; expected one of {', '.join(sorted(MATERIALS))}"
-            )
-        material = MATERIALS[name]
-        if not material.covers(radio):
-            raise RfgsError(
-                f"{bundle.path}: material {row['name']!r} is {name!r}, whose model holds from "
-                f"{material.freq_min_hz / 1e9:g} to {material.freq_max_hz / 1e9:g} GHz, but radio "
-                f"{radio.name!r} uses {radio.freq_min_hz / 1e9:g} to "
-                f"{radio.freq_max_hz / 1e9:g} GHz; choose another material or radio"
-            )
+    for problem in material_problems(radio, bundle.materials):
+        raise RfgsError(f"{bundle.path}: {problem}")
 
 
 def radio_material(row: dict[str, Any], index: int) -> rt.RadioMaterial:

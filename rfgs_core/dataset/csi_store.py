@@ -4,9 +4,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
-import shutil
-import uuid
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +11,7 @@ import numpy as np
 from jaxtyping import Complex64
 
 from rfgs_core.errors import RfgsError, RfgsFormatError
-from rfgs_core.files import read_json, write_json
+from rfgs_core.files import read_json, replacing_folder, write_json
 from rfgs_core.radio import FrameSamples, Layout, Radio
 
 if TYPE_CHECKING:
@@ -73,13 +70,8 @@ def create_csi(
         )
     if path.exists():
         return
-    temporary = path.with_name(f".tmp-{uuid.uuid4().hex[:8]}-{path.name}")
-    temporary.parent.mkdir(parents=True, exist_ok=True)
-    try:
+    with replacing_folder(path) as temporary:
         _create(temporary, radio, layout, frames, time_s, samples)
-        os.replace(temporary, path)
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
 
 
 def write_csi(path: Path, index: int | None, value: np.ndarray, marker: Path) -> None:

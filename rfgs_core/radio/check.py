@@ -37,12 +37,17 @@ def check(
     Returns:
         One sentence per problem, each with its remedy; empty when all is well.
     """
-    problems = too_far(radio, bounds_m)
-    for row in materials:
-        problem = _material_problem(radio, row)
-        if problem:
-            problems.append(problem)
-    return problems
+    return too_far(radio, bounds_m) + material_problems(radio, materials)
+
+
+def material_problems(radio: Radio, materials: list[dict[str, Any]]) -> list[str]:
+    """Lists materials whose model does not cover a radio's band, one sentence each.
+
+    Args:
+        radio: The radio.
+        materials: Rows with `name` and `radio_material`.
+    """
+    return [problem for row in materials if (problem := _material_problem(radio, row))]
 
 
 def too_far(radio: Radio, bounds_m: Float64[np.ndarray, "2 3"]) -> list[str]:

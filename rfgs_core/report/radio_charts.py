@@ -8,6 +8,7 @@ from jaxtyping import Complex, Float
 
 from rfgs_core.evaluate.scene import Scene
 from rfgs_core.radio.layout import rotation
+from rfgs_core.radio.levels import decibels
 from rfgs_core.report.charts import INK, METHOD, figure_uri, new_figure
 
 #: Dynamic range of all images of power [dB].
@@ -28,7 +29,7 @@ def channel_chart(scene: Scene, frame: int) -> str:
         axes = figure.subplots(1, 3)
         panels = (("|H|", csi[tx, links]), ("|H − H static|", (csi - scene.csi_static)[tx, links]))
         for axis, (title, values) in zip(axes, panels, strict=False):
-            level = _db(np.abs(values) ** 2)
+            level = decibels(np.abs(values) ** 2)
             image = axis.imshow(
                 level,
                 aspect="auto",
@@ -51,7 +52,7 @@ def _delay_over_time(scene: Scene, axis, figure) -> None:
         profiles.append(np.mean(np.abs(_profile(delta)) ** 2, axis=0))
     length_m = _path_lengths_m(scene)
     shown = length_m <= _longest_m(scene)
-    level = _db(np.stack(profiles)[:, shown].T)
+    level = decibels(np.stack(profiles)[:, shown].T)
     image = axis.imshow(
         level,
         aspect="auto",
@@ -82,7 +83,7 @@ def delay_angle_chart(scene: Scene, frame: int, centroid_m: Float[np.ndarray, "3
             power = _delay_angle(scene, delta, tx_device, index, world)
             length_m = _path_lengths_m(scene)
             shown = length_m <= _longest_m(scene)
-            level = _db(power[shown])
+            level = decibels(power[shown])
             axis.pcolormesh(
                 ANGLES_DEG,
                 length_m[shown],
@@ -168,10 +169,6 @@ def _longest_m(scene: Scene) -> float:
     """Path lengths beyond are not shown [m]: twice the diagonal of the scene."""
     low, high = scene.run.sequence.bounds_m
     return min(2.0 * float(np.linalg.norm(high - low)), scene.radio.unambiguous_path_m)
-
-
-def _db(power: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
-    return 10.0 * np.log10(np.maximum(power, 1e-30))
 
 
 def f10_chart(frames: list[dict], shown: dict[str, str]) -> str:

@@ -19,6 +19,9 @@ from dataset_factory.generate import generate
 from dataset_factory.job import Job
 from dataset_factory.plan import make_plan
 from dataset_factory.scenes import find_scene
+from dataset_factory.validate import validate
+from rfgs_core.dataset import open_dataset
+from rfgs_core.dataset.writer import finish_dataset
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -91,6 +94,23 @@ def box_dataset(make_job: MakeJob, tmp_path_factory: pytest.TempPathFactory) -> 
 @pytest.fixture
 def box_copy(box_dataset: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(box_dataset, tmp_path / "dataset"))
+
+
+@pytest.fixture
+def tiny_copy(tiny_dataset: Path, tmp_path: Path) -> Path:
+    """A copy of the made-up dataset, to be changed."""
+    return Path(shutil.copytree(tiny_dataset, tmp_path / "dataset"))
+
+
+@pytest.fixture(scope="session")
+def resealed() -> Callable[[Path], list[str]]:
+    """Faults of a dataset after its checksums were made to fit the damage."""
+
+    def faults(path: Path) -> list[str]:
+        finish_dataset(path, open_dataset(path).info)
+        return validate(path)
+
+    return faults
 
 
 @pytest.fixture(scope="session")

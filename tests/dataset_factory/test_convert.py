@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import csv
 import json
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -34,11 +33,6 @@ CENTRE = 8
 @pytest.fixture
 def sequence(tiny_dataset: Path) -> Sequence:
     return open_dataset(tiny_dataset).sequence()
-
-
-@pytest.fixture
-def tiny_copy(tiny_dataset: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(tiny_dataset, tmp_path / "dataset"))
 
 
 def pixels(file: Path) -> np.ndarray:

@@ -24,11 +24,6 @@ from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.radio.impairments import IMPAIRMENT_PRESETS, Impairments, restore
 
 
-@pytest.fixture
-def tiny_copy(tiny_dataset: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(tiny_dataset, tmp_path / "dataset"))
-
-
 def test_impaired_channels_stand_beside_untouched_clean_ones(
     tiny_copy: Path, tiny_dataset: Path, data_of: Callable[[Path], dict[str, bytes]]
 ) -> None:

@@ -14,14 +14,9 @@ from dataset_factory.validate import validate
 from rfgs_core.dataset import open_dataset
 from rfgs_core.dataset.csi_store import write_csi
 from rfgs_core.dataset.pictures import write_png
-from rfgs_core.dataset.writer import finish_dataset
 from rfgs_core.files import write_json
 
-
-def resealed(path: Path) -> list[str]:
-    """Faults after the checksums were made to fit the damage."""
-    finish_dataset(path, open_dataset(path).info)
-    return validate(path)
+Faults = Callable[[Path], list[str]]
 
 
 def test_a_fresh_dataset_is_sound(box_dataset: Path) -> None:
@@ -38,13 +33,13 @@ def test_missing_and_foreign_files_are_named(box_copy: Path) -> None:
     assert any("MANIFEST.sha256: missing" in fault for fault in validate(box_copy))
 
 
-def test_unknown_mask_ids_are_named(box_copy: Path) -> None:
+def test_unknown_mask_ids_are_named(resealed: Faults, box_copy: Path) -> None:
     file = box_copy / "box_room/mask/cam00/000002.png"
     write_png(file, np.full((32, 32), 7, np.uint16))
     assert resealed(box_copy) == [f"{file}: ids [7] missing in sequence.json"]
 
 
-def test_a_wrong_picture_size_and_a_lost_marker_are_named(box_copy: Path) -> None:
+def test_a_wrong_picture_size_and_a_lost_marker_are_named(resealed: Faults, box_copy: Path) -> None:
     file = box_copy / "box_room/mask/cam00/000002.png"
     write_png(file, np.zeros((8, 32), np.uint16))
     marker = box_copy / "box_room/images/done/000001"
@@ -66,7 +61,9 @@ Damage = Callable[[np.ndarray], np.ndarray]
         (lambda csi: csi[..., ::-1].copy(), "arrive before"),
     ],
 )
-def test_unphysical_channels_are_named(box_copy: Path, damage: Damage, word: str) -> None:
+def test_unphysical_channels_are_named(
+    resealed: Faults, box_copy: Path, damage: Damage, word: str
+) -> None:
     sequence = open_dataset(box_copy).sequence()
     store = sequence.files.csi("wifi")
     write_csi(
@@ -86,7 +83,7 @@ def test_a_channel_late_by_a_metre_is_named(box_dataset: Path) -> None:
     )
 
 
-def test_people_missing_from_a_frame_are_noticed(box_copy: Path) -> None:
+def test_people_missing_from_a_frame_are_noticed(resealed: Faults, box_copy: Path) -> None:
     sequence = open_dataset(box_copy).sequence()
     files = sequence.files
     write_csi(files.csi("wifi"), 1, sequence.csi_static("wifi"), files.csi_done("wifi", 2))

@@ -3,11 +3,10 @@
 
 from __future__ import annotations
 
-import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from dataset_factory.impair import impair_dataset
 from dataset_factory.validate import checksum_faults, validate
@@ -15,19 +14,10 @@ from rfgs_core.dataset import open_dataset
 from rfgs_core.dataset.csi_store import write_csi
 from rfgs_core.dataset.impaired_store import Impaired, remove_impaired, writing_impaired
 from rfgs_core.dataset.pictures import write_png
-from rfgs_core.dataset.writer import MANIFEST, finish_dataset, write_arrays
+from rfgs_core.dataset.writer import MANIFEST, write_arrays
 from rfgs_core.radio.impairments import IMPAIRMENT_PRESETS
 
-
-@pytest.fixture
-def tiny_copy(tiny_dataset: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(tiny_dataset, tmp_path / "dataset"))
-
-
-def resealed(path: Path) -> list[str]:
-    """Faults after the checksums were made to fit the damage."""
-    finish_dataset(path, open_dataset(path).info)
-    return validate(path)
+Faults = Callable[[Path], list[str]]
 
 
 def test_a_sound_dataset_has_no_faults(tiny_copy: Path) -> None:
@@ -54,20 +44,20 @@ def test_a_flipped_bit_anywhere_is_found_and_named(tiny_copy: Path) -> None:
     assert checksum_faults(tiny_copy) == []
 
 
-def test_a_mask_where_nobody_is_is_named(tiny_copy: Path) -> None:
+def test_a_mask_where_nobody_is_is_named(resealed: Faults, tiny_copy: Path) -> None:
     file = tiny_copy / "tiny/mask/cam01/000002.png"
     mask = open_dataset(tiny_copy).sequence().mask("cam01", 2)
     write_png(file, np.roll(mask, 9, axis=1))
     assert f"{file}: instance 1 is seen where its mesh is not" in resealed(tiny_copy)
 
 
-def test_joints_beside_their_mask_are_named(tiny_copy: Path) -> None:
+def test_joints_beside_their_mask_are_named(resealed: Faults, tiny_copy: Path) -> None:
     file = tiny_copy / "tiny/mask/cam02/000001.png"
     write_png(file, np.zeros((24, 24), np.uint16))
     assert f"{file}: 15 of 15 visible joints of person 1 lie off its mask" in resealed(tiny_copy)
 
 
-def test_joints_of_another_place_are_named(tiny_copy: Path) -> None:
+def test_joints_of_another_place_are_named(resealed: Faults, tiny_copy: Path) -> None:
     sequence = open_dataset(tiny_copy).sequence()
     file = sequence.files.geometry(2)
     stored = dict(np.load(file))
@@ -83,7 +73,7 @@ def test_joints_of_another_place_are_named(tiny_copy: Path) -> None:
     assert any(str(file) in fault and "1 persons, 2 actions" in fault for fault in faults)
 
 
-def test_a_channel_with_too_much_energy_is_named(tiny_copy: Path) -> None:
+def test_a_channel_with_too_much_energy_is_named(resealed: Faults, tiny_copy: Path) -> None:
     sequence = open_dataset(tiny_copy).sequence()
     store, marker = sequence.files.csi("wifi"), sequence.files.csi_done("wifi", 2)
     write_csi(store, 1, 3 * sequence.csi("wifi", 2), marker)
@@ -91,7 +81,9 @@ def test_a_channel_with_too_much_energy_is_named(tiny_copy: Path) -> None:
     assert any("frame 2: " in fault and "energy of free space" in fault for fault in faults)
 
 
-def test_impaired_values_that_contradict_the_lost_packets_are_named(tiny_copy: Path) -> None:
+def test_impaired_values_that_contradict_the_lost_packets_are_named(
+    resealed: Faults, tiny_copy: Path
+) -> None:
     impair_dataset(tiny_copy, IMPAIRMENT_PRESETS["lab"])
     sequence = open_dataset(tiny_copy).sequence()
     known = sequence.impairments("wifi")

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
-from rfgs_core.dataset.reader import Dataset, Sequence, open_dataset
+from rfgs_core.dataset.reader import Dataset, open_dataset
+from rfgs_core.dataset.sequence import Sequence
 
 __all__ = ["Dataset", "Sequence", "open_dataset"]

@@ -11,7 +11,7 @@ from jaxtyping import Complex64
 from rfgs_core.radio.impairments import amplitude
 
 if TYPE_CHECKING:
-    from rfgs_core.dataset.reader import Sequence
+    from rfgs_core.dataset.sequence import Sequence
 
 #: clean: as traced; impaired: as stored by `rfgs-factory impair`.
 Observed = Literal["clean", "impaired"]

@@ -8,7 +8,7 @@ from typing import Any
 import torch
 from torch.utils.data import Dataset as TorchDataset
 
-from rfgs_core.dataset.reader import Sequence
+from rfgs_core.dataset.sequence import Sequence
 
 
 class FrameDataset(TorchDataset[dict[str, Any]]):

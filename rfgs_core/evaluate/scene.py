@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Complex, Float, Float32, Float64
 
 from rfgs_core.dataset.observed import Observed, observed_csi
-from rfgs_core.dataset.reader import Sequence
+from rfgs_core.dataset.sequence import Sequence
 from rfgs_core.errors import RfgsError
 from rfgs_core.evaluate.controls.gaussian_process import krige, krige_level
 from rfgs_core.evaluate.controls.interpolation import fill

@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from jaxtyping import Float32, UInt8
 
-from rfgs_core.dataset.reader import Sequence
+from rfgs_core.dataset.sequence import Sequence
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.gaussians.model import Gaussians
 from rfgs_core.gaussians.ply import GaussianCloud, cloud_of, read_ply, write_ply

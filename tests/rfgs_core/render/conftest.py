@@ -12,7 +12,7 @@ import pytest
 import torch
 
 from rfgs_core.dataset import open_dataset
-from rfgs_core.dataset.reader import Sequence
+from rfgs_core.dataset.sequence import Sequence
 from rfgs_core.gaussians import FEATURE_DIM, Gaussians
 from rfgs_core.render.cameras import Camera
 

@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from blender_scenes.motion.feet import feet_at
 from blender_scenes.motion.footsteps import Footprint, PlannedSteps, footprint_on
-from blender_scenes.motion.gait import Gait, Manner, feet_at, pelvis_at
+from blender_scenes.motion.gait import Gait, Manner, pelvis_at
 from blender_scenes.motion.path import Path, RoundedPath, Spot
 from blender_scenes.motion.rotations import about, smoothstep
 from blender_scenes.motion.score import Clip, Figure, Posture

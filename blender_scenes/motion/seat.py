@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from blender_scenes.motion.arms import hang_arm, reach, relax_fingers
-from blender_scenes.motion.gait import Gait, facing, feet_at, solve_leg
+from blender_scenes.motion.feet import feet_at, solve_leg
+from blender_scenes.motion.gait import Gait, facing
 from blender_scenes.motion.gestures import minimum_jerk
 from blender_scenes.motion.rotations import about_x
 from blender_scenes.motion.score import Clip, Figure, Posture, standing_steps

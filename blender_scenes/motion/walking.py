@@ -6,8 +6,9 @@ from __future__ import annotations
 import numpy as np
 
 from blender_scenes.motion.arms import hang_arm, relax_fingers
+from blender_scenes.motion.feet import feet_at, solve_leg
 from blender_scenes.motion.footsteps import Steps
-from blender_scenes.motion.gait import Gait, facing, feet_at, pelvis_at, solve_leg
+from blender_scenes.motion.gait import Gait, facing, pelvis_at
 from blender_scenes.motion.rotations import about_x, about_y
 from blender_scenes.motion.skeleton import SIDES, Pose, Skeleton
 

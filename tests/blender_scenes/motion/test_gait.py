@@ -6,8 +6,9 @@ import dataclasses
 import numpy as np
 import pytest
 
+from blender_scenes.motion.feet import Feet, feet_at, solve_leg
 from blender_scenes.motion.footsteps import EndlessSteps
-from blender_scenes.motion.gait import Feet, Gait, Manner, feet_at, pelvis_at, solve_leg
+from blender_scenes.motion.gait import Gait, Manner, pelvis_at
 from blender_scenes.motion.path import ArcPath
 from blender_scenes.motion.rotations import (
     about,

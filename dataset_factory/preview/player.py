@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from PIL import Image
+from scipy.spatial import ConvexHull
 
 from dataset_factory.preview.pictures import over_backdrop
 from rfgs_core.dataset import Sequence
@@ -36,6 +37,7 @@ def player(sequence: Sequence, has: list[str]) -> dict[str, Any]:
         "times": [sequence.time_s(frame) for frame in frames],
         "parents": list(PARENTS),
         "joints": [[_skeleton(person) for person in sequence.joints(frame)] for frame in frames],
+        "outlines": [_outlines(sequence, frame) for frame in frames],
         "actions": [sequence.actions(frame) for frame in frames],
         "cameras": [_camera(sequence, row, frames) for row in cameras[:4]],
     }
@@ -44,6 +46,20 @@ def player(sequence: Sequence, has: list[str]) -> dict[str, Any]:
 def _skeleton(joints: np.ndarray) -> list[Any]:
     """Joints from above; none where the scene does not tell them."""
     return _rounded(joints[:, :2]) if np.isfinite(joints).all() else []
+
+
+def _outlines(sequence: Sequence, frame: int) -> list[list[Any]]:
+    """Outlines from above of what moves and is no person [m], as closed polygons."""
+    vertices, faces, instance = sequence.moving_mesh(frame)
+    people = {int(row["id"]) for row in sequence.instances if row["class"] == "person"}
+    outlines = []
+    for other in sorted(set(instance.tolist()) - people):
+        above = vertices[np.unique(faces[instance == other]), :2].astype(np.float64)
+        points = np.unique(np.round(above, 3), axis=0)
+        if len(points) > 2:
+            # Joggled (QJ), as what moves may be flat.
+            outlines.append(_rounded(points[ConvexHull(points, qhull_options="QJ").vertices]))
+    return outlines
 
 
 def plan(sequence: Sequence) -> dict[str, Any]:

@@ -151,3 +151,15 @@ def test_doppler_of_an_approaching_reflector_shows_its_speed(sequence: Sequence)
     middle = 0.5 * (speeds[1:] + speeds[:-1])
     strongest = middle[level.argmax(axis=0)]
     assert np.abs(strongest - speed_m_s).max() < 0.05
+
+
+def test_the_plan_outlines_what_moves_and_is_no_person(box_dataset: Path) -> None:
+    sequence = open_dataset(box_dataset).sequence()
+    assert player(sequence, [])["outlines"] == [[], []]
+    sequence.info.instances[0]["class"] = "vehicle"
+    for frame, (outline,) in zip((1, 2), player(sequence, [])["outlines"], strict=True):
+        vertices, _, _ = sequence.moving_mesh(frame)
+        corners = np.array(outline)
+        assert len(corners) == 4
+        np.testing.assert_allclose(corners.min(axis=0), vertices[:, :2].min(axis=0), atol=2e-3)
+        np.testing.assert_allclose(corners.max(axis=0), vertices[:, :2].max(axis=0), atol=2e-3)

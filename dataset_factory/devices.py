@@ -16,7 +16,13 @@ from rfgs_core.radio import DevicePose, Radio, frame_samples, layout, place_devi
 from rfgs_core.radio.check import check, check_devices, enclosed
 
 #: Placement rules in words.
-_WHERE = {"corners": "in the corners of the scene", "walls": "along the walls of the scene"}
+_WHERE = {
+    "corners": "in the corners of the scene",
+    "walls": "along the walls of the scene",
+    "circle": "on a circle around the middle of the scene",
+}
+#: A circle through a wall would name every one of its places.
+_MOST_PROBLEMS = 5
 
 
 def choose_devices(bundle: Bundle, radio: Radio) -> tuple[list[DevicePose], dict[str, Any] | None]:
@@ -42,12 +48,13 @@ def choose_devices(bundle: Bundle, radio: Radio) -> tuple[list[DevicePose], dict
                     f"{bundle.info['blend_name']}: no device of radio {radio.name!r} {word}; give "
                     "an Empty another role"
                 )
-        return own, None
+        return _in_order(bundle, radio, own), None
     placed = _clear_of_furniture(radio, place_devices(radio, bundle.bounds_m), bundle)
     guess = {
         "what": "devices",
         "object": radio.name,
-        "value": f"{len(placed)} {_WHERE[radio.placement]}",
+        "value": f"{len(placed)} {'places of one device ' if radio.antennas_move else ''}"
+        f"{_WHERE[radio.placement]}",
         "why": "no Empty has a role with radio "
         + " or ".join(repr(name) for name in sorted(names)),
     }
@@ -78,6 +85,24 @@ def _clear_of_furniture(
     return clear
 
 
+def _in_order(bundle: Bundle, radio: Radio, own: list[DevicePose]) -> list[DevicePose]:
+    """The scene's devices; of one that moves its places, in the order of their names."""
+    if not radio.antennas_move:
+        return own
+    if len(own) != radio.samples_per_frame:
+        raise RfgsError(
+            f"{bundle.info['blend_name']}: {len(own)} Empties for radio {radio.name!r}, which "
+            f"moves through {radio.samples_per_frame} places in a frame; add Empties, or describe "
+            f"a radio like it in a file, with samples_per_frame: {len(own)}"
+        )
+    if any(device.role != "ACCESS_POINT" for device in own):
+        raise RfgsError(
+            f"{bundle.info['blend_name']}: radio {radio.name!r} moves and hears itself; give all "
+            "of its Empties the role access point"
+        )
+    return sorted(own, key=lambda device: device.name)
+
+
 def check_scene(bundle: Bundle, devices: dict[str, list[DevicePose]], radios: list[Radio]) -> None:
     """Refuses scenes that a radio cannot be traced in faithfully.
 
@@ -86,7 +111,9 @@ def check_scene(bundle: Bundle, devices: dict[str, list[DevicePose]], radios: li
     """
     problems = scene_problems(bundle, devices, radios)
     if problems:
-        raise RfgsError(f"{bundle.info['blend_name']}: " + "; also: ".join(problems))
+        more = len(problems) - _MOST_PROBLEMS
+        said = [*problems[:_MOST_PROBLEMS], *([f"{more} more like these"] if more > 0 else [])]
+        raise RfgsError(f"{bundle.info['blend_name']}: " + "; also: ".join(said))
 
 
 def scene_problems(

@@ -168,8 +168,8 @@ def _choose(job: Job, bundle: Bundle) -> tuple[dict[str, list[DevicePose]], list
     devices, guesses = {}, []
     for radio in radios:
         devices[radio.name], guess = choose_devices(bundle, radio)
-        whose = guess["value"] if guess else "the scene's own"
-        logger.info("%s: %d devices, %s", radio.name, len(devices[radio.name]), whose)
+        own = f"{len(devices[radio.name])} devices, the scene's own"
+        logger.info("%s: %s", radio.name, guess["value"] if guess else own)
         guesses += [guess] if guess else []
     check_scene(bundle, devices, radios)
     if job.plan.images and not bundle.cameras:
@@ -189,7 +189,7 @@ def _prepare(
     times = [(frame - sequence.frame_start) / sequence.fps for frame in sequence.frames]
     for name, poses in devices.items():
         radio = job.plan.radio(name)
-        samples = frame_samples(radio, sequence.fps)
+        samples = frame_samples(radio, sequence.fps, poses)
         create_csi(
             job.files.csi(name), radio, layout(radio, poses), sequence.frames, times, samples
         )

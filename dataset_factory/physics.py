@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from rfgs_core.dataset import Sequence
-from rfgs_core.radio import Layout
+from rfgs_core.radio import DevicePose, Layout, Radio, devices_at, layout
 from rfgs_core.radio.antennas import field
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.layout import rotation
@@ -36,17 +36,42 @@ def channel_faults(sequence: Sequence, radio: str, static: np.ndarray, file: Pat
 
     Two laws: nothing arrives before light can, and where nothing blocks the line of sight the
     direct path has Friis' amplitude λ/(4πd), times both antennas' responses, and delay d/c.
+
+    Args:
+        sequence: The sequence.
+        radio: Which radio.
+        static: Its static channels (sample, tx, rx, subcarrier), several if antennas move.
+        file: Where they are stored.
     """
-    layout = sequence.layout(radio)
-    if not np.isfinite(static).all():
-        yield f"{file}: static channel: values that are not finite"
-        return
-    if not static[layout.measured].any():
-        yield f"{file}: static channel: silent"
-        return
+    spec, devices = sequence.radio_spec(radio), sequence.devices(radio)
     vertices, faces = sequence.static_mesh()
     triangles = vertices[faces].astype(np.float64)
     clear = []
+    for sample, value in enumerate(static):
+        place = layout(spec, devices, sample)
+        where = f"{file}: static channel" + (f", sample {sample}" if len(static) > 1 else "")
+        if not np.isfinite(value).all():
+            yield f"{where}: values that are not finite"
+            return
+        if not value[place.measured].any():
+            yield f"{where}: silent"
+            return
+        yield from _early_faults(sequence, radio, value, place, where)
+        here = devices_at(spec, devices, sample)
+        for tx, rx in _clear_links(place, triangles):
+            response = _response(spec, place, here, tx[0], rx[0])
+            if abs(response) > WEAK_RESPONSE:
+                links = value[np.ix_(tx, rx)] / response
+                distance_m = np.linalg.norm(place.tx_xyz[tx][:, None] - place.rx_xyz[rx], axis=-1)
+                clear.append(_direct_path(sequence, radio, links, distance_m))
+    if clear:
+        yield from _direct_faults(sequence, radio, file, np.array(clear))
+
+
+def _early_faults(
+    sequence: Sequence, radio: str, static: np.ndarray, layout: Layout, where: str
+) -> Iterator[str]:
+    """Pairs of devices between which something arrives before light can."""
     for a, b in layout.device_pairs:
         tx, rx = layout.tx_device == a, layout.rx_device == b
         links = static[np.ix_(tx, rx)]
@@ -54,17 +79,9 @@ def channel_faults(sequence: Sequence, radio: str, static: np.ndarray, file: Pat
         early = _early_power(sequence, radio, links, float(distance_m.min()))
         if early > EARLY_LIMIT:
             yield (
-                f"{file}: devices {a} to {b}: {10 * np.log10(early):.0f} dB arrive before the "
+                f"{where}: devices {a} to {b}: {10 * np.log10(early):.0f} dB arrive before the "
                 "direct path can"
             )
-    for tx, rx in _clear_links(layout, triangles):
-        response = _response(sequence, radio, tx[0], rx[0])
-        if abs(response) > WEAK_RESPONSE:
-            links = static[np.ix_(tx, rx)] / response
-            distance_m = np.linalg.norm(layout.tx_xyz[tx][:, None] - layout.rx_xyz[rx], axis=-1)
-            clear.append(_direct_path(sequence, radio, links, distance_m))
-    if clear:
-        yield from _direct_faults(sequence, radio, file, np.array(clear))
 
 
 def _direct_faults(sequence: Sequence, radio: str, file: Path, clear: np.ndarray) -> Iterator[str]:
@@ -96,17 +113,12 @@ def _clear_links(layout: Layout, triangles: np.ndarray) -> Iterator[tuple[np.nda
             yield tx, rx
 
 
-def _response(sequence: Sequence, radio: str, tx: int, rx: int) -> float:
+def _response(spec: Radio, layout: Layout, devices: list[DevicePose], tx: int, rx: int) -> float:
     """What both antennas make of the direct path between two elements' sites.
 
     Patterns, slants and turned devices; 1 for upright isotropic antennas, 0 where a device has
     the other straight above or below it.
     """
-    layout, spec, devices = (
-        sequence.layout(radio),
-        sequence.radio_spec(radio),
-        sequence.devices(radio),
-    )
     a, b = int(layout.tx_device[tx]), int(layout.rx_device[rx])
     start = layout.tx_xyz[layout.tx_site == layout.tx_site[tx]].mean(axis=0)
     end = layout.rx_xyz[layout.rx_site == layout.rx_site[rx]].mean(axis=0)
@@ -180,16 +192,18 @@ def _direct_path(
 def energy_faults(sequence: Sequence, radio: str, value: np.ndarray, where: str) -> Iterator[str]:
     """Passive scenes bring no more energy than free space, give or take what adds in phase.
 
-    The energy of all links is compared with that of straight lines of the same lengths, (λ/4πd)²,
-    times the antennas' peak gains.
+    The energy of all links, in the loudest of the samples `value` (sample, tx, rx, subcarrier),
+    is compared with that of straight lines of the same lengths, (λ/4πd)², times the antennas'
+    peak gains.
     """
-    layout, spec = sequence.layout(radio), sequence.radio_spec(radio)
-    tx, rx = np.nonzero(layout.measured)
-    distance_m = np.linalg.norm(layout.tx_xyz[tx] - layout.rx_xyz[rx], axis=-1)
+    # Antennas that move keep their distance.
+    elements, spec = sequence.layout(radio), sequence.radio_spec(radio)
+    tx, rx = np.nonzero(elements.measured)
+    distance_m = np.linalg.norm(elements.tx_xyz[tx] - elements.rx_xyz[rx], axis=-1)
     wavenumber = 2 * np.pi * spec.freq_hz / SPEED_OF_LIGHT
     free_space = (1.0 / (2 * wavenumber * distance_m[:, None])) ** 2
     gain = PEAK_GAINS.get(spec.pattern, max(PEAK_GAINS.values())) ** 2
-    energy = (np.abs(value[layout.measured]) ** 2).sum()
+    energy = max((np.abs(one[elements.measured]) ** 2).sum() for one in value)
     ratio = float(energy / free_space.sum() / gain)
     if ratio > ENERGY_LIMIT:
         yield f"{where}: {ratio:.1f} times the energy of free space, more than a scene can give"

@@ -52,7 +52,8 @@ class Plan:
     impairments: dict[str, Any] | None = None
     """Settings of the impaired channels beside the clean ones; none makes none."""
     packets_per_frame: int = 1
-    """Packets or chirps of each frame; 1 leaves every radio its own number."""
+    """Packets or chirps of each frame; 1 leaves every radio its own number, as do antennas that
+    move, whose pulses are their places."""
     overrides: dict[str, Any] = field(default_factory=dict)
     """What the user says about the scene, in the words of the YAML file."""
     custom_radios: dict[str, dict[str, Any]] = field(default_factory=dict)
@@ -62,7 +63,8 @@ class Plan:
         """One of the plan's radios, with the packets asked for."""
         custom = self.custom_radios.get(name)
         radio = checked_radio(name, custom) if custom else preset(name)
-        if self.packets_per_frame == 1:
+        # Places of antennas that move are no packets.
+        if self.packets_per_frame == 1 or radio.antennas_move:
             return radio
         return replace(radio, samples_per_frame=self.packets_per_frame)
 

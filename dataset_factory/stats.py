@@ -13,6 +13,7 @@ from tqdm import tqdm
 
 from rfgs_core.dataset import Dataset, Sequence, open_dataset
 from rfgs_core.dataset.impaired_store import has_impaired
+from rfgs_core.radio import devices_at
 from rfgs_core.radio.levels import decibels
 
 #: Arrivals weaker than this relative to a link's strongest do not count for its spread [dB].
@@ -62,17 +63,21 @@ def radio_stats(sequence: Sequence, radio: str) -> dict[str, Any]:
     Σ|csi − csi_static|² / Σ|csi_static|² over links and tones, its median over frames [dB].
     """
     layout, spec = sequence.layout(radio), sequence.radio_spec(radio)
-    static = sequence.csi_static(radio)[layout.measured].astype(np.complex128)
+    # One sample of each frame, or, where antennas move, all of its places.
+    static = sequence.csi_static_samples(radio)[:, layout.measured].astype(np.complex128)
     moving, levels = [], []
     for frame in tqdm(sequence.frames, desc=radio, unit="frame"):
-        csi = sequence.csi(radio, frame)[layout.measured].astype(np.complex128)
+        csi = sequence.csi_samples(radio, frame)[: len(static), layout.measured]
+        csi = csi.astype(np.complex128)
         moving.append((np.abs(csi - static) ** 2).sum() / (np.abs(static) ** 2).sum())
-        levels.append((np.abs(csi) ** 2).mean(axis=-1))
+        levels.append((np.abs(csi) ** 2).mean(axis=-1).ravel())
     level_db = decibels(np.concatenate(levels))
     low, middle, high = np.percentile(level_db, [1, 50, 99])
-    spread_ns = 1e9 * delay_spread_s(static, spec.subcarrier_spacing_hz)
+    spread_ns = 1e9 * delay_spread_s(
+        static.reshape(-1, static.shape[-1]), spec.subcarrier_spacing_hz
+    )
     found = {
-        "devices": len(sequence.devices(radio)),
+        "devices": len(devices_at(spec, sequence.devices(radio), 0)),
         "tx_elements": len(layout.tx_device),
         "rx_elements": len(layout.rx_device),
         "links": int(layout.measured.sum()),

@@ -20,6 +20,7 @@ from rfgs_core.dataset.schema import read_dataset_info
 from rfgs_core.dataset.writer import MANIFEST, listed_files, own_digest
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json, sha256
+from rfgs_core.radio import layout
 
 #: Coordinates of a store that follow from the devices in `sequence.json`.
 LAYOUT_COORDINATES = (
@@ -119,26 +120,33 @@ def _sequence_faults(sequence: Sequence, has: list[str]) -> Iterator[str]:
 
 def _radio_faults(sequence: Sequence, radio: str) -> Iterator[str]:
     store = sequence.files.csi(radio)
-    data, layout = sequence.radio(radio), sequence.layout(radio)
+    data, spec, devices = (
+        sequence.radio(radio),
+        sequence.radio_spec(radio),
+        sequence.devices(radio),
+    )
     times_s = [sequence.sample_times_s(radio, frame) for frame in sequence.frames]
     if data["frame"].values.tolist() != np.repeat(sequence.frames, len(times_s[0])).tolist():
         yield f"{store}: frame: expected the frames of sequence.json, once per sample"
     elif not np.allclose(data["time_s"].values, np.concatenate(times_s), rtol=0.0, atol=1e-9):
         yield f"{store}: time_s: differs from frames and samples in sequence.json"
-    if not np.allclose(data["freq_hz"].values, sequence.radio_spec(radio).freq_hz, rtol=1e-12):
+    if not np.allclose(data["freq_hz"].values, spec.freq_hz, rtol=1e-12):
         yield f"{store}: freq_hz: differs from the radio in sequence.json"
     for name in LAYOUT_COORDINATES:
         if name not in data:
             yield f"{store}: {name}: missing; the dataset was made by an older version"
             continue
-        values = data[name].values
-        # Antennas that move stand at the first sample where the layout puts them.
-        first = values[0] if "time" in data[name].dims else values
-        if not (np.isfinite(values).all() and np.allclose(first, getattr(layout, name), atol=1e-9)):
+        values, samples = data[name].values, 1
+        if "time" in data[name].dims:
+            samples = len(times_s[0])
+            values = values.reshape(-1, samples, *values.shape[1:])
+        places = (layout(spec, devices, sample) for sample in range(samples))
+        expected = np.stack([getattr(place, name) for place in places])
+        if not (np.isfinite(values).all() and np.allclose(values, expected, atol=1e-9)):
             yield f"{store}: {name}: differs from the devices in sequence.json"
     static = sequence.csi_static_samples(radio)
-    yield from channel_faults(sequence, radio, static[0], chunk_file(store, None))
-    yield from energy_faults(sequence, radio, static[0], f"{chunk_file(store, None)}: static")
+    yield from channel_faults(sequence, radio, static, chunk_file(store, None))
+    yield from energy_faults(sequence, radio, static, f"{chunk_file(store, None)}: static")
     for index, frame in enumerate(sequence.frames):
         file = chunk_file(store, index)
         yield from _caught(
@@ -159,13 +167,20 @@ def _frame_faults(
         yield f"{file}: frame {frame}: values on links that are not measured"
     elif not np.abs(value[:, measured]).any(axis=(1, 2)).all():
         yield f"{file}: frame {frame}: silent channel"
-    elif (value == static).all(axis=(1, 2, 3)).any():
+    elif _nobody(sequence, radio, value, static):
         hint = (
             "" if sequence.trace_depth(radio) > 2 else "; behind a wall only --depth 3 shows people"
         )
         yield f"{file}: frame {frame}: equals the static channel, nobody is in it{hint}"
     else:
-        yield from energy_faults(sequence, radio, value[0], f"{file}: frame {frame}")
+        yield from energy_faults(sequence, radio, value, f"{file}: frame {frame}")
+
+
+def _nobody(sequence: Sequence, radio: str, value: np.ndarray, static: np.ndarray) -> bool:
+    """Whether a sample equals the static channel; of antennas that move, whether all do."""
+    same = (value == static).all(axis=(1, 2, 3))
+    # Furniture may hide people from some of the places.
+    return bool(same.all() if sequence.radio_spec(radio).antennas_move else same.any())
 
 
 def _impaired_faults(sequence: Sequence, radio: str) -> Iterator[str]:

@@ -25,7 +25,7 @@ from rfgs_core.dataset.schema import device_pose, radio_from_json
 from rfgs_core.errors import RfgsError
 
 if TYPE_CHECKING:
-    from dataset_factory.trace import Tracer
+    from dataset_factory.trace import ApertureTracer, Tracer
 
 
 class Worker:
@@ -44,7 +44,7 @@ class Worker:
         self.job = job
         self.bundle: Bundle = read_bundle(Path(job["bundle"]))
         self.radio = ""
-        self.tracer: Tracer | None = None
+        self.tracer: Tracer | ApertureTracer | None = None
 
     def trace(self, radio: str, frame: int | None, file: str | None) -> dict[str, float]:
         """Traces one frame and stores it.
@@ -70,14 +70,15 @@ class Worker:
             write_csi(files.csi(radio), index, value, files.csi_done(radio, frame))
         return {**spent, "write": time.perf_counter() - start}
 
-    def _tracer(self, radio: str) -> Tracer:
-        from dataset_factory.trace import Tracer
+    def _tracer(self, radio: str) -> Tracer | ApertureTracer:
+        from dataset_factory.trace import ApertureTracer, Tracer
 
         if self.tracer is None or self.radio != radio:
             devices = [device_pose(row) for row in self.job["devices"][radio]]
             spec = radio_from_json(self.bundle.path, self.job["radios"][radio])
             self.radio = radio
-            self.tracer = Tracer(
+            kind = ApertureTracer if spec.antennas_move else Tracer
+            self.tracer = kind(
                 self.bundle,
                 spec,
                 devices,

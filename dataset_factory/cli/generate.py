@@ -43,8 +43,8 @@ class GenerateArgs:
     """Light samples per pixel; more is less noisy and slower."""
     depth: int | None = None
     """Interactions of a path that meets a person: 1 the person alone (fast), 2 also one wall, 3
-    two (slow; needed behind a wall). Default: what the scene needs, else 2; for uwb 1, which is
-    all that an ultra-wide band can have."""
+    two (slow; needed behind a wall). Default: what the scene needs, else 2; for uwb and sar 1,
+    which is all that an ultra-wide band, or antennas that move, can have."""
     seed: int = 0
     """Root seed; the same seed gives the same bytes."""
     workers: int = 2
@@ -62,7 +62,8 @@ class GenerateArgs:
     `rfgs-factory impair --help`."""
     packets_per_frame: int = 1
     """Channels per frame, for Doppler: packets spread until the next frame, or for mmwave chirps
-    0.25 ms apart. The animation's last frame is left out, as nothing is known beyond it."""
+    0.25 ms apart. The animation's last frame is left out, as nothing is known beyond it. Not for
+    sar, whose pulses are the places of its antenna."""
     images: bool = True
     """Render pictures with Blender."""
     options: tyro.conf.OmitArgPrefixes[SceneOptions] = field(default_factory=SceneOptions)
@@ -143,7 +144,7 @@ def _refuse_depth(scene: Scene, args: GenerateArgs) -> None:
     for name, radio in chosen_radios(args.radio).items():
         if name == SCENE_RADIO:
             continue
-        if radio.ultra_wide and args.depth is not None and args.depth > radio.deepest:
+        if radio.deepest == 1 and args.depth is not None and args.depth > 1:
             raise RfgsError(too_deep(radio, args.depth))
         if args.depth is None and scene.depth > max(radio.deepest, DEFAULT_DEPTH):
             raise RfgsError(

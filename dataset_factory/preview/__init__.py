@@ -12,6 +12,7 @@ import jinja2
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
+from dataset_factory.preview.aperture import aperture_strip, image_figure, range_figure
 from dataset_factory.preview.channels import delay_angle_figure, profile_figure
 from dataset_factory.preview.panels import doppler_shown, watch
 from dataset_factory.preview.pictures import layer_sheet
@@ -45,6 +46,8 @@ def preview(path: Path, out: Path | None, sequence_name: str | None) -> Path:
     for title, radio in tqdm(jobs, desc="preview", unit="section"):
         if radio is None:
             figures = _pictures(sequence, timeline, folder)
+        elif sequence.radio_spec(radio).antennas_move:
+            figures = _aperture(sequence, radio, timeline, folder)
         else:
             figures = _radio(sequence, radio, timeline, folder)
         sections.append({"title": title, "figures": figures})
@@ -158,6 +161,41 @@ def _radio(
             f"Frame {frame}. Bartlett beam over the columns of each receiving array, power "
             "averaged over its rows and transmitters; 0° is the boresight. Each image has its own "
             "scale of 40 dB; the cross marks the person's pelvis.",
+            folded=True,
+        ),
+    ]
+
+
+def _aperture(
+    sequence: Sequence, radio: str, timeline: Timeline, folder: Path
+) -> list[dict[str, Any]]:
+    frame = sequence.frames[len(sequence.frames) // 2]
+    return [
+        _figure(
+            aperture_strip(sequence, radio, timeline),
+            folder / f"{radio}_strip.png",
+            f"Images of {radio} over time",
+            "What people change, focused by back-projection from all places of the antenna (dots), "
+            "the strongest of all heights; the cross marks the pelvis. Each image has its own "
+            "scale of 25 dB.",
+            strip=True,
+        ),
+        _figure(
+            range_figure(sequence, radio, frame),
+            folder / f"{radio}_ranges.png",
+            f"Range profiles of {radio} along its aperture, one frame",
+            f"Frame {frame}. Half the path length over the places of the antenna, with people, "
+            "without (static), and their difference; dashed: the pelvis' own range. A point "
+            "scatterer draws one such curve.",
+            folded=True,
+        ),
+        _figure(
+            image_figure(sequence, radio, frame),
+            folder / f"{radio}_images.png",
+            f"Focused images of {radio}, one frame",
+            f"Frame {frame}. Matched filter over all places and tones, the strongest along the "
+            "axis that is not drawn; the cross marks the pelvis. Smooth walls and furniture "
+            "mirror, so they show where they face the antenna, not as a whole.",
             folded=True,
         ),
     ]

@@ -169,9 +169,9 @@ def groups(layout: Layout) -> list[Group]:
     tx, rx = (np.arange(count) for count in wanted.shape)
     if len(tx) <= SITES_AT_ONCE and len(rx) <= SITES_AT_ONCE:
         return [(tx, rx)]
-    if len(tx) == len(rx) and (wanted == np.eye(len(tx), dtype=bool)).all():
-        return [(tx[i : i + 1], rx[i : i + 1]) for i in tx]
     starts = range(0, len(rx), SITES_AT_ONCE)
+    if len(tx) == len(rx) and (wanted == np.eye(len(tx), dtype=bool)).all():
+        return [(tx[i : i + SITES_AT_ONCE], rx[i : i + SITES_AT_ONCE]) for i in starts]
     return [(tx, rx[i : i + SITES_AT_ONCE]) for i in starts]
 
 

@@ -4,52 +4,31 @@
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 
-import drjit as dr
 import numpy as np
-import sionna.rt as rt
 
 from dataset_factory.bundle import Bundle, BundleFrame
 from dataset_factory.motion import read_motion
-from dataset_factory.trace.bounces import BUFFER, Bounces, with_facets
+from dataset_factory.trace.base import BaseTracer
+from dataset_factory.trace.bounces import Bounces, with_facets
 from dataset_factory.trace.direct import PosedPoints, direct_channel, in_sight
 from dataset_factory.trace.environment import (
     Environment,
     environment_channel,
-    node_frequencies,
 )
 from dataset_factory.trace.held import Trace, follow, mixed
-from dataset_factory.trace.movers import split_movers
 from dataset_factory.trace.paths import PathSet
-from dataset_factory.trace.points import SurfacePoints, surface_points
-from dataset_factory.trace.scene import (
-    BODY,
-    check_materials,
-    environment_scene,
-    half_space_reflection,
-    mesh,
-    move_meshes,
-    move_vehicles,
-)
-from dataset_factory.trace.shadow import Shadow, coarse_mesh, transmission
+from dataset_factory.trace.shadow import Shadow, transmission
 from dataset_factory.trace.steering import steer
-from rfgs_core.errors import RfgsError
 from rfgs_core.radio import Radio, frame_samples, layout, pose_span_s
-from rfgs_core.radio.check import too_deep
-from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.layout import DevicePose
 from rfgs_core.seeds import sub_seed
 
 #: Longest time between traces of a frame with several samples [s].
 TRACE_STEP_S = 0.02
-#: Dr.Jit keeps kernels and memory of every frame; they are dropped this often [frames].
-FLUSH_EVERY = 10
 
 
-class Tracer:
+class Tracer(BaseTracer):
     """Traces one radio through one bundle: H = H_environment · shadow + H_people.
 
     Vehicles are part of the environment, which is traced again for every frame if there are any.
@@ -69,55 +48,24 @@ class Tracer:
         shadow: Shadow = "kirchhoff",
         seed: int = 0,
     ) -> None:
-        """Builds the scenes; tracing starts with the first call.
-
-        Args:
-            bundle: Scene bundle.
-            radio: Radio to simulate.
-            devices: Poses of its devices.
-            depth: Interactions of people's paths: 1 direct, 2 with one wall, 3 with two.
-            shadow: "kirchhoff", or "hard" for Sionna's all-or-nothing shadow.
-            seed: Root seed; rays and points depend on it, frames do not.
-
-        Raises:
-            RfgsError: A material does not hold in the radio's band, or the depth is not 1, 2
-                or 3.
-        """
-        if depth != 1 and depth not in BUFFER:
-            raise RfgsError(f"trace depth {depth}: expected 1, 2 or 3")
-        if depth > radio.deepest:
-            raise RfgsError(too_deep(radio, depth))
-        check_materials(bundle, radio)
-        self._bundle, self._radio, self._devices = bundle, radio, devices
-        self._shadow: Shadow = shadow
-        self._seed = seed
+        """Builds the scenes and traces the environment, see `BaseTracer`."""
+        super().__init__(bundle, radio, devices, depth=depth, shadow=shadow, seed=seed)
         self._layout = layout(radio, devices)
         self._samples = frame_samples(radio, bundle.fps)
-        self._nodes = node_frequencies(radio)
-        self.timings: dict[str, float] = dict.fromkeys(
-            ("environment", "shadow", "people_direct", "people_bounces"), 0.0
-        )
-        self._people, self._vehicles = split_movers(bundle)
-        rays = sub_seed(seed, "environment")
+        bodies = self._bodies
         with self._timed("environment"):
-            environment = Environment(bundle, radio, self._layout, devices, rays)
+            environment = Environment(bundle, radio, self._layout, devices, self._rays)
             self._static_paths = environment.paths()
-            if len(self._vehicles):
+            if len(bodies.vehicles):
                 environment = Environment(
-                    bundle, radio, self._layout, devices, rays, self._vehicles
+                    bundle, radio, self._layout, devices, self._rays, bodies.vehicles
                 )
         self._environment = environment
-        self._frames_done = 0
-        self._points = self._make_points()
-        self._outlines = self._make_outlines()
-        self._scene = environment_scene(bundle, radio, self._vehicles)
         self._bounces: Bounces | None = None
-        if self._points is not None:
-            self._add_body()
-            if depth > 1:
-                self._bounces = Bounces(
-                    self._scene, self._layout, devices, depth, sub_seed(seed, "bounces")
-                )
+        if bodies.scatter and depth > 1:
+            self._bounces = Bounces(
+                bodies.scene, self._layout, devices, depth, sub_seed(seed, "bounces")
+            )
 
     def static(self) -> np.ndarray:
         """Channel without anything that moves, complex64, shape (tx, rx, subcarrier)."""
@@ -151,9 +99,10 @@ class Tracer:
                 after = self._trace(motion.at(offset_s[-1] * part / parts))
             share = 1.0 - part + progress
             pose = motion.at(time_s)
-            environment = self._environment_at(pose) if len(self._vehicles) else None
+            environment = self._environment_at(pose) if len(self._bodies.vehicles) else None
             shares = (1.0 - share, share)
-            out[k] = self._channel(self._posed(pose), (before, after), shares, environment)
+            points = self._bodies.points(pose)
+            out[k] = self._channel(points, (before, after), shares, environment)
         return out
 
     def frame(self, frame: BundleFrame) -> np.ndarray:
@@ -177,13 +126,12 @@ class Tracer:
         vertices = vertices.astype(np.float32)
         environment = self._environment_at(vertices)
         self._flush()
-        if self._points is None:
+        points = self._bodies.points(vertices)
+        if points is None:
             return Trace(environment)
-        self._move(vertices)
-        points = self._posed(vertices)
-        assert points is not None
+        self._bodies.move(vertices)
         with self._timed("people_direct"):
-            seen = in_sight(self._scene.mi_scene, points, self._layout)
+            seen = in_sight(self._bodies.scene.mi_scene, points, self._layout)
         bounced = None
         if self._bounces is not None:
             with self._timed("people_bounces"):
@@ -195,11 +143,10 @@ class Tracer:
         vertices = vertices.astype(np.float32)
         paths = self._paths_at(vertices)
         passed = None
-        if self._points is not None:
-            people = self._people.posed(vertices)
-            bodies = [(people[kept], faces) for kept, faces in self._outlines]
+        if self._bodies.scatter:
+            outlines = self._bodies.outlines(vertices)
             with self._timed("shadow"):
-                passed = transmission(paths, self._layout, bodies, self._nodes, self._shadow)
+                passed = transmission(paths, self._layout, outlines, self._nodes, self._shadow)
         with self._timed("environment"):
             return environment_channel(paths, self._radio, self._layout, passed)
 
@@ -229,7 +176,7 @@ class Tracer:
                     mixed([(trace.seen, share) for trace, share in weighted]),
                     self._layout,
                     self._devices,
-                    self._gamma(self._radio.freq_hz),
+                    self._bodies.gamma(self._radio.freq_hz),
                     self._radio,
                 )
             for trace, share in weighted:
@@ -241,10 +188,11 @@ class Tracer:
 
     def _paths_at(self, vertices: np.ndarray) -> PathSet:
         """Paths without people when the bundle's vertices are at places [m], shape (V, 3)."""
-        if not len(self._vehicles):
+        vehicles = self._bodies.vehicles
+        if not len(vehicles):
             return self._static_paths
         with self._timed("environment"):
-            return self._environment.paths(self._vehicles.posed(vertices))
+            return self._environment.paths(vehicles.posed(vertices))
 
     def _bounced(self, points: PosedPoints, trace: Trace) -> np.ndarray:
         """People's paths by way of walls, shape (tx, rx, subcarrier)."""
@@ -252,77 +200,6 @@ class Tracer:
         paths = trace.bounced
         if points is not trace.points:
             paths = follow(paths, points.lifted)
-        paths = with_facets(
-            paths, points, self._gamma(self._nodes), self._nodes, self._radio.centre_hz
-        )
+        gamma = self._bodies.gamma(self._nodes)
+        paths = with_facets(paths, points, gamma, self._nodes, self._radio.centre_hz)
         return steer(paths, self._layout, self._radio.freq_hz, self._nodes)
-
-    def _posed(self, vertices: np.ndarray) -> PosedPoints | None:
-        """Scattering points when the bundle's vertices are at places [m], shape (V, 3)."""
-        if self._points is None:
-            return None
-        positions, normals = self._points.at(self._people.posed(vertices))
-        return PosedPoints(positions, normals, self._points.areas, self._points.material)
-
-    def _gamma(self, freq_hz: np.ndarray) -> dict[int, np.ndarray]:
-        """Reflection coefficients of all materials that move, by material index."""
-        assert self._points is not None
-        return {
-            int(index): half_space_reflection(
-                self._bundle.materials[int(index)]["radio_material"], freq_hz
-            )
-            for index in np.unique(self._points.material)
-        }
-
-    def _make_points(self) -> SurfacePoints | None:
-        """Points on everything that scatters from points; None if nothing does."""
-        people = self._people
-        if not len(people):
-            return None
-        return surface_points(
-            people.rest_vertices,
-            people.faces,
-            people.material,
-            people.instance,
-            SPEED_OF_LIGHT / self._radio.freq_max_hz,
-            sub_seed(self._seed, "points"),
-        )
-
-    def _make_outlines(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Vertices kept and triangles of the coarse mesh of each instance."""
-        people = self._people
-        return [
-            coarse_mesh(people.rest_vertices, people.faces[people.instance == instance])
-            for instance in np.unique(people.instance)
-        ]
-
-    def _add_body(self) -> None:
-        """Adds everything that scatters from points as one absorber, in its rest pose."""
-        body = rt.SceneObject(
-            mi_mesh=mesh(BODY, self._people.rest_vertices, self._people.faces),
-            name=BODY,
-            radio_material=rt.AbsorberRadioMaterial(name="absorber"),
-        )
-        self._scene.edit(add=body)
-
-    def _move(self, vertices: np.ndarray) -> None:
-        """Puts people and vehicles in place, given the bundle's vertices [m], shape (V, 3)."""
-        move_meshes(self._scene, {BODY: self._people.posed(vertices)})
-        if len(self._vehicles):
-            move_vehicles(self._scene, self._vehicles, self._vehicles.posed(vertices))
-
-    def _flush(self) -> None:
-        """Drops what Dr.Jit keeps of past frames, every few frames."""
-        self._frames_done += 1
-        if self._frames_done % FLUSH_EVERY == 0:
-            dr.flush_kernel_cache()
-            dr.flush_malloc_cache()
-
-    @contextmanager
-    def _timed(self, stage: str) -> Iterator[None]:
-        """Adds the block's wall time to a stage."""
-        start = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.timings[stage] += time.perf_counter() - start

@@ -38,6 +38,7 @@ PERSON_SURFACE_M2 = 1.6
 
 _NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]*")
 _TYPES: dict[str, type | tuple[type, ...]] = {
+    "bool": bool,
     "int": int,
     "float": (int, float),
     "str": str,

@@ -87,12 +87,19 @@ class Sequence:
         return radio_from_json(self.files.info, self.info.radios[self._radio(name)])
 
     def devices(self, name: str) -> list[DevicePose]:
-        """Where the radio's devices stand."""
-        return [device_pose(row) for row in self.info.devices[self._radio(name)]]
+        """Where the radio's devices stand; of one that moves, its place at each sample."""
+        devices = [device_pose(row) for row in self.info.devices[self._radio(name)]]
+        spec = self.radio_spec(name)
+        if spec.antennas_move and len(devices) != spec.samples_per_frame:
+            raise RfgsFormatError(
+                f"{self.files.info}: devices of {name}: expected one place for each of "
+                f"{spec.samples_per_frame} samples, got {len(devices)}"
+            )
+        return devices
 
-    def layout(self, name: str) -> Layout:
-        """Every antenna element of the radio."""
-        return layout(self.radio_spec(name), self.devices(name))
+    def layout(self, name: str, sample: int = 0) -> Layout:
+        """Every antenna element of the radio, at one of a frame's samples where they move."""
+        return layout(self.radio_spec(name), self.devices(name), sample)
 
     def radio(self, name: str) -> xarray.Dataset:
         """Channels of a radio with their coordinates, read when used.

@@ -160,6 +160,29 @@ def matched_filter(
     return images(*profiles, tx_xyz, rx_xyz, pair, points)
 
 
+def aperture_filter(
+    csi: Complex[np.ndarray, "sample subcarrier"],
+    tx_xyz: Float[np.ndarray, "sample 3"],
+    rx_xyz: Float[np.ndarray, "sample 3"],
+    freq_hz: Float[np.ndarray, "subcarrier"],
+    points: Float[np.ndarray, "N 3"],
+) -> Complex[np.ndarray, "N"]:
+    """Complex matched-filter output of a synthetic aperture: time-domain back-projection.
+
+    Args:
+        csi: Channel of one antenna pair at each of its places; uniform tone grid.
+        tx_xyz: Its transmitting antenna at each place [m].
+        rx_xyz: Its receiving antenna at each place [m].
+        freq_hz: Tone frequencies [Hz], equally spaced.
+        points: Where to evaluate [m].
+
+    Returns:
+        Mean over places and tones, shape (N,).
+    """
+    own = np.where(np.eye(len(csi), dtype=bool), 0, -1)
+    return images(*_band_profiles(csi, freq_hz, 1), tx_xyz, rx_xyz, own, points)[0, 0]
+
+
 def images(
     profiles: Complex[np.ndarray, "link channel sample"],
     centre_k: Float[np.ndarray, "channel"],

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from rfgs_core.radio.layout import DevicePose, Layout, layout
+from rfgs_core.radio.layout import DevicePose, Layout, devices_at, layout
 from rfgs_core.radio.placement import place_devices
 from rfgs_core.radio.presets import PRESETS, Radio, preset
 from rfgs_core.radio.samples import FrameSamples, frame_samples, pose_span_s
@@ -14,6 +14,7 @@ __all__ = [
     "FrameSamples",
     "Layout",
     "Radio",
+    "devices_at",
     "frame_samples",
     "layout",
     "place_devices",

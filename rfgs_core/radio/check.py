@@ -75,9 +75,12 @@ def too_far(radio: Radio, bounds_m: Float64[np.ndarray, "2 3"]) -> list[str]:
 
 def too_deep(radio: Radio, depth: int) -> str:
     """Why a radio is not traced at a depth beyond its deepest, with the remedy."""
+    why = "traced at one frequency, too few for an ultra-wide band"
+    if radio.antennas_move:
+        why = "not traced for antennas that move"
     return (
-        f"radio {radio.name!r}, trace depth {depth}: people's paths by way of walls are traced at "
-        f"one frequency, too few for an ultra-wide band; use --depth {radio.deepest}"
+        f"radio {radio.name!r}, trace depth {depth}: people's paths by way of walls are {why}; "
+        f"use --depth {radio.deepest}"
     )
 
 

@@ -108,7 +108,30 @@ def radio_problems(radio: Radio) -> list[str]:
     for name, table in (("pattern", PATTERNS), ("polarization", POLARIZATIONS)):
         if getattr(radio, name) not in table:
             problems.append(f"{name}: {getattr(radio, name)!r}: expected {' or '.join(table)}")
+    if radio.antennas_move:
+        problems += _aperture_problems(radio)
     return problems or _antenna_problems(radio)
+
+
+def _aperture_problems(radio: Radio) -> list[str]:
+    """Problems of a device that moves."""
+    problems = []
+    if radio.own_device_links != "only":
+        problems.append(
+            f"own_device_links: {radio.own_device_links}: expected only, as a device that moves "
+            "(antennas_move) hears nothing but itself"
+        )
+    if radio.num_devices != 1:
+        problems.append(
+            f"num_devices: {radio.num_devices}: expected 1 that moves (antennas_move); its places "
+            "are samples_per_frame"
+        )
+    if radio.sample_interval_s:
+        problems.append(
+            f"sample_interval_s: {radio.sample_interval_s:g}: expected 0, as the scene stands "
+            "still while antennas move (antennas_move)"
+        )
+    return problems
 
 
 def _antenna_problems(radio: Radio) -> list[str]:
@@ -158,6 +181,8 @@ def _converted(source: str, name: str, value: Any) -> Any:
         return tuple(_number(source, name, part) for part in value)
     if kind is float:
         return _number(source, name, value)
+    if kind is bool and not isinstance(value, bool):
+        raise RfgsError(f"{source}: {name}: expected true or false, got {value!r}")
     if kind is int and (isinstance(value, bool) or not isinstance(value, int)):
         raise RfgsError(f"{source}: {name}: expected a whole number, got {value!r}")
     if kind is str and not isinstance(value, str):

@@ -91,8 +91,20 @@ def element_offsets(
     return np.stack([np.zeros_like(y), y, z], axis=1), column.astype(np.int64)
 
 
-def layout(radio: Radio, devices: list[DevicePose]) -> Layout:
-    """Lays out the antennas of `devices`, all of the same kind `radio`."""
+def devices_at(radio: Radio, devices: list[DevicePose], sample: int) -> list[DevicePose]:
+    """Where the devices are at one of a frame's samples: all of them, or the one that moves.
+
+    Args:
+        radio: Their kind; it tells whether they move.
+        devices: Poses; of a device that moves, one for each sample.
+        sample: Which sample of a frame.
+    """
+    return devices[sample : sample + 1] if radio.antennas_move else devices
+
+
+def layout(radio: Radio, devices: list[DevicePose], sample: int = 0) -> Layout:
+    """Lays out the antennas of `devices`, all of the same kind `radio`, at a sample of a frame."""
+    devices = devices_at(radio, devices, sample)
     tx_local, _ = element_offsets(
         radio.tx_rows, radio.tx_cols, _spacing_m(radio.tx_spacing_m, radio)
     )

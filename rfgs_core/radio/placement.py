@@ -16,18 +16,20 @@ def place_devices(radio: Radio, bounds_m: Float64[np.ndarray, "2 3"]) -> list[De
 
     `corners`: in the corners of the scene, facing its centre, counter-clockwise from the corner
     of smallest x and y. `walls`: along the walls, facing inwards, as evenly as they fit.
+    `circle`: on the largest circle around the centre, facing it, counter-clockwise from +x.
 
     Args:
         radio: Which radio; gives rule, count, heights and inset.
         bounds_m: Scene bounds [m], rows minimum and maximum.
 
     Returns:
-        One pose per device.
+        One pose per device; of a device that moves, one per sample of a frame.
 
     Raises:
-        RfgsError: The arrays are longer than the walls.
+        RfgsError: The arrays are longer than the walls, or there is no room for a circle.
     """
-    spots = {"corners": _corners, "walls": _walls}[radio.placement](radio, bounds_m)
+    rule = {"corners": _corners, "walls": _walls, "circle": _circle}[radio.placement]
+    spots = rule(radio, bounds_m)
     devices = []
     for index, (x, y, yaw) in enumerate(spots):
         z = bounds_m[0, 2] + radio.heights_m[index % len(radio.heights_m)]
@@ -41,8 +43,26 @@ def _corners(radio: Radio, bounds_m: np.ndarray) -> list[tuple[float, float, flo
     low, high = bounds_m[0] + radio.inset_m, bounds_m[1] - radio.inset_m
     corners = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])]
     centre = bounds_m.mean(axis=0)
-    chosen = [corners[index % 4] for index in range(radio.num_devices)]
+    chosen = [corners[index % 4] for index in range(radio.num_places)]
     return [(x, y, float(np.arctan2(centre[1] - y, centre[0] - x))) for x, y in chosen]
+
+
+def _circle(radio: Radio, bounds_m: np.ndarray) -> list[tuple[float, float, float]]:
+    """Place [m] and yaw [rad] of devices on the largest circle that keeps off the bounds."""
+    centre = bounds_m.mean(axis=0)
+    radius_m = 0.5 * float(np.diff(bounds_m[:, :2], axis=0).min()) - radio.inset_m
+    if radius_m <= 0.0:
+        raise RfgsError(
+            f"radio {radio.name!r}: no circle fits into a scene of "
+            f"{np.diff(bounds_m, axis=0)[0].round(2).tolist()} m with {radio.inset_m:g} m to "
+            "spare; place devices in the scene (Empties with the role access point)"
+        )
+    turns = 2.0 * np.pi * np.arange(radio.num_places) / radio.num_places
+    away = radius_m * np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    return [
+        (float(centre[0] + x), float(centre[1] + y), float(turn + np.pi))
+        for (x, y), turn in zip(away, turns, strict=True)
+    ]
 
 
 def _walls(radio: Radio, bounds_m: np.ndarray) -> list[tuple[float, float, float]]:
@@ -52,14 +72,14 @@ def _walls(radio: Radio, bounds_m: np.ndarray) -> list[tuple[float, float, float
     length = np.array([high[0] - low[0], high[1] - low[1]] * 2)
     # A wall takes one device after the other as long as their arrays do not overlap.
     room = (length // max(width_m, 1e-3)).astype(int)
-    if room.sum() < radio.num_devices:
+    if room.sum() < radio.num_places:
         raise RfgsError(
-            f"radio {radio.name!r}: {radio.num_devices} arrays of {width_m:g} m do not fit along "
+            f"radio {radio.name!r}: {radio.num_places} arrays of {width_m:g} m do not fit along "
             f"walls of {length[0]:.2f} and {length[1]:.2f} m; place devices in the scene (Empties "
             "with the role access point) or use a radio with shorter arrays"
         )
     count = np.zeros(4, dtype=int)
-    while count.sum() < radio.num_devices:
+    while count.sum() < radio.num_places:
         # The next device goes where it gets most space, the first of equals.
         count[np.argmax(np.where(count < room, length / (count + 1), -1.0))] += 1
     starts = np.array([low, (high[0], low[1]), high, (low[0], high[1])])

@@ -14,7 +14,7 @@ from rfgs_core.radio.antennas import POLARIZATIONS
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
 OwnLinks = Literal["included", "only", "excluded"]
-Placement = Literal["corners", "walls"]
+Placement = Literal["corners", "walls", "circle"]
 
 #: Above this fractional bandwidth a radio is ultra-wide band (ITU-R SM.1755).
 ULTRA_WIDE_BAND = 0.2
@@ -70,6 +70,9 @@ class Radio:
     """Packets, chirps or pulses of every frame; the first is taken at the frame's own time."""
     sample_interval_s: float = 0.0
     """Time between a frame's samples [s]; 0 spreads them evenly until the next frame."""
+    antennas_move: bool = False
+    """Whether one device goes from place to place within a frame and takes a sample, a pulse, at
+    each, while the scene stands still at the frame's own time: a synthetic aperture."""
 
     @property
     def bandwidth_hz(self) -> float:
@@ -96,14 +99,19 @@ class Radio:
         """Most interactions that a path which meets a person is traced with.
 
         Paths by way of walls are traced at one frequency, which is too few for an ultra-wide
-        band.
+        band, and takes too long at every place of antennas that move.
         """
-        return 1 if self.ultra_wide else 3
+        return 1 if self.ultra_wide or self.antennas_move else 3
 
     @property
     def wavelength_m(self) -> float:
         """Wavelength at the band's centre [m]."""
         return SPEED_OF_LIGHT / self.centre_hz
+
+    @property
+    def num_places(self) -> int:
+        """Places that devices are put at when the scene brings none: of a moving one, its own."""
+        return self.samples_per_frame if self.antennas_move else self.num_devices
 
     @property
     def slants_deg(self) -> tuple[float, ...]:
@@ -195,6 +203,24 @@ PRESETS: dict[str, Radio] = {
             placement="walls",
             # The regulatory −41.3 dBm/MHz over the band.
             power_dbm=-2.5,
+        ),
+        Radio(
+            name="sar",
+            freq_min_hz=8e9,
+            freq_max_hz=12e9,
+            num_subcarriers=320,
+            tx_rows=1,
+            tx_cols=1,
+            rx_rows=1,
+            rx_cols=1,
+            tx_offset_m=(0.0, 0.1, 0.0),
+            own_device_links="only",
+            placement="circle",
+            num_devices=1,
+            # Above heads: at 1.2 m the antenna would go through whoever meets the circle.
+            heights_m=(2.2,),
+            samples_per_frame=180,
+            antennas_move=True,
         ),
     )
 }

@@ -24,7 +24,7 @@ from rfgs_core.threads import one_torch_thread
 from rfgs_core.train.config import TrainConfig
 from rfgs_core.train.frame import FrameState, solve_reflectivity, start_frame
 from rfgs_core.train.head import HEAD_SHAPES, RadioHead
-from rfgs_core.train.observations import observe
+from rfgs_core.train.observations import need_still_antennas, observe
 from rfgs_core.train.parameters import GAUSSIAN_SHAPES
 from rfgs_core.train.refine import refine
 
@@ -48,8 +48,9 @@ def train_sequence(
     """Fits every frame, each starting from the one before; finished frames are kept.
 
     Raises:
-        RfgsError: `out` holds a run with other settings.
+        RfgsError: `out` holds a run with other settings, or the radio's antennas move.
     """
+    need_still_antennas(sequence, radio)
     bodies = sum(1 for row in sequence.instances if row["class"] == "person")
     config = replace(config, bodies=max(bodies, 1))
     settings: dict[str, Any] = {

@@ -72,6 +72,20 @@ def _visible(
     return links, tones
 
 
+def need_still_antennas(sequence: Sequence, radio: str) -> None:
+    """Refuses radios that training cannot use.
+
+    Raises:
+        RfgsError: The radio's antennas move within a frame.
+    """
+    data = sequence.radio(radio)
+    if data["tx_xyz"].ndim != 2 or data["rx_xyz"].ndim != 2:
+        raise RfgsError(
+            f"{sequence.name}, {radio}: the antennas move within a frame, and training takes one "
+            "sample per frame; choose a radio whose antennas stand still"
+        )
+
+
 def observe(
     sequence: Sequence, radio: str, frame: int, channel: Observed = "clean"
 ) -> Observations:
@@ -81,12 +95,8 @@ def observe(
         RfgsError: The channel holds values that are not finite, or its antennas move within a
             frame.
     """
+    need_still_antennas(sequence, radio)
     data = sequence.radio(radio)
-    if data["tx_xyz"].ndim != 2 or data["rx_xyz"].ndim != 2:
-        raise RfgsError(
-            f"{sequence.name}, {radio}: the antennas move within a frame, and training takes one "
-            "sample per frame; choose a radio whose antennas stand still"
-        )
     # The links that exist are those the channels were stored with.
     elements = replace(sequence.layout(radio), measured=data["measured"].values)
     links, tones = _visible(sequence.splits["rf"][radio], elements, data.sizes["subcarrier"])

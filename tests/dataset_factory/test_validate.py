@@ -79,7 +79,7 @@ def test_a_channel_late_by_a_metre_is_named(box_dataset: Path) -> None:
     late = np.exp(-2j * np.pi * sequence.radio_spec("wifi").freq_hz * delay_s)
     static = (sequence.csi_static("wifi") * late).astype(np.complex64)
     assert any(
-        "half a delay cell" in f for f in channel_faults(sequence, "wifi", static, Path("x"))
+        "half a delay cell" in f for f in channel_faults(sequence, "wifi", static[None], Path("x"))
     )
 
 

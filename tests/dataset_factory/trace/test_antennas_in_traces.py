@@ -84,7 +84,7 @@ def test_dipoles_have_their_closed_form_in_both_terms(
     tracer = Tracer(bundle, dipoles, devices, depth=1)
     lone = Tracer(bundle, radio, devices, depth=1)
     # One facet at a time: the body is far from a point, so each has factors of its own.
-    points = tracer._posed(bundle.frame(1).vertices)
+    points = tracer._bodies.points(bundle.frame(1).vertices)
     for index in (0, len(points.areas) // 2):
         one = replace(
             points,
@@ -109,7 +109,7 @@ def _direct(tracer, points) -> np.ndarray:
     from dataset_factory.trace.scene import environment_scene
 
     free = environment_scene(tracer._bundle, tracer._radio)
-    gamma = tracer._gamma(tracer._radio.freq_hz)
+    gamma = tracer._bodies.gamma(tracer._radio.freq_hz)
     devices, radio = tracer._devices, tracer._radio
     seen = in_sight(free.mi_scene, points, tracer._layout)
     return direct_channel(points, seen, tracer._layout, devices, gamma, radio)[0, 1]
@@ -173,19 +173,19 @@ def test_direct_term_of_any_antenna_matches_the_solver(
     tracer = Tracer(bundle, radio, devices, depth=2)
     tracer._move(bundle.frame(1).vertices)
     points, elements, nodes = (
-        tracer._posed(bundle.frame(1).vertices),
+        tracer._bodies.points(bundle.frame(1).vertices),
         layout(radio, devices),
         radio.freq_hz,
     )
     bounces = tracer._bounces
     bounces._hang(points.lifted)
     traced = bounces._solver(
-        tracer._scene, max_depth=1, samples_per_sp=1, buffer_size_per_sp=16, seed=0
+        tracer._bodies.scene, max_depth=1, samples_per_sp=1, buffer_size_per_sp=16, seed=0
     )
     paths = path_set(traced, *centres(elements))
-    paths = with_facets(paths, points, tracer._gamma(nodes), nodes, radio.centre_hz)
+    paths = with_facets(paths, points, tracer._bodies.gamma(nodes), nodes, radio.centre_hz)
     solver = steer(paths, elements, radio.freq_hz, nodes)
-    scene, gamma = tracer._scene.mi_scene, tracer._gamma(nodes)
+    scene, gamma = tracer._bodies.scene.mi_scene, tracer._bodies.gamma(nodes)
     seen = in_sight(scene, points, elements)
     ours = direct_channel(points, seen, elements, devices, gamma, radio)
     assert np.linalg.norm(solver) > 0

@@ -28,7 +28,7 @@ def posed_body(bundle: Bundle, radio: Radio, devices: list[DevicePose]) -> tuple
     tracer = Tracer(bundle, radio, devices, depth=2)
     frame = bundle.frame(1)
     tracer._move(frame.vertices)
-    return tracer, tracer._posed(frame.vertices)
+    return tracer, tracer._bodies.points(frame.vertices)
 
 
 def bounced(tracer, points) -> np.ndarray:
@@ -60,14 +60,14 @@ def test_direct_term_matches_the_solver(
     bounces = tracer._bounces
     bounces._hang(points.lifted)
     traced = bounces._solver(
-        tracer._scene, max_depth=1, samples_per_sp=1, buffer_size_per_sp=16, seed=0
+        tracer._bodies.scene, max_depth=1, samples_per_sp=1, buffer_size_per_sp=16, seed=0
     )
     nodes = radio.freq_hz
     paths = path_set(traced, *centres(elements))
-    paths = with_facets(paths, points, tracer._gamma(nodes), nodes, radio.centre_hz)
+    paths = with_facets(paths, points, tracer._bodies.gamma(nodes), nodes, radio.centre_hz)
     solver = steer(paths, elements, radio.freq_hz, nodes)
-    seen = in_sight(tracer._scene.mi_scene, points, elements)
-    ours = direct_channel(points, seen, elements, devices, tracer._gamma(nodes), radio)
+    seen = in_sight(tracer._bodies.scene.mi_scene, points, elements)
+    ours = direct_channel(points, seen, elements, devices, tracer._bodies.gamma(nodes), radio)
     assert error_db(ours, solver) < -80.0
 
 

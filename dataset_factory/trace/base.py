@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What every tracer has: a scene, a radio, what moves, and the time each stage takes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import drjit as dr
+
+from dataset_factory.bundle import Bundle
+from dataset_factory.trace.bodies import Bodies
+from dataset_factory.trace.bounces import BUFFER
+from dataset_factory.trace.environment import node_frequencies
+from dataset_factory.trace.scene import check_materials
+from dataset_factory.trace.shadow import Shadow
+from rfgs_core.errors import RfgsError
+from rfgs_core.radio import Radio
+from rfgs_core.radio.check import too_deep
+from rfgs_core.radio.layout import DevicePose
+from rfgs_core.seeds import sub_seed
+
+#: Dr.Jit keeps kernels and memory of every frame; they are dropped this often [frames].
+FLUSH_EVERY = 10
+
+
+class BaseTracer:
+    """One radio in one bundle, ready to be traced."""
+
+    def __init__(
+        self,
+        bundle: Bundle,
+        radio: Radio,
+        devices: list[DevicePose],
+        *,
+        depth: int = 2,
+        shadow: Shadow = "kirchhoff",
+        seed: int = 0,
+    ) -> None:
+        """Builds the scenes; tracing starts with the first call.
+
+        Args:
+            bundle: Scene bundle.
+            radio: Radio to simulate.
+            devices: Poses of its devices; of one that moves, its place at each sample.
+            depth: Interactions of people's paths: 1 direct, 2 with one wall, 3 with two.
+            shadow: "kirchhoff", or "hard" for Sionna's all-or-nothing shadow.
+            seed: Root seed; rays and points depend on it, frames do not.
+
+        Raises:
+            RfgsError: A material does not hold in the radio's band, or the depth is not 1, 2
+                or 3, or more than the radio can have.
+        """
+        if depth != 1 and depth not in BUFFER:
+            raise RfgsError(f"trace depth {depth}: expected 1, 2 or 3")
+        if depth > radio.deepest:
+            raise RfgsError(too_deep(radio, depth))
+        check_materials(bundle, radio)
+        self._bundle, self._radio, self._devices = bundle, radio, devices
+        self._shadow: Shadow = shadow
+        self._rays = sub_seed(seed, "environment")
+        self._nodes = node_frequencies(radio)
+        self._bodies = Bodies(bundle, radio, sub_seed(seed, "points"))
+        self._frames_done = 0
+        self.timings: dict[str, float] = dict.fromkeys(
+            ("environment", "shadow", "people_direct", "people_bounces"), 0.0
+        )
+
+    def _flush(self) -> None:
+        """Drops what Dr.Jit keeps of past frames, every few frames."""
+        self._frames_done += 1
+        if self._frames_done % FLUSH_EVERY == 0:
+            dr.flush_kernel_cache()
+            dr.flush_malloc_cache()
+
+    @contextmanager
+    def _timed(self, stage: str) -> Iterator[None]:
+        """Adds the block's wall time to a stage."""
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.timings[stage] += time.perf_counter() - start

@@ -177,7 +177,7 @@ def _aperture(
             f"Images of {radio} over time",
             "What people change, focused by back-projection from all places of the antenna (dots), "
             "the strongest of all heights; the cross marks the pelvis. Each image has its own "
-            "scale of 25 dB.",
+            "scale of 20 dB.",
             strip=True,
         ),
         _figure(
@@ -193,9 +193,9 @@ def _aperture(
             image_figure(sequence, radio, frame),
             folder / f"{radio}_images.png",
             f"Focused images of {radio}, one frame",
-            f"Frame {frame}. Matched filter over all places and tones, the strongest along the "
-            "axis that is not drawn; the cross marks the pelvis. Smooth walls and furniture "
-            "mirror, so they show where they face the antenna, not as a whole.",
+            f"Frame {frame}. What people change through a matched filter over all places and "
+            "tones, the strongest along the axis that is not drawn; the cross marks the pelvis. "
+            "The antenna looks down, so heads and shoulders answer most.",
             folded=True,
         ),
     ]

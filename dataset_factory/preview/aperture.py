@@ -17,11 +17,11 @@ from rfgs_core.radio.levels import decibels
 
 #: Cells of the images [m]: across, and from height to height.
 CELL_M = 0.03
-STEP_M = 0.2
+STEP_M = 0.1
 #: Heights above the floor that images span [m].
 SPAN_M = (0.2, 1.9)
 #: Dynamic range of images of the change [dB].
-CHANGE_RANGE_DB = 25.0
+CHANGE_RANGE_DB = 20.0
 #: A bound on the cells of one image; in larger scenes they grow.
 MOST_CELLS = 400_000
 
@@ -79,7 +79,7 @@ def aperture_strip(sequence: Sequence, radio: str, timeline: Timeline) -> Figure
         level = decibels(aperture.image(change, axes_m).max(axis=2))
         where = (left + (column + 0.04) * slot, 0.45 / (tall + 0.6), 0.92 * slot)
         axis = figure.add_axes((*where, tall / (tall + 0.6)))
-        _from_above(axis, sequence, aperture, level, axes_m, CHANGE_RANGE_DB)
+        _from_above(axis, sequence, aperture, level, axes_m)
         _people(axis, sequence, frame, 0, 1)
         axis.set_xlabel(f"frame {frame}, x [m]", fontsize=7)
         axis.tick_params(labelsize=6, length=2, labelleft=column == 0)
@@ -123,29 +123,23 @@ def range_figure(sequence: Sequence, radio: str, frame: int) -> Figure:
 
 
 def image_figure(sequence: Sequence, radio: str, frame: int) -> Figure:
-    """Focused images: the scene without people, what people change, from above and from aside."""
+    """What people change, focused: from above, along y and along x."""
     aperture, axes_m = Aperture.of(sequence, radio), image_axes(sequence)
     static = sequence.csi_static_samples(radio)[:, 0, 0]
-    change = aperture.image(sequence.csi_samples(radio, frame)[:, 0, 0] - static, axes_m)
-    empty = aperture.image(static, axes_m)
-    figure = Figure(figsize=(12, 4.4), layout="constrained")
+    change = sequence.csi_samples(radio, frame)[:, 0, 0] - static
+    power = aperture.image(change, axes_m)
+    figure = Figure(figsize=(12, 4.2), layout="constrained")
     axes = figure.subplots(1, 3)
-    for axis, value, title, range_db in (
-        (axes[0], empty, "without people, from above", RANGE_DB),
-        (axes[1], change, "change, from above", CHANGE_RANGE_DB),
-    ):
-        level = decibels(value.max(axis=2))
-        shown = _from_above(axis, sequence, aperture, level, axes_m, range_db)
+    for axis, (across, up) in zip(axes, ((0, 1), (0, 2), (1, 2)), strict=True):
+        level = decibels(power.max(axis=3 - across - up))
+        if up == 1:
+            shown = _from_above(axis, sequence, aperture, level, axes_m)
+        else:
+            shown = _draw(axis, axes_m[across], axes_m[up], level)
         figure.colorbar(shown, ax=axis, pad=0.01).ax.tick_params(labelsize=7)
-        axis.set_title(title, fontsize=9)
-        axis.set(xlabel="x [m]", ylabel="y [m]")
-    level = decibels(change.max(axis=1))
-    shown = _draw(axes[2], axes_m[0], axes_m[2], level, CHANGE_RANGE_DB)
-    figure.colorbar(shown, ax=axes[2], pad=0.01).ax.tick_params(labelsize=7)
-    axes[2].set_title("change, from aside", fontsize=9)
-    axes[2].set(xlabel="x [m]", ylabel="z [m]")
-    _people(axes[1], sequence, frame, 0, 1)
-    _people(axes[2], sequence, frame, 0, 2)
+        _people(axis, sequence, frame, across, up)
+        axis.set(xlabel=f"{'xyz'[across]} [m]", ylabel=f"{'xyz'[up]} [m]")
+        axis.set_title(f"change, along {'xyz'[3 - across - up]} [dB]", fontsize=9)
     return figure
 
 
@@ -165,17 +159,16 @@ def _from_above(
     aperture: Aperture,
     level: np.ndarray,
     axes_m: list[np.ndarray],
-    range_db: float,
 ) -> Any:
     """Draws a level (x, y) with the antenna's places."""
-    shown = _draw(axis, axes_m[0], axes_m[1], level, range_db)
+    shown = _draw(axis, axes_m[0], axes_m[1], level)
     axis.plot(*aperture.rx_xyz[:, :2].T, ".", color="#8a94a3", ms=1.5)
     low, high = sequence.bounds_m
     axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     return shown
 
 
-def _draw(axis: Any, x: np.ndarray, y: np.ndarray, level: np.ndarray, range_db: float) -> Any:
+def _draw(axis: Any, x: np.ndarray, y: np.ndarray, level: np.ndarray) -> Any:
     top = level.max()
     return axis.pcolormesh(
         x,
@@ -183,7 +176,7 @@ def _draw(axis: Any, x: np.ndarray, y: np.ndarray, level: np.ndarray, range_db: 
         level.T,
         shading="nearest",
         cmap="inferno",
-        vmin=top - range_db,
+        vmin=top - CHANGE_RANGE_DB,
         vmax=top,
         rasterized=True,
     )

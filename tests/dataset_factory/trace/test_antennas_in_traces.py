@@ -171,7 +171,7 @@ def test_direct_term_of_any_antenna_matches_the_solver(
     devices = [replace(devices[0], quat_wxyz=(0.95, 0.2, 0.1, 0.2)), devices[1]]
     bundle = make_bundle(static=[], mover=coarse_capsule)
     tracer = Tracer(bundle, radio, devices, depth=2)
-    tracer._move(bundle.frame(1).vertices)
+    tracer._bodies.move(bundle.frame(1).vertices)
     points, elements, nodes = (
         tracer._bodies.points(bundle.frame(1).vertices),
         layout(radio, devices),

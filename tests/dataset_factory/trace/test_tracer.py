@@ -27,7 +27,7 @@ def posed_body(bundle: Bundle, radio: Radio, devices: list[DevicePose]) -> tuple
 
     tracer = Tracer(bundle, radio, devices, depth=2)
     frame = bundle.frame(1)
-    tracer._move(frame.vertices)
+    tracer._bodies.move(frame.vertices)
     return tracer, tracer._bodies.points(frame.vertices)
 
 

@@ -16,6 +16,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "report": ("report", "ReportArgs"),
     "compare": ("compare", "CompareArgs"),
     "study": ("study", "StudyArgs"),
+    "predict": ("predict", "PredictArgs"),
     "bench": ("bench", "BenchArgs"),
 }
 

@@ -97,6 +97,30 @@ def _scatter_block(
     visibility: Float[Tensor, "gaussian group"] | None,
 ) -> Complex[Tensor, "link subcarrier"]:
     """Sum over a few Gaussians, through arrays of [gaussian, link, subcarrier]."""
+    terms = echoes(means, shape, links, tones, normals, sharpness, visibility)
+    return torch.einsum("mf,mlf->lf", gamma_at_tones(gamma, tones), terms)
+
+
+def echoes(
+    means: Float[Tensor, "gaussian 3"],
+    shape: Float[Tensor, "gaussian 3 3"],
+    links: Links,
+    tones: Tones,
+    normals: Float[Tensor, "gaussian 3"] | None = None,
+    sharpness: float = 0.0,
+    visibility: Float[Tensor, "gaussian group"] | None = None,
+) -> Complex[Tensor, "gaussian link subcarrier"]:
+    """What each Gaussian alone would scatter with a reflectivity of one metre.
+
+    Args:
+        means: Centres [m].
+        shape: Covariances of the reflecting clouds [m^2].
+        links: Pairs of antennas.
+        tones: Subcarriers.
+        normals: Outward unit normals; None: every Gaussian is seen from all sides.
+        sharpness: How fast a Gaussian disappears behind its tangent plane.
+        visibility: Weight per Gaussian and group of links.
+    """
     real = shape.dtype
     distance_tx, to_tx = _legs(means, links.tx_xyz)
     distance_rx, to_rx = _legs(means, links.rx_xyz)
@@ -114,10 +138,9 @@ def _scatter_block(
     wavenumber = (2 * math.pi / SPEED_OF_LIGHT * freq_hz).to(real)
     turns = (distance_tx + distance_rx)[..., None] * (freq_hz / SPEED_OF_LIGHT)
     phase = (-2 * math.pi) * (turns - turns.detach().round()).to(real)
+    wavelength = (SPEED_OF_LIGHT / freq_hz / (4 * math.pi) ** 1.5).to(real)
     magnitude = weight[..., None] * torch.exp(-0.5 * spread[..., None] * wavenumber**2)
-    terms = torch.polar(magnitude, phase)
-    summed = torch.einsum("mf,mlf->lf", gamma_at_tones(gamma, tones), terms)
-    return summed * (SPEED_OF_LIGHT / freq_hz / (4 * math.pi) ** 1.5).to(real)
+    return torch.polar(magnitude * wavelength, phase)
 
 
 def _smooth_step(x: Float[Tensor, "..."]) -> Float[Tensor, "..."]:

@@ -44,8 +44,8 @@ class Aperture:
         """The first elements of the radio's arrays."""
         count = sequence.radio_spec(radio).samples_per_frame
         data = sequence.radio(radio)
-        places = [data[name].values[:count, 0] for name in ("tx_xyz", "rx_xyz")]
-        return Aperture(*places, sequence.radio_spec(radio).freq_hz)
+        tx_xyz, rx_xyz = (data[name].values[:count, 0] for name in ("tx_xyz", "rx_xyz"))
+        return Aperture(tx_xyz, rx_xyz, sequence.radio_spec(radio).freq_hz)
 
     def image(self, pulses: np.ndarray, axes_m: list[np.ndarray]) -> np.ndarray:
         """Power (x, y, z) that the matched filter finds, from channels (sample, subcarrier).

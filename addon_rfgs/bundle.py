@@ -24,7 +24,7 @@ from .poses import at_offsets, pose_offsets, pose_table
 from .scene_check import report
 from .state import kept
 from .survey import Surface, positions
-from .velocities import SegmentVelocities
+from .velocities import SegmentVelocities, vertex_velocity
 
 SCHEMA = "rfgs-bundle/1"
 VERSION = "0.1.0"
@@ -39,6 +39,7 @@ def export_bundle(
     progress: Callable[[int, int], None] | None = None,
     spans_s: list[float] | None = None,
     overrides: Overrides | None = None,
+    velocities: bool = False,
 ) -> dict[str, Any]:
     """Writes the open scene as a bundle.
 
@@ -51,6 +52,7 @@ def export_bundle(
         progress: Called with (frames done, frames in all).
         spans_s: Times after each frame over which poses are written too [s], see `pose_table`.
         overrides: What the user says about the scene beside the file.
+        velocities: Whether the velocity of every vertex is written too.
 
     Returns:
         What `bundle.json` holds.
@@ -70,7 +72,8 @@ def export_bundle(
             objects = _write_objects(target, content, table)
             topology = _write_topology(scene, target, content, table)
             poses = pose_table(scene, spans_s or [])
-            _write_frames(scene, target, content, topology, pose_offsets(poses), progress)
+            offsets_s = pose_offsets(poses)
+            _write_frames(scene, target, content, topology, offsets_s, velocities, progress)
             info = _describe(scene, content, sha256)
             info.update({"poses": poses} if poses else {})
             info.update(
@@ -164,29 +167,32 @@ def _write_frames(
     content: Content,
     topology: dict[str, np.ndarray],
     offsets_s: list[float],
+    with_velocities: bool,
     progress: Callable[[int, int], None] | None,
 ) -> None:
     """Writes what moves, frame by frame."""
+
+    def moving(frame: int) -> np.ndarray:
+        return _moving_vertices(scene, content.moving, frame)
+
     people = content.people
     ids = np.array([person.id for person in people], np.int32)
-    velocities = SegmentVelocities(
-        scene, people, topology, lambda frame: _moving_vertices(scene, content.moving, frame)
-    )
+    velocities = SegmentVelocities(scene, people, topology, moving)
     for done, number in enumerate(content.frames, start=1):
         velocity = velocities.at(number)
+        of_vertices = vertex_velocity(scene, number, moving) if with_velocities else None
         scene.frame_set(number)
         arrays = {
-            "vertices": _moving_vertices(scene, content.moving, number),
+            "vertices": moving(number),
             "joints": joints(scene, people),
             "segment_velocity": velocity,
             "person_instance": ids,
             "action": np.array([action_label(item, number) for item in people], dtype=np.str_),
         }
+        if of_vertices is not None:
+            arrays["vertex_velocity"] = of_vertices
         if offsets_s:
-            poses = [
-                _moving_vertices(scene, content.moving, number)
-                for _ in at_offsets(scene, number, offsets_s)
-            ]
+            poses = [moving(number) for _ in at_offsets(scene, number, offsets_s)]
             arrays.update(pose_offset_s=np.array(offsets_s), pose_vertices=np.stack(poses))
         _save_arrays(target / "frames" / f"{number:06d}.npz", **arrays)
         if progress:

@@ -43,6 +43,7 @@ def parser(program: str) -> argparse.ArgumentParser:
         metavar="SECONDS",
         help="also write poses over so long after each frame (0: until the next); repeatable",
     )
+    export.add_argument("--velocities", action="store_true", help="also that of every vertex")
     truth = commands.add_parser("groundtruth", help="render pictures and passes with Cycles")
     truth.add_argument("--out", type=Path, required=True, help="folder of the pictures")
     check = commands.add_parser("check", help="say what the scene holds and what is guessed")
@@ -117,6 +118,7 @@ def _export(options: argparse.Namespace, out: TextIO) -> str:
         _progress(out),
         options.span,
         read_overrides(options.overrides),
+        options.velocities,
     )
     return (
         f"wrote {options.out}: {len(info['frames'])} frames, {len(info['objects'])} objects, "

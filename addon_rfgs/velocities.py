@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How fast each body segment of each person moves, as a label."""
+"""How fast everything moves: each body segment of each person as a label, or each vertex."""
 
 from __future__ import annotations
 
@@ -11,6 +11,38 @@ import numpy as np
 from .frames import seconds_per_frame
 from .people import Instance, joints
 from .tables import JOINTS
+
+
+def vertex_velocity(
+    scene: bpy.types.Scene, frame: int, vertices: Callable[[int], np.ndarray]
+) -> np.ndarray:
+    """Velocities [m/s] of all vertices at a frame, float32 [V, 3], differences as for segments.
+
+    Leaves the scene evaluated beside the frame.
+
+    Args:
+        scene: Gives frames and rate.
+        frame: Frame number.
+        vertices: As `SegmentVelocities` takes it.
+    """
+    first, last = _around(scene, frame)
+    start = _evaluated(scene, first, vertices)
+    way = _evaluated(scene, last, vertices) - start
+    return (way / ((last - first) * seconds_per_frame(scene))).astype(np.float32)
+
+
+def _around(scene: bpy.types.Scene, frame: int) -> tuple[float, float]:
+    """Half a frame before and after, within the scene's range."""
+    return max(frame - 0.5, float(scene.frame_start)), min(frame + 0.5, float(scene.frame_end))
+
+
+def _evaluated(
+    scene: bpy.types.Scene, frame: float, vertices: Callable[[int], np.ndarray]
+) -> np.ndarray:
+    """Puts the scene at a time between frames; all vertices [m], float64 [V, 3]."""
+    whole = int(np.floor(frame))
+    scene.frame_set(whole, subframe=frame - whole)
+    return vertices(whole).astype(np.float64)
 
 
 class SegmentVelocities:
@@ -49,8 +81,7 @@ class SegmentVelocities:
         """
         if not self._people:
             return np.zeros((0, len(JOINTS), 3), np.float32)
-        first = max(frame - 0.5, float(self._scene.frame_start))
-        last = min(frame + 0.5, float(self._scene.frame_end))
+        first, last = _around(self._scene, frame)
         start = self._before[1] if self._before and self._before[0] == first else None
         start = self._centres(first) if start is None else start
         end = self._centres(last)
@@ -63,9 +94,7 @@ class SegmentVelocities:
 
         A segment without skin of its own has its joint instead.
         """
-        whole = int(np.floor(frame))
-        self._scene.frame_set(whole, subframe=frame - whole)
-        corners = self._vertices(whole).astype(np.float64)[self._faces]
+        corners = _evaluated(self._scene, frame, self._vertices)[self._faces]
         sides = corners[:, 1:] - corners[:, :1]
         area = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
         count = len(self._people) * len(JOINTS)

@@ -147,6 +147,20 @@ class Bundle:
             action=arrays["action"].astype(str),
         )
 
+    @property
+    def path_objects(self) -> list[dict[str, Any]]:
+        """What paths can meet: each static object, then each moving instance, ids from 1."""
+        still = [
+            {"name": row["name"], "class": "static", "instance": 0}
+            for row in self.objects
+            if row["files"]
+        ]
+        moving = [
+            {"name": row["name"], "class": row["class"], "instance": row["id"]}
+            for row in self.instances
+        ]
+        return [{"id": number, **row} for number, row in enumerate([*still, *moving], start=1)]
+
     def static_meshes(self) -> list[StaticMesh]:
         """Reads every static mesh, in the order of the object table.
 

@@ -32,7 +32,7 @@ from dataset_factory.workers import Task, failure, stages
 from rfgs_core.dataset.csi_store import write_csi
 from rfgs_core.dataset.names import SequenceFiles
 from rfgs_core.errors import MissingToolError, RfgsError
-from rfgs_core.files import read_json
+from rfgs_core.files import read_json, write_bytes
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -95,7 +95,7 @@ def run_on_cluster(
         for future in running:
             task = of_future.pop(future.key)
             reply = _answer(future, task, address)
-            store.write(task, reply.pop("value"))
+            store.write(task, reply.pop("value"), reply.pop("paths"))
             seconds.update(stages(task, reply))
             done(task, reply)
             for following in islice(waiting, 1):
@@ -130,8 +130,10 @@ class _Store:
         """What moves at a task's frame."""
         return None if task.frame is None else _frame_file(self._bundle, task.frame)
 
-    def write(self, task: Task, value: np.ndarray) -> None:
-        """Writes a channel and its marker."""
+    def write(self, task: Task, value: np.ndarray, paths: bytes) -> None:
+        """Writes the table of paths, if there is one, then a channel and its marker."""
+        if paths:
+            write_bytes(self._files.paths(task.radio, task.frame), paths)
         index = None if task.frame is None else self._frames.index(task.frame)
         marker = self._files.csi_done(task.radio, task.frame)
         write_csi(self._files.csi(task.radio), index, value, marker)
@@ -267,4 +269,6 @@ def _trace_here(
     reply = place.lane.trace({**task.request, "file": str(file)})
     if "error" in reply:
         return {**reply, "log": f"{place.log} on {socket.gethostname()}"}
-    return {**reply, "value": np.load(file, allow_pickle=False)}
+    table = file.with_suffix(".npz")
+    paths = table.read_bytes() if job["paths"] else b""
+    return {**reply, "value": np.load(file, allow_pickle=False), "paths": paths}

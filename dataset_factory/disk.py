@@ -6,14 +6,19 @@ from __future__ import annotations
 import shutil
 from dataclasses import dataclass
 
+import numpy as np
+
 from dataset_factory.bundle import Bundle
 from dataset_factory.job import Job
 from rfgs_core.dataset.csi_store import open_csi
-from rfgs_core.dataset.schema import SequenceInfo
+from rfgs_core.dataset.schema import SequenceInfo, device_pose
 from rfgs_core.errors import RfgsError
+from rfgs_core.radio import layout
 
 #: Picture, depth, normals and mask of one pixel as they are stored [B]; 5.5 in a furnished room.
 BYTES_PER_PIXEL = 6.0
+#: Paths of one pair of sites as they are stored [B]; 45,000 in a furnished room at depth 2.
+PATH_BYTES_PER_PAIR = 60_000.0
 
 
 @dataclass(frozen=True)
@@ -33,7 +38,8 @@ class Space:
 def space(job: Job, bundle: Bundle, sequence: SequenceInfo) -> Space:
     """What a sequence needs, from its empty stores and the files of its scene.
 
-    Geometry counts twice, as the exported scene stays until the end.
+    Geometry counts twice, as the exported scene stays until the end. Tables of paths count as
+    the largest of those that are there, or else as in a furnished room.
     """
     frames = len(sequence.frames)
     frame_bytes = 2.0 * (bundle.path / "frames" / f"{sequence.frames[0]:06d}.npz").stat().st_size
@@ -49,11 +55,27 @@ def space(job: Job, bundle: Bundle, sequence: SequenceInfo) -> Space:
         copies = 2.0 if job.plan.impairments else 1.0
         frame_bytes += copies * share * store["csi"].nbytes / frames
         once += share * store["csi_static"].nbytes
+        if job.plan.paths:
+            table = _path_bytes(job, radio, sequence)
+            frame_bytes += table
+            once += table
     if job.plan.images:
         pixels = sum(row["width"] * row["height"] for row in sequence.cameras)
         frame_bytes += BYTES_PER_PIXEL * pixels
         once += BYTES_PER_PIXEL * pixels
     return Space(once, frame_bytes)
+
+
+def _path_bytes(job: Job, radio: str, sequence: SequenceInfo) -> float:
+    """Size of one table of paths [B]."""
+    there = [job.files.paths(radio, frame) for frame in sequence.frames]
+    sizes = [float(file.stat().st_size) for file in there if file.is_file()]
+    if sizes:
+        return max(sizes)
+    spread = layout(job.plan.radio(radio), [device_pose(row) for row in sequence.devices[radio]])
+    tx, rx = np.nonzero(spread.measured)
+    pairs = np.unique(np.stack([spread.tx_site[tx], spread.rx_site[rx]]), axis=1).shape[1]
+    return PATH_BYTES_PER_PAIR * pairs
 
 
 def refuse_small_disk(job: Job, needed_bytes: float) -> None:

@@ -77,6 +77,7 @@ def generate(job: Job) -> bool:
         refuse_small_disk(job, needed.bytes(len(sequence.frames)))
         with job.stage("trace"):
             trace(job, bundle, sequence)
+        needed = space(job, bundle, sequence)
         if job.plan.impairments:
             with job.stage("impair"):
                 _impair(job)
@@ -101,7 +102,8 @@ def generate(job: Job) -> bool:
 def _contents(job: Job) -> list[str]:
     pictures = ["images", "depth", "normal", "mask"] if job.plan.images else []
     impaired = ["csi_impaired"] if job.plan.impairments else []
-    return ["csi", "csi_static", *impaired, *pictures, "geometry"]
+    paths = ["paths"] if job.plan.paths else []
+    return ["csi", "csi_static", *impaired, *paths, *pictures, "geometry"]
 
 
 def _impair(job: Job) -> None:
@@ -129,13 +131,14 @@ def _export(job: Job) -> Bundle:
         spans = {pose_span_s(job.plan.radio(name)) for name in job.plan.radios}
         spans_s = sorted(span_s for span_s in spans if span_s is not None)
         poses = [text for span_s in spans_s for text in ("--span", repr(span_s))]
+        more = [*frames, *poses, *(["--velocities"] if job.plan.paths else [])]
         with progress_bar("export", "frame") as progress, job.clock("export") as clock:
 
             def step(done: int, total: int) -> None:
                 progress(done, total)
                 clock.step()
 
-            job.run_blender("export", *arguments, *frames, *poses, progress=step)
+            job.run_blender("export", *arguments, *more, progress=step)
         read_bundle(fresh)
         fresh.rename(target)
     return read_bundle(target)

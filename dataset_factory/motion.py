@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where everything that moves is between two frames."""
+"""Where everything that moves is between two frames, and how fast at a frame."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from dataset_factory.bundle import Bundle, read_arrays
+from rfgs_core.arrays import load_arrays
 from rfgs_core.errors import RfgsFormatError
 
 
@@ -65,3 +66,15 @@ def read_motion(bundle: Bundle, frame: int, span_s: float) -> Motion:
     if not np.isfinite(vertices).all():
         raise RfgsFormatError(f"{path}: pose_vertices: expected finite numbers")
     return Motion(np.concatenate([[0.0], wanted]), vertices)
+
+
+def read_velocity(bundle: Bundle, frame: int) -> np.ndarray:
+    """Reads the velocity of every vertex at a frame [m/s], float64, shape (V, 3).
+
+    Raises:
+        RfgsFormatError: The bundle holds none, or they do not fit its topology.
+    """
+    path = bundle.path / "frames" / f"{frame:06d}.npz"
+    name, shape = "vertex_velocity", bundle.topology.rest_vertices.shape
+    remedy = "export the scene again with --velocities"
+    return load_arrays(path, remedy, {name: shape}, others=False)[name].astype(np.float64)

@@ -54,6 +54,8 @@ class Plan:
     packets_per_frame: int = 1
     """Packets or chirps of each frame; 1 leaves every radio its own number, as do antennas that
     move, whose pulses are their places."""
+    paths: bool = False
+    """Whether the paths behind every channel are stored."""
     overrides: dict[str, Any] = field(default_factory=dict)
     """What the user says about the scene, in the words of the YAML file."""
     custom_radios: dict[str, dict[str, Any]] = field(default_factory=dict)
@@ -92,6 +94,12 @@ def make_plan(scene: Scene, radios: tuple[str, ...], frames: str, **options: Any
     for name, (low, high) in limits.items():
         if not low <= options[name] <= high:
             raise RfgsError(f"--{name} {options[name]}: expected {low} to {high}")
+    moving = [name for name, radio in chosen.items() if radio.antennas_move]
+    if options.get("paths") and moving:
+        raise RfgsError(
+            f"--paths: radio {moving[0]!r} has antennas that move, paths are told between antennas "
+            "that stand still; leave one of them out"
+        )
     packets = options.get("packets_per_frame", 1)
     if not 1 <= packets <= MAX_PACKETS:
         raise RfgsError(f"--packets-per-frame {packets}: expected 1 to {MAX_PACKETS}")
@@ -164,14 +172,27 @@ def refuse_other_plan(
             )
 
 
-def missing_channels(files: SequenceFiles, radio: str, frames: list[int]) -> list[int | None]:
-    """Frames whose channel is not finished, None standing for the static channel."""
+def missing_channels(
+    files: SequenceFiles, radio: str, frames: list[int], paths: bool = False
+) -> list[int | None]:
+    """Frames whose channel is not finished, None standing for the static channel.
+
+    Args:
+        files: Where things lie.
+        radio: Name of the radio.
+        frames: All frames.
+        paths: Whether a channel needs its table of paths.
+    """
     store = files.csi(radio)
     rows: list[tuple[int | None, int | None]] = [(None, None), *enumerate(frames)]
     return [
         frame
         for index, frame in rows
-        if not (files.csi_done(radio, frame).is_file() and chunk_file(store, index).is_file())
+        if not (
+            files.csi_done(radio, frame).is_file()
+            and chunk_file(store, index).is_file()
+            and (files.paths(radio, frame).is_file() or not paths)
+        )
     ]
 
 

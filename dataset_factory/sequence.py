@@ -51,6 +51,7 @@ def describe_sequence(
         },
         materials=bundle.materials,
         instances=[instance_row(row) for row in bundle.instances],
+        objects=bundle.path_objects,
         guesses=[*(read_json(file) if file.is_file() else []), *guesses],
         trace_depth=plan.depth,
         shadow=plan.shadow,

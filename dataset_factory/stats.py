@@ -14,6 +14,7 @@ from tqdm import tqdm
 from rfgs_core.dataset import Dataset, Sequence, open_dataset
 from rfgs_core.dataset.impaired_store import has_impaired
 from rfgs_core.radio import devices_at
+from rfgs_core.radio.images import SCATTERING
 from rfgs_core.radio.levels import decibels
 
 #: Arrivals weaker than this relative to a link's strongest do not count for its spread [dB].
@@ -97,6 +98,8 @@ def radio_stats(sequence: Sequence, radio: str) -> dict[str, Any]:
     }
     if has_impaired(sequence.files.csi(radio)):
         found["impaired"] = _impaired(sequence, radio)
+    if sequence.files.paths(radio, None).is_file():
+        found["paths"] = _paths(sequence, radio)
     return _rounded(found)
 
 
@@ -130,6 +133,18 @@ def _impaired(sequence: Sequence, radio: str) -> dict[str, Any]:
     return {
         "settings": asdict(known.settings),
         "lost_share": float(1.0 - received[:, layout.measured].mean()),
+    }
+
+
+def _paths(sequence: Sequence, radio: str) -> dict[str, Any]:
+    """How many paths a frame has, how many of them by way of people, and how these move."""
+    tables = [sequence.paths(radio, frame) for frame in sequence.frames]
+    by_people = [(table.kind == SCATTERING).any(axis=1) for table in tables]
+    moved_hz = np.concatenate([t.doppler_hz[own] for t, own in zip(tables, by_people, strict=True)])
+    return {
+        "per_frame": float(np.median([len(table) for table in tables])),
+        "by_people_per_frame": float(np.median([own.sum() for own in by_people])),
+        "largest_doppler_hz": float(np.abs(moved_hz).max(initial=0.0)),
     }
 
 

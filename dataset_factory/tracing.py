@@ -27,7 +27,7 @@ def trace(job: Job, bundle: Bundle, sequence: SequenceInfo) -> None:
     tasks = [
         Task(radio, frame)
         for radio in job.plan.radios
-        for frame in missing_channels(job.files, radio, sequence.frames)
+        for frame in missing_channels(job.files, radio, sequence.frames, job.plan.paths)
     ]
     if not tasks:
         return
@@ -67,6 +67,7 @@ def _request(job: Job, bundle: Bundle, sequence: SequenceInfo) -> dict[str, Any]
         "depth": job.plan.depth,
         "shadow": job.plan.shadow,
         "seed": job.plan.seed,
+        "paths": job.plan.paths,
     }
 
 

@@ -12,6 +12,7 @@ from tqdm import tqdm
 
 from dataset_factory.bundle import unknown_joints
 from dataset_factory.labels import label_faults, mask_faults
+from dataset_factory.path_faults import path_faults
 from dataset_factory.physics import channel_faults, energy_faults
 from rfgs_core.dataset import Sequence
 from rfgs_core.dataset.csi_store import chunk_file
@@ -109,6 +110,8 @@ def _sequence_faults(sequence: Sequence, has: list[str]) -> Iterator[str]:
     with tqdm(sequence.radios, desc="channels", unit="radio") as bar:
         for radio in bar:
             yield from _caught(lambda radio=radio: _radio_faults(sequence, radio))
+            if "paths" in has:
+                yield from _caught(lambda radio=radio: path_faults(sequence, radio))
     if "geometry" in has:
         yield from _caught(lambda: _geometry_faults(sequence))
     if "images" in has:

@@ -21,8 +21,10 @@ import numpy as np
 from dataset_factory.bundle import Bundle, read_bundle
 from rfgs_core.dataset.csi_store import write_csi
 from rfgs_core.dataset.names import SequenceFiles
+from rfgs_core.dataset.path_store import write_paths
 from rfgs_core.dataset.schema import device_pose, radio_from_json
 from rfgs_core.errors import RfgsError
+from rfgs_core.radio.path_table import PathTable
 
 if TYPE_CHECKING:
     from dataset_factory.trace import ApertureTracer, Tracer
@@ -36,7 +38,8 @@ class Worker:
 
         Args:
             job: `bundle` (folder), `sequence` (folder the channels go to), `devices` by radio,
-                `depth` (radios that cannot go so deep go as deep as they can), `shadow` and `seed`.
+                `depth` (radios that cannot go so deep go as deep as they can), `shadow`, `seed`
+                and `paths` (whether tables of paths are written too).
         """
         from dataset_factory.trace.setup import prepare
 
@@ -52,23 +55,44 @@ class Worker:
         Args:
             radio: Name of the radio.
             frame: Frame number; None is the static channel.
-            file: A `.npy` file to write instead of the job's sequence, which may not be at hand.
+            file: A `.npy` file to write instead of the job's sequence, which may not be at hand;
+                a table of paths is written beside it, as `.npz`.
 
         Returns:
             Seconds spent on it per stage.
         """
         before = dict(self.tracer.timings) if self.tracer and self.radio == radio else {}
         tracer = self._tracer(radio)
-        value = tracer.static() if frame is None else tracer.samples(self.bundle.frame(frame))
+        value, table = self._traced(tracer, frame)
         spent = {stage: s - before.get(stage, 0.0) for stage, s in tracer.timings.items()}
         start = time.perf_counter()
         if file is not None:
             np.save(file, value)
+            if table is not None:
+                write_paths(Path(file).with_suffix(".npz"), table)
         else:
             files = SequenceFiles(Path(self.job["sequence"]))
+            if table is not None:
+                # Before the channel, whose marker says that the frame is whole.
+                write_paths(files.paths(radio, frame), table)
             index = None if frame is None else self.bundle.frames.index(frame)
             write_csi(files.csi(radio), index, value, files.csi_done(radio, frame))
         return {**spent, "write": time.perf_counter() - start}
+
+    def _traced(
+        self, tracer: Tracer | ApertureTracer, frame: int | None
+    ) -> tuple[np.ndarray, PathTable | None]:
+        """Channel of a frame, and the paths behind it if they are wanted."""
+        from dataset_factory.trace import Tracer
+
+        if not (self.job["paths"] and isinstance(tracer, Tracer)):
+            value = tracer.static() if frame is None else tracer.samples(self.bundle.frame(frame))
+            return value, None
+        if frame is None:
+            return tracer.static(), tracer.static_paths()
+        moving = self.bundle.frame(frame)
+        trace = tracer.trace(moving)
+        return tracer.samples(moving, trace), tracer.paths(moving, trace)
 
     def _tracer(self, radio: str) -> Tracer | ApertureTracer:
         from dataset_factory.trace import ApertureTracer, Tracer

@@ -64,6 +64,10 @@ class GenerateArgs:
     """Channels per frame, for Doppler: packets spread until the next frame, or for mmwave chirps
     0.25 ms apart. The animation's last frame is left out, as nothing is known beyond it. Not for
     sar, whose pulses are the places of its antenna."""
+    paths: bool = False
+    """Also store the paths behind every channel: amplitude, delay, angles, Doppler, and what each
+    meets where. Takes about as much disk as the channels, and a few seconds per frame. Not for
+    sar."""
     images: bool = True
     """Render pictures with Blender."""
     options: tyro.conf.OmitArgPrefixes[SceneOptions] = field(default_factory=SceneOptions)
@@ -116,6 +120,7 @@ def job_of(args: GenerateArgs) -> tuple[Job, Scene]:
         images=args.images,
         impairments=asdict(read_impairments(args.impairments)) if args.impairments else None,
         packets_per_frame=args.packets_per_frame,
+        paths=args.paths,
         overrides=said,
     )
     use_llvm()

@@ -72,6 +72,11 @@ class Bodies:
         positions, normals = self._points.at(self.people.posed(vertices))
         return PosedPoints(positions, normals, self._points.areas, self._points.material)
 
+    @property
+    def surface(self) -> SurfacePoints | None:
+        """The scattering points on the mesh of people; None if there are none."""
+        return self._points
+
     def outlines(self, vertices: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """Vertices [m] and triangles that cast the shadow of each person, in that pose."""
         posed = self.people.posed(vertices)

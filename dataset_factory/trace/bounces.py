@@ -21,10 +21,11 @@ from sionna.rt.rcs import ConstantCPM, ConstantRCS, RCSSolver, ScatteringModel, 
 from dataset_factory.trace.direct import PosedPoints
 from dataset_factory.trace.environment import measured_pairs
 from dataset_factory.trace.legs import LegCandidates
-from dataset_factory.trace.paths import SENSING, PathSet, empty, merged, path_set
+from dataset_factory.trace.paths import PathSet, empty, merged, path_set
 from dataset_factory.trace.scene import add_antennas, centres
 from rfgs_core.radio import Layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.radio.images import SCATTERING
 from rfgs_core.radio.layout import DevicePose
 
 #: Points per call, for memory's sake; every call compiles kernels for its own path count.
@@ -137,7 +138,7 @@ class Bounces:
         if not len(found):
             return empty(self._depth)
         found = found.select((found.kinds != 0).sum(axis=1) > 1)
-        primitives = np.where(found.kinds == SENSING, found.primitives + first, found.primitives)
+        primitives = np.where(found.kinds == SCATTERING, found.primitives + first, found.primitives)
         return replace(found, primitives=primitives)
 
     def _hang(self, places: np.ndarray) -> None:
@@ -173,7 +174,7 @@ def with_facets(
     """
     if not len(paths):
         return paths
-    at = np.argmax(paths.kinds == SENSING, axis=1)
+    at = np.argmax(paths.kinds == SCATTERING, axis=1)
     rows = np.arange(len(paths))
     point = paths.primitives[rows, at]
     corner = paths.vertices[rows, at + 1]

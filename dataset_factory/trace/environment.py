@@ -83,6 +83,11 @@ class Environment:
         self._scene = environment_scene(bundle, radio, vehicles)
         self._solver = BandSolver(deterministic=True)
 
+    @property
+    def scene(self) -> rt.Scene:
+        """The scene that is traced."""
+        return self._scene
+
     def paths(self, vertices: np.ndarray | None = None) -> PathSet:
         """Traces the scene; the result does not depend on what was traced before.
 

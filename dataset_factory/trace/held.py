@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dataset_factory.trace.direct import PosedPoints
-from dataset_factory.trace.paths import SENSING, PathSet
+from dataset_factory.trace.paths import PathSet
+from rfgs_core.radio.images import SCATTERING
 
 
 @dataclass(frozen=True)
@@ -22,6 +23,8 @@ class Trace:
 
     environment: np.ndarray
     """Channel of the environment, shadows included, shape (tx, rx, subcarrier)."""
+    paths: PathSet
+    """Paths of the environment, without shadows."""
     points: PosedPoints | None = None
     """Scattering points; None if there are none."""
     seen: np.ndarray | None = None
@@ -50,7 +53,7 @@ def follow(paths: PathSet, places: np.ndarray) -> PathSet:
     if not len(paths):
         return paths
     rows, depth = np.arange(len(paths)), paths.kinds.shape[1]
-    at = np.argmax(paths.kinds == SENSING, axis=1)
+    at = np.argmax(paths.kinds == SCATTERING, axis=1)
     count = (paths.kinds != 0).sum(axis=1)
     place = places[paths.primitives[rows, at]]
     shift = place - paths.vertices[rows, at + 1]

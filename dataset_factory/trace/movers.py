@@ -24,6 +24,8 @@ class Movers:
     """Material index of each triangle, int32, shape (T,)."""
     instance: np.ndarray
     """Instance id of each triangle, int32, shape (T,)."""
+    segment: np.ndarray
+    """Joint that each triangle follows or -1, int32, shape (T,)."""
 
     def __len__(self) -> int:
         return len(self.faces)
@@ -49,4 +51,5 @@ def _select(bundle: Bundle, triangles: np.ndarray) -> Movers:
         faces=faces.reshape(-1, 3).astype(np.int64),
         material=topology.material[triangles],
         instance=topology.instance[triangles],
+        segment=topology.segment[triangles],
     )

@@ -8,10 +8,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 import sionna.rt as rt
 
-#: Sionna's code of a sensing interaction: a scattering point.
-SENSING = 16
-_SPECULAR = 1
-_REFRACTION = 4
+from rfgs_core.radio.images import SPECULAR, breaks
 
 
 @dataclass(frozen=True)
@@ -30,6 +27,8 @@ class PathSet:
     """Sionna's interaction codes, 0 beyond the last, shape (path, depth)."""
     primitives: np.ndarray
     """Triangle, or scattering point, of each interaction, shape (path, depth)."""
+    objects: np.ndarray
+    """Sionna's number of the object of each interaction, shape (path, depth)."""
 
     def __len__(self) -> int:
         return len(self.tx)
@@ -48,6 +47,7 @@ class PathSet:
             self.vertices[keep],
             self.kinds[keep],
             self.primitives[keep],
+            self.objects[keep],
         )
 
     def sorted(self) -> PathSet:
@@ -64,11 +64,11 @@ class PathSet:
 
     def breaks(self) -> np.ndarray:
         """Interactions after which a path no longer has one mirror image, bool (path, depth)."""
-        return (self.kinds != 0) & (self.kinds != _SPECULAR) & (self.kinds != _REFRACTION)
+        return breaks(self.kinds)
 
     def mirrors(self) -> np.ndarray:
         """Interactions that mirror the way, bool, shape (path, depth)."""
-        return self.kinds == _SPECULAR
+        return self.kinds == SPECULAR
 
 
 def path_set(paths: rt.Paths, tx_centres: np.ndarray, rx_centres: np.ndarray) -> PathSet:
@@ -90,14 +90,15 @@ def path_set(paths: rt.Paths, tx_centres: np.ndarray, rx_centres: np.ndarray) ->
     real, imag = (np.array(part).transpose(0, 2, 4, 3, 1)[valid] for part in paths.a)
     kinds = np.array(paths.interactions)[:, valid].T.astype(np.int64)
     primitives = np.array(paths.primitives)[:, valid].T.astype(np.int64)
+    objects = np.array(paths.objects)[:, valid].T.astype(np.int64)
     corners = np.moveaxis(np.array(paths.vertices)[:, valid], 0, 1).astype(np.float64)
     corners = np.where((kinds == 0)[:, :, None], rx_centres[rx][:, None, :], corners)
     vertices = np.concatenate(
         [tx_centres[tx][:, None, :], corners, rx_centres[rx][:, None, :]], axis=1
     )
     amplitude = (real.astype(np.float64) + 1j * imag.astype(np.float64)).reshape(len(tx), -1, 1)
-    primitives = np.where(kinds == 0, 0, primitives)
-    return PathSet(tx, rx, amplitude, vertices, kinds, primitives).sorted()
+    primitives, objects = (np.where(kinds == 0, 0, column) for column in (primitives, objects))
+    return PathSet(tx, rx, amplitude, vertices, kinds, primitives, objects).sorted()
 
 
 def empty(depth: int, nodes: int = 1) -> PathSet:
@@ -105,7 +106,7 @@ def empty(depth: int, nodes: int = 1) -> PathSet:
     index = np.zeros(0, dtype=np.int64)
     table = np.zeros((0, depth), dtype=np.int64)
     amplitude = np.zeros((0, 1, nodes), np.complex128)
-    return PathSet(index, index, amplitude, np.zeros((0, depth + 2, 3)), table, table)
+    return PathSet(index, index, amplitude, np.zeros((0, depth + 2, 3)), table, table, table)
 
 
 def merged(parts: list[PathSet]) -> PathSet:
@@ -114,12 +115,7 @@ def merged(parts: list[PathSet]) -> PathSet:
     if not parts:
         return empty(0)
     depth = max(part.kinds.shape[1] for part in parts)
-    parts = [_padded(part, depth) for part in parts]
-    columns = zip(
-        *((p.tx, p.rx, p.amplitude, p.vertices, p.kinds, p.primitives) for p in parts),
-        strict=True,
-    )
-    return PathSet(*(np.concatenate(column) for column in columns)).sorted()
+    return _concatenated([_padded(part, depth) for part in parts]).sorted()
 
 
 def joined(sets: list[PathSet]) -> PathSet:
@@ -181,4 +177,5 @@ def _padded(part: PathSet, depth: int) -> PathSet:
         np.concatenate([part.vertices, end], axis=1),
         np.pad(part.kinds, ((0, 0), (0, extra))),
         np.pad(part.primitives, ((0, 0), (0, extra))),
+        np.pad(part.objects, ((0, 0), (0, extra))),
     )

@@ -44,6 +44,8 @@ class SurfacePoints:
     """Material index of each point, shape (point,)."""
     welded_faces: np.ndarray
     """Faces of the outer surface over welded vertices, outward, shape (T', 3)."""
+    triangle: np.ndarray
+    """Index of the triangle each point lies on among those given, shape (point,)."""
     weld: np.ndarray
     """First vertex at the place of each vertex, shape (V,); seams share one normal."""
 
@@ -69,6 +71,10 @@ class SurfacePoints:
         smooth = np.einsum("pc,pcx->px", self.barycentric, normals[self.weld[self.faces]])
         length = np.linalg.norm(smooth, axis=1, keepdims=True)
         return positions, smooth / np.maximum(length, 1e-12)
+
+    def carried(self, values: np.ndarray) -> np.ndarray:
+        """Values of all vertices, such as velocities, at the points, shape (point, 3)."""
+        return np.einsum("pc,pcx->px", self.barycentric, values[self.weld][self.faces])
 
 
 def density(wavelength_m: float) -> float:
@@ -111,6 +117,7 @@ def surface_points(
         barycentric=barycentric,
         areas=areas,
         material=material[keep][index],
+        triangle=np.flatnonzero(keep)[index],
         welded_faces=welded,
         weld=weld,
     )

@@ -96,13 +96,13 @@ def environment_scene(bundle: Bundle, radio: Radio, vehicles: Movers | None = No
     )
     scene.tx_array = scene.rx_array = antenna
     parts = [
-        (f"static-{index}", part.material_index, part.vertices, part.faces)
+        (static_name(index), part.material_index, part.vertices, part.faces)
         for index, part in enumerate(bundle.static_meshes())
     ]
     if vehicles is not None:
         parts += [
-            (_vehicle_name(int(material)), int(material), vehicles.rest_vertices, faces)
-            for material, faces in _by_material(vehicles)
+            (name, material, vehicles.rest_vertices, faces)
+            for name, material, faces in vehicle_meshes(vehicles)
         ]
     materials: dict[int, rt.RadioMaterial] = {}
     objects = []
@@ -127,7 +127,7 @@ def move_vehicles(scene: rt.Scene, vehicles: Movers, vertices: np.ndarray) -> No
         vehicles: The vehicles.
         vertices: Their vertices [m], shape (V, 3).
     """
-    names = [_vehicle_name(int(material)) for material, _ in _by_material(vehicles)]
+    names = [name for name, _, _ in vehicle_meshes(vehicles)]
     move_meshes(scene, dict.fromkeys(names, vertices))
 
 
@@ -140,14 +140,20 @@ def move_meshes(scene: rt.Scene, places: dict[str, np.ndarray]) -> None:
     params.update()
 
 
-def _by_material(vehicles: Movers) -> list[tuple[int, np.ndarray]]:
-    """Triangles of each material; all meshes share the vertices of all vehicles."""
-    found = np.unique(vehicles.material)
-    return [(int(index), vehicles.faces[vehicles.material == index]) for index in found]
+def static_name(index: int) -> str:
+    """Name of a static mesh in the scene, by its place in the bundle's list."""
+    return f"static-{index}"
 
 
-def _vehicle_name(material: int) -> str:
-    return f"vehicle-{material}"
+def vehicle_meshes(vehicles: Movers) -> list[tuple[str, int, np.ndarray]]:
+    """Name in the scene, material and triangles of each mesh of vehicles.
+
+    There is one per material; all of them share the vertices of all vehicles.
+    """
+    found = [int(index) for index in np.unique(vehicles.material)]
+    return [
+        (f"vehicle-{index}", index, vehicles.faces[vehicles.material == index]) for index in found
+    ]
 
 
 def set_frequency(scene: rt.Scene, freq_hz: float) -> None:

@@ -10,7 +10,6 @@ seen from each end. Amplitudes scale with the changed distance.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numba
 import numpy as np
@@ -19,65 +18,9 @@ from dataset_factory.trace.paths import PathSet
 from dataset_factory.trace.scene import ports
 from rfgs_core.radio import Layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.radio.images import images
 
 _BLOCK = 128
-
-
-@dataclass(frozen=True)
-class Images:
-    """What the ends of each path see."""
-
-    one_sided: np.ndarray
-    """Whether the path has one mirror image from end to end, bool, shape (path,)."""
-    seen_from_tx: np.ndarray
-    """Image of the first scattering point seen from the transmitter [m], shape (path, 3)."""
-    seen_from_rx: np.ndarray
-    """Image of the last scattering point, or of the transmitter, seen from the receiver [m]."""
-    mirror: np.ndarray
-    """Turns offsets at the transmitter into offsets of its image, shape (path, 3, 3)."""
-    middle_m: np.ndarray
-    """Length between first and last scattering point [m], shape (path,)."""
-
-
-def images(paths: PathSet) -> Images:
-    """Unfolds paths into the straight lines that both ends see."""
-    steps = np.diff(paths.vertices, axis=1)
-    length = np.linalg.norm(steps, axis=2)
-    # Padding repeats the receiver, so directions are taken where a step exists.
-    k = steps / np.maximum(length, 1e-12)[:, :, None]
-    depth = paths.kinds.shape[1]
-    count = (paths.kinds != 0).sum(axis=1)
-    breaks = paths.breaks()
-    one_sided = ~breaks.any(axis=1)
-    rows = np.arange(len(paths))
-    last = k[rows, count]
-    first_break = np.argmax(breaks, axis=1) if depth else np.zeros(len(paths), dtype=np.int64)
-    last_break = depth - 1 - np.argmax(breaks[:, ::-1], axis=1) if depth else first_break
-    before = np.where(np.arange(depth + 1) <= first_break[:, None], length, 0.0).sum(axis=1)
-    after = np.where(np.arange(depth + 1) > last_break[:, None], length, 0.0).sum(axis=1)
-    total = length.sum(axis=1)
-    after = np.where(one_sided, total, after)
-    before = np.where(one_sided, 0.0, before)
-    return Images(
-        one_sided=one_sided,
-        seen_from_tx=paths.vertices[:, 0] + before[:, None] * k[:, 0],
-        seen_from_rx=paths.vertices[:, -1] - after[:, None] * last,
-        mirror=_mirror(paths, k),
-        middle_m=np.where(one_sided, 0.0, total - before - after),
-    )
-
-
-def _mirror(paths: PathSet, k: np.ndarray) -> np.ndarray:
-    """Product of the reflections along each path, shape (path, 3, 3)."""
-    product = np.broadcast_to(np.eye(3), (len(paths), 3, 3)).copy()
-    for i in range(paths.kinds.shape[1]):
-        normal = k[:, i + 1] - k[:, i]
-        size = np.linalg.norm(normal, axis=1)
-        bends = paths.mirrors()[:, i] & (size > 1e-9)
-        normal = np.where(bends[:, None], normal / np.maximum(size, 1e-12)[:, None], 0.0)
-        reflect = np.eye(3) - 2.0 * normal[:, :, None] * normal[:, None, :]
-        product = reflect @ product
-    return product
 
 
 def steer(
@@ -106,7 +49,7 @@ def steer(
     out = np.zeros((len(layout.tx_xyz), len(layout.rx_xyz), len(freq_hz)), dtype=np.complex128)
     if not len(paths):
         return out
-    seen = images(paths)
+    seen = images(paths.vertices, paths.kinds)
     left, share = _interpolation(freq_hz, nodes_hz)
     wavenumber = 2.0 * np.pi * np.asarray(freq_hz, dtype=np.float64) / SPEED_OF_LIGHT
     step = float(wavenumber[1] - wavenumber[0]) if len(wavenumber) > 1 else 0.0

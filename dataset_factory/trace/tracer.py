@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from dataset_factory.bundle import Bundle, BundleFrame
-from dataset_factory.motion import read_motion
+from dataset_factory.motion import read_motion, read_velocity
 from dataset_factory.trace.base import BaseTracer
 from dataset_factory.trace.bounces import Bounces, with_facets
 from dataset_factory.trace.direct import PosedPoints, direct_channel, in_sight
@@ -17,11 +17,14 @@ from dataset_factory.trace.environment import (
     environment_channel,
 )
 from dataset_factory.trace.held import Trace, follow, mixed
+from dataset_factory.trace.met import Met
 from dataset_factory.trace.paths import PathSet
 from dataset_factory.trace.shadow import Shadow, transmission
 from dataset_factory.trace.steering import steer
+from dataset_factory.trace.table import TableMaker
 from rfgs_core.radio import Radio, frame_samples, layout, pose_span_s
 from rfgs_core.radio.layout import DevicePose
+from rfgs_core.radio.path_table import PathTable
 from rfgs_core.seeds import sub_seed
 
 #: Longest time between traces of a frame with several samples [s].
@@ -56,11 +59,14 @@ class Tracer(BaseTracer):
         with self._timed("environment"):
             environment = Environment(bundle, radio, self._layout, devices, self._rays)
             self._static_paths = environment.paths()
+            self._static_met = Met(bundle, environment.scene, bodies.vehicles)
             if len(bodies.vehicles):
                 environment = Environment(
                     bundle, radio, self._layout, devices, self._rays, bodies.vehicles
                 )
         self._environment = environment
+        self._met = Met(bundle, environment.scene, bodies.vehicles)
+        self._tables = TableMaker(radio, self._layout, devices, shadow)
         self._bounces: Bounces | None = None
         if bodies.scatter and depth > 1:
             self._bounces = Bounces(
@@ -72,16 +78,50 @@ class Tracer(BaseTracer):
         channel = environment_channel(self._static_paths, self._radio, self._layout)
         return channel.astype(np.complex64)
 
-    def samples(self, frame: BundleFrame) -> np.ndarray:
+    def static_paths(self) -> PathTable:
+        """Paths behind `static`."""
+        return self._tables.environment(self._static_paths, self._static_met, [])
+
+    def paths(self, frame: BundleFrame, trace: Trace | None = None) -> PathTable:
+        """Paths behind the channel at a frame's own time.
+
+        Args:
+            frame: What moves, in place.
+            trace: Result of `trace` for this frame; None traces it.
+
+        Raises:
+            RfgsFormatError: The bundle was exported without velocities.
+        """
+        trace, bodies = trace or self.trace(frame), self._bodies
+        velocity = read_velocity(self._bundle, frame.frame)
+        vehicles = None
+        if len(bodies.vehicles):
+            vehicles = bodies.vehicles.posed(frame.vertices), bodies.vehicles.posed(velocity)
+        outlines = bodies.outlines(frame.vertices)
+        parts = [self._tables.environment(trace.paths, self._met, outlines, vehicles)]
+        if trace.points is not None:
+            met = Met(self._bundle, bodies.scene, bodies.vehicles)
+            parts.append(self._tables.people(trace, bodies, met, velocity, vehicles))
+        return self._tables.joined(parts)
+
+    def trace(self, frame: BundleFrame) -> Trace:
+        """Everything about a frame that needs rays, for `samples` and `paths`."""
+        return self._trace(frame.vertices)
+
+    def samples(self, frame: BundleFrame, trace: Trace | None = None) -> np.ndarray:
         """Channels at every sample of a frame, complex64, shape (sample, tx, rx, subcarrier).
 
         The first is `frame`'s. For the others the scene is traced every `TRACE_STEP_S` at most;
         in between, points and facets are where the animation has them, with exact path lengths,
         while visibility, walls met and shadows fade from one trace to the next. Where there are
         vehicles, the environment is traced again for every sample.
+
+        Args:
+            frame: What moves, in place.
+            trace: Result of `trace` for this frame; None traces it.
         """
         offset_s = self._samples.offset_s
-        first = self._trace(frame.vertices)
+        first = trace or self.trace(frame)
         channel = self._channel(first.points, (first,), (1.0,))
         out = np.zeros((len(offset_s), *channel.shape), dtype=np.complex64)
         out[0] = channel
@@ -124,11 +164,12 @@ class Tracer(BaseTracer):
             vertices: Vertices of the bundle [m], shape (V, 3).
         """
         vertices = vertices.astype(np.float32)
-        environment = self._environment_at(vertices)
+        paths = self._paths_at(vertices)
+        environment = self._environment_of(paths, vertices)
         self._flush()
         points = self._bodies.points(vertices)
         if points is None:
-            return Trace(environment)
+            return Trace(environment, paths)
         self._bodies.move(vertices)
         with self._timed("people_direct"):
             seen = in_sight(self._bodies.scene.mi_scene, points, self._layout)
@@ -136,12 +177,15 @@ class Tracer(BaseTracer):
         if self._bounces is not None:
             with self._timed("people_bounces"):
                 bounced = self._bounces.paths(points)
-        return Trace(environment, points, seen, bounced)
+        return Trace(environment, paths, points, seen, bounced)
 
     def _environment_at(self, vertices: np.ndarray) -> np.ndarray:
         """Channel of everything but people's echoes, complex128, (tx, rx, subcarrier)."""
         vertices = vertices.astype(np.float32)
-        paths = self._paths_at(vertices)
+        return self._environment_of(self._paths_at(vertices), vertices)
+
+    def _environment_of(self, paths: PathSet, vertices: np.ndarray) -> np.ndarray:
+        """Channel of the environment's paths past what stands at places [m], shape (V, 3)."""
         passed = None
         if self._bodies.scatter:
             outlines = self._bodies.outlines(vertices)

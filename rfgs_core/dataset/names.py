@@ -28,6 +28,11 @@ class SequenceFiles:
         name = "static" if frame is None else f"{frame:06d}"
         return self.root / "radio" / radio / "done" / name
 
+    def paths(self, radio: str, frame: int | None) -> Path:
+        """Path table of a frame; None is the static channel's."""
+        name = "static" if frame is None else f"{frame:06d}"
+        return self.root / "radio" / radio / "paths" / f"{name}.npz"
+
     def image(self, camera: str, frame: int) -> Path:
         """Colour picture."""
         return self.root / "images" / camera / f"{frame:06d}.png"

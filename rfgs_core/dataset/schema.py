@@ -26,6 +26,7 @@ CONTENTS = (
     "csi",
     "csi_static",
     "csi_impaired",
+    "paths",
     "images",
     "depth",
     "normal",
@@ -94,6 +95,8 @@ class SequenceInfo:
     """Radio materials of the scene."""
     instances: list[dict[str, Any]] = field(default_factory=list)
     """Ids that masks use, with name, class and nominal surface [m²]."""
+    objects: list[dict[str, Any]] = field(default_factory=list)
+    """What paths can meet, with id, name, class and instance."""
     guesses: list[dict[str, Any]] = field(default_factory=list)
     """Every default that was guessed, with the reason."""
     trace_depth: int = 1

@@ -14,10 +14,12 @@ from rfgs_core.dataset.csi_store import open_csi, read_csi
 from rfgs_core.dataset.impaired_store import Impaired, read_draw, read_impaired
 from rfgs_core.dataset.mesh_ply import read_mesh
 from rfgs_core.dataset.names import SequenceFiles
+from rfgs_core.dataset.path_store import read_paths
 from rfgs_core.dataset.pictures import read_exr, read_png_rgba, read_png_u16
 from rfgs_core.dataset.schema import bounds_array, device_pose, radio_from_json, read_sequence_info
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.radio import DevicePose, Layout, Radio, frame_samples, layout
+from rfgs_core.radio.path_table import PathTable
 
 if TYPE_CHECKING:
     import xarray
@@ -167,6 +169,20 @@ class Sequence:
         """
         value = read_csi(self.files.csi(self._radio(name)), None, self.files.csi_done(name, None))
         return self._fitting(name, value, None, (1, self.radio_spec(name).samples_per_frame))
+
+    def paths(self, name: str, frame: int) -> PathTable:
+        """The paths behind `csi` of a frame, between centres of sites.
+
+        Raises:
+            RfgsError: There is no such radio or frame, or the dataset holds no paths.
+            RfgsFormatError: The table is damaged.
+        """
+        self._index(frame)
+        return read_paths(self.files.paths(self._radio(name), frame))
+
+    def paths_static(self, name: str) -> PathTable:
+        """The paths behind `csi_static`, refused like `paths`."""
+        return read_paths(self.files.paths(self._radio(name), None))
 
     def moving_mesh(
         self, frame: int

@@ -64,7 +64,13 @@ def make_job(box_room: Path) -> MakeJob:
     """A job of two frames, one camera of 32 px, Wi-Fi at depth 1."""
 
     def make(
-        out: Path, *, frames: str = "1:2", seed: int = 0, images: bool = True, **options: Any
+        out: Path,
+        *,
+        frames: str = "1:2",
+        seed: int = 0,
+        images: bool = True,
+        paths: bool = False,
+        **options: Any,
     ) -> Job:
         plan = make_plan(
             find_scene(str(box_room)),
@@ -77,6 +83,7 @@ def make_job(box_room: Path) -> MakeJob:
             seed=seed,
             shadow="kirchhoff",
             images=images,
+            paths=paths,
         )
         return Job(out, plan, Blender(box_room), **{"workers": 1, **options})
 

@@ -15,6 +15,7 @@ from rfgs_core.dataset import Sequence, open_dataset
 from rfgs_core.dataset.schema import CONTENTS, DatasetInfo, SequenceInfo
 from rfgs_core.files import read_json
 from rfgs_core.radio import PRESETS, Radio
+from rfgs_core.radio.path_table import PathTable
 from rfgs_core.skeleton import JOINTS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -52,6 +53,7 @@ def stored_names(path: Path) -> set[str]:
         with np.load(file) as arrays:
             names |= set(arrays)
     transforms = read_json(sequence.files.transforms("train"))
+    names |= {spec.name for spec in fields(PathTable)}
     return names | {*transforms, *transforms["frames"][0], *read_json(path / "dataset.json")}
 
 

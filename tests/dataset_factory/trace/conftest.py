@@ -17,6 +17,8 @@ from rfgs_core.radio import DevicePose, Radio, preset
 prepare()
 
 ROOM_M = (4.0, 4.0, 2.6)
+#: Of everything that moves, from its first to its second place in a tenth of a second.
+VELOCITY_M_S = (5.0, -3.0, 0.0)
 Mesh = tuple[np.ndarray, np.ndarray]
 MakeBundle = Callable[..., Bundle]
 
@@ -80,6 +82,7 @@ def write_bundle(
             vertices=vertices + np.float32(place),
             joints=np.zeros((1, 17, 3), np.float32),
             segment_velocity=np.zeros((1, 17, 3), np.float32),
+            vertex_velocity=np.full((len(vertices), 3), VELOCITY_M_S, np.float32),
             person_instance=np.array([1], np.int32),
             action=np.array(["walk"]),
         )
@@ -132,6 +135,18 @@ def make_bundle(tmp_path_factory: pytest.TempPathFactory) -> MakeBundle:
 @pytest.fixture(scope="session")
 def person_bundle(make_bundle: MakeBundle) -> Bundle:
     return make_bundle(mover=capsule())
+
+
+@pytest.fixture(scope="session")
+def velocity_m_s() -> np.ndarray:
+    """Velocity of everything that moves in these bundles."""
+    return np.array(VELOCITY_M_S)
+
+
+@pytest.fixture
+def metal_floor() -> list[Mesh]:
+    """A floor alone, in the middle of which reflections lie."""
+    return [sheet((-10, -10, 0), (24, 0, 0), (0, 24, 0))]
 
 
 @pytest.fixture

@@ -89,7 +89,7 @@ def test_moved_bounces_keep_the_law_of_reflection(
 ) -> None:
     from dataset_factory.trace import Tracer
     from dataset_factory.trace.held import follow
-    from dataset_factory.trace.paths import SENSING
+    from rfgs_core.radio.images import SCATTERING
 
     tracer = Tracer(person_bundle, small_radio, two_devices, depth=3)
     trace = tracer._trace(person_bundle.frame(1).vertices)
@@ -106,7 +106,7 @@ def test_moved_bounces_keep_the_law_of_reflection(
     assert (off_axis(moved)[specular] < off_axis(paths)[specular] + 1e-4).all()
     ways = np.diff(moved.vertices, axis=1)
     # … and the spreading of both legs sets the amplitude.
-    at = np.argmax(paths.kinds == SENSING, axis=1)
+    at = np.argmax(paths.kinds == SCATTERING, axis=1)
     legs = [
         np.where(np.arange(ways.shape[1]) <= at[:, None], np.linalg.norm(w, axis=2), 0.0).sum(1)
         for w in (np.diff(paths.vertices, axis=1), ways)

@@ -20,7 +20,7 @@ def line_of_sight(tx: np.ndarray, rx: np.ndarray, elements: np.ndarray) -> tuple
     zero = np.zeros(1, np.int64)
     vertices = np.stack([tx, rx])[None].astype(np.float64)
     none = np.zeros((1, 0), np.int64)
-    paths = PathSet(zero, zero, np.ones((1, 1, 1), np.complex128), vertices, none, none)
+    paths = PathSet(zero, zero, np.ones((1, 1, 1), np.complex128), vertices, none, none, none)
     return paths, one_site(tx[None].astype(float), rx + elements)
 
 
@@ -89,7 +89,7 @@ def test_reflected_path_is_shaded_on_its_unfolded_line() -> None:
     tx, corner, rx = np.zeros(3), np.array([3.0, 0.0, 0.0]), np.array([3.0, 3.0, 0.0])
     zero, kind = np.zeros(1, np.int64), np.ones((1, 1), np.int64)
     vertices = np.stack([tx, corner, rx])[None]
-    paths = PathSet(zero, zero, np.ones((1, 1, 1), np.complex128), vertices, kind, kind)
+    paths = PathSet(zero, zero, np.ones((1, 1, 1), np.complex128), vertices, kind, kind, kind)
     layout = one_site(tx[None], rx[None])
     wide = np.array([[-1.0, -4.0], [1.0, -4.0], [1.0, 0.07], [-1.0, 0.07]])
     middle = [np.stack([np.full(4, D_1), wide[:, 0], wide[:, 1]], axis=1)]

@@ -17,13 +17,13 @@ class ConvertArgs:
 
     nerfstudio and d-nerf: pictures with cameras and time. colmap: the first frame's pictures as a
     text model with points. nerf2: angular spectra per receiving array. mat: channels and labels
-    for MATLAB. DeepMIMO is left out: its scenarios store single rays with their angles, while a
-    dataset stores their sum.
+    for MATLAB. deepmimo: the paths of a dataset made with `generate --paths`, a scenario per radio
+    and a scene per frame; put them into the folder deepmimo_scenarios and load them by radio.
     """
 
     dataset: tyro.conf.Positional[Path]
     """Folder of the dataset."""
-    to: Literal["nerfstudio", "d-nerf", "colmap", "nerf2", "mat"]
+    to: Literal["nerfstudio", "d-nerf", "colmap", "nerf2", "mat", "deepmimo"]
     """Format."""
     out: Path
     """Folder to make."""

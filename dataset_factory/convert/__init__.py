@@ -17,6 +17,7 @@ FORMATS: dict[str, tuple[str, tuple[str, ...]]] = {
     "colmap": ("colmap", ("images", "depth", "mask", "geometry")),
     "nerf2": ("nerf2", ("csi",)),
     "mat": ("mat", ("csi", "csi_static")),
+    "deepmimo": ("deepmimo", ("paths",)),
 }
 
 

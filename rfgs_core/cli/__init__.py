@@ -13,6 +13,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "eval": ("eval", "EvalArgs"),
     "render": ("render", "RenderArgs"),
     "export": ("export", "ExportArgs"),
+    "view": ("view", "ViewArgs"),
     "report": ("report", "ReportArgs"),
     "compare": ("compare", "CompareArgs"),
     "study": ("study", "StudyArgs"),

@@ -12,7 +12,10 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
-PACKAGES = ("rfgs", "torch", "numba", "sionna-rt", "mitsuba", "drjit", "bpy", "xarray", "zarr")
+PACKAGES = (
+    *("rfgs", "torch", "numba", "sionna-rt", "mitsuba", "drjit", "bpy", "xarray", "zarr"),
+    "viser",
+)
 OPTIONAL = {
     "anny": "builds the people of the scenes: pip install 'rfgs[scenes]'",
     "gsplat": "rasterises on CUDA: pip install 'rfgs[gpu]'",

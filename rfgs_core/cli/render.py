@@ -18,9 +18,6 @@ if TYPE_CHECKING:
 
     from rfgs_core.render.view import TrainedRun
 
-#: White columns between a rendered picture and the true one.
-_GAP_PX = 4
-
 _LOG = logging.getLogger(__name__)
 
 
@@ -57,6 +54,7 @@ def render_run(trained: TrainedRun, args: RenderArgs) -> None:
     from tqdm import tqdm
 
     from rfgs_core.dataset.pictures import write_png
+    from rfgs_core.render.beside import side_by_side, to_bytes
     from rfgs_core.render.view import camera_of, fitted_shader, render_person, render_view
 
     if fitted_shader(trained) is None:
@@ -64,12 +62,12 @@ def render_run(trained: TrainedRun, args: RenderArgs) -> None:
     draw = render_person if args.person_only else render_view
     for name, frame in tqdm(_chosen(trained, args), desc="render", unit="picture"):
         camera = camera_of(trained.sequence, name)
-        rendered = _bytes(draw(trained, camera, frame).rgb)
+        rendered = to_bytes(draw(trained, camera, frame).rgb)
         write_png(args.out / name / f"{frame:06d}.png", rendered)
         true = _true_picture(trained, name, frame, args.person_only)
         if true is not None:
             file = args.out / name / f"{frame:06d}_beside_true.png"
-            write_png(file, _side_by_side(rendered, true))
+            write_png(file, side_by_side(rendered, true))
 
 
 def _chosen(trained: TrainedRun, args: RenderArgs) -> list[tuple[str, int]]:
@@ -86,21 +84,11 @@ def _chosen(trained: TrainedRun, args: RenderArgs) -> list[tuple[str, int]]:
 def _true_picture(
     trained: TrainedRun, name: str, frame: int, person_only: bool
 ) -> np.ndarray | None:
+    from rfgs_core.render.beside import to_bytes
     from rfgs_core.render.view import camera_of, true_person
 
     if not trained.sequence.files.image(name, frame).is_file():
         return None
     if person_only:
-        return _bytes(true_person(trained.sequence, camera_of(trained.sequence, name), frame))
+        return to_bytes(true_person(trained.sequence, camera_of(trained.sequence, name), frame))
     return trained.sequence.image(name, frame)[..., :3]
-
-
-def _bytes(rgb: np.ndarray) -> np.ndarray:
-    return (rgb * 255.0 + 0.5).clip(0, 255).astype("uint8")
-
-
-def _side_by_side(left: np.ndarray, right: np.ndarray) -> np.ndarray:
-    import numpy as np
-
-    gap = np.full((left.shape[0], _GAP_PX, 3), 255, np.uint8)
-    return np.concatenate([left, gap, right], axis=1)

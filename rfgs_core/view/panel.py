@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The controls of the viewer, beside the scene."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rfgs_core.view.choice import Choice
+from rfgs_core.view.colors import TITLES, ColorMode
+from rfgs_core.view.pictures import Beside
+
+if TYPE_CHECKING:
+    from viser import ViserServer
+
+#: The far end of the power slider, which hides nothing [dB].
+ALL_DB = 60.0
+
+_NAMES = {title: mode for mode, title in TITLES.items()}
+_MAX_BRIGHTNESS = 20.0
+
+
+@dataclass(frozen=True)
+class Offer:
+    """What a run gives the user to choose from."""
+
+    title: str
+    """One line about the run, Markdown."""
+    frames: Sequence[int]
+    """Frames that are there, ascending."""
+    modes: Sequence[ColorMode]
+    """Modes there are values for."""
+    max_opacity: float
+    """Greatest opacity of a Gaussian."""
+    cameras: Sequence[str]
+    """Cameras to render through."""
+    has_truth: bool
+    """Whether the true surface is known."""
+    has_room: bool
+    """Whether there is a mesh of what stands still."""
+    has_links: bool
+    """Whether some devices measure each other."""
+
+
+class Panel:
+    """Controls on a page; `choice` reads them all at once."""
+
+    def __init__(self, server: ViserServer, offer: Offer, start: Choice) -> None:
+        self._frames = np.asarray(offer.frames)
+        gui = server.gui
+        gui.set_panel_label("RF-GS")
+        gui.configure_theme(
+            control_width="large", dark_mode=True, show_logo=False, show_share_button=False
+        )
+        gui.main_panel.dock_right()
+        gui.add_markdown(offer.title)
+        self._inputs: dict[str, Any] = {}
+        self._add_time(gui, start)
+        with gui.add_folder("Gaussians"):
+            self._add_gaussians(gui, offer, start)
+        with gui.add_folder("Scene"):
+            self._add_scene(gui, offer, start)
+        self._has_pictures = bool(offer.cameras)
+        if offer.cameras:
+            with gui.add_folder("Rendered beside true"):
+                self._add_pictures(gui, offer, start)
+
+    def choice(self) -> Choice:
+        """What is chosen now."""
+        value = {name: handle.value for name, handle in self._inputs.items()}
+        nearest = int(self._frames[np.abs(self._frames - value["frame"]).argmin()])
+        floor_db = value["below_peak_db"]
+        return Choice(
+            **{
+                **value,
+                "frame": nearest,
+                "mode": _NAMES[value["mode"]],
+                "below_peak_db": floor_db if floor_db < ALL_DB else math.inf,
+            }
+        )
+
+    def on_change(self, call: Callable[[], None]) -> None:
+        """Calls `call` whenever a control changes, from threads of the server."""
+        for handle in (*self._inputs.values(), self._play):
+            handle.on_update(lambda _: call())
+
+    def on_look(self, call: Callable[[Any], None]) -> None:
+        """Calls `call` with the client that wants to look through the chosen camera."""
+        if self._has_pictures:
+            self._look.on_click(lambda event: call(event.client))
+
+    @property
+    def playing(self) -> bool:
+        """Whether frames follow each other by themselves."""
+        return bool(self._play.value)
+
+    def next_frame(self) -> tuple[int, int]:
+        """The frame shown and the one after it; the first follows the last."""
+        frame = self.choice().frame
+        index = int(np.flatnonzero(self._frames == frame)[0])
+        return frame, int(self._frames[(index + 1) % len(self._frames)])
+
+    def set_frame(self, frame: int) -> None:
+        """Moves the slider."""
+        self._inputs["frame"].value = frame
+
+    def tell(self, shown: str, legend: str) -> None:
+        """Says what is shown and what its colours mean."""
+        self._shown.content = shown
+        self._legend.content = legend
+
+    def show_picture(self, beside: Beside) -> None:
+        """Replaces the rendered picture and its caption."""
+        self._picture.image = beside.picture
+        self._caption.content = beside.caption
+
+    def _add_time(self, gui: Any, start: Choice) -> None:
+        first, last = int(self._frames[0]), int(self._frames[-1])
+        step = int(np.gcd.reduce(np.diff(self._frames))) if len(self._frames) > 1 else 1
+        self._inputs["frame"] = gui.add_slider("Frame", first, last, step, start.frame)
+        self._play = gui.add_checkbox("Play", False, disabled=first == last)
+        self._shown = gui.add_markdown("")
+
+    def _add_gaussians(self, gui: Any, offer: Offer, start: Choice) -> None:
+        names = [TITLES[mode] for mode in offer.modes]
+        top = math.ceil(100.0 * offer.max_opacity) / 100.0
+        self._inputs |= {
+            "mode": gui.add_dropdown("Colour by", names, initial_value=TITLES[start.mode])
+        }
+        self._legend = gui.add_html("")
+        self._inputs |= {
+            "drawn_as": gui.add_dropdown(
+                "Draw as", ("splats", "points"), initial_value=start.drawn_as
+            ),
+            "min_opacity": gui.add_slider(
+                "Opacity from", 0.0, top, top / 200.0, start.min_opacity,
+                hint="Hides Gaussians with less opacity",
+            ),
+            "below_peak_db": gui.add_slider(
+                "Power within dB", 0.0, ALL_DB, 1.0, min(start.below_peak_db, ALL_DB),
+                hint="Hides what reflects this much less than the strongest; the end hides none",
+            ),
+            "brightness": gui.add_slider(
+                "Brightness", 1.0, _MAX_BRIGHTNESS, 0.5, start.brightness,
+                hint="Multiplies the opacity of splats; points are always opaque",
+            ),
+        }  # fmt: skip
+
+    def _add_scene(self, gui: Any, offer: Offer, start: Choice) -> None:
+        for name, label, there in (
+            ("truth", "True surface", offer.has_truth),
+            ("room", "Room", offer.has_room),
+            ("radios", "Antennas", True),
+            ("links", "Links", offer.has_links),
+            ("cameras", "Cameras", bool(offer.cameras)),
+        ):
+            ticked = getattr(start, name) and there
+            self._inputs[name] = gui.add_checkbox(label, ticked, disabled=not there)
+
+    def _add_pictures(self, gui: Any, offer: Offer, start: Choice) -> None:
+        self._inputs["camera"] = gui.add_dropdown(
+            "Camera", tuple(offer.cameras), initial_value=start.camera
+        )
+        self._picture = gui.add_image(np.zeros((2, 4, 3), np.uint8), format="png")
+        self._caption = gui.add_markdown("")
+        self._look = gui.add_button("Look through this camera")

@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A picture of the whole page, taken by a headless Chromium on this machine."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rfgs_core.errors import RfgsError
+from rfgs_core.files import write_bytes
+from rfgs_core.view.chromium import open_page
+from rfgs_core.view.server import address
+
+if TYPE_CHECKING:
+    from viser import ViserServer
+
+#: Size of the page [px].
+WIDTH_PX, HEIGHT_PX = 1280, 840
+#: Without a GPU a page takes a minute; on a busy machine, longer.
+LIMIT_S = 300.0
+
+#: Without a GPU the page warns about that; in a picture it would hide the scene.
+_DISMISS = "document.querySelectorAll('.mantine-Notification-closeButton').forEach(e => e.click())"
+
+
+def take_picture(server: ViserServer, file: Path) -> None:
+    """Writes what the page of a server looks like, PNG.
+
+    Raises:
+        MissingToolError: Chromium is not installed.
+        RfgsError: The page does not connect or does not come to rest.
+    """
+    with open_page(address(server), WIDTH_PX, HEIGHT_PX) as page:
+        until = time.monotonic() + LIMIT_S
+        while not server.get_clients():
+            if time.monotonic() > until:
+                raise RfgsError(f"the page did not connect within {LIMIT_S:.0f} s")
+            time.sleep(0.2)
+        page.settled_picture(LIMIT_S)
+        page.evaluate(_DISMISS)
+        write_bytes(file, page.settled_picture(LIMIT_S))

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The three-dimensional part of the page: everything is drawn in world metres, Z up."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from rfgs_core.render.cameras import Camera
+from rfgs_core.view.choice import Choice
+from rfgs_core.view.frame import Mesh, ShownFrame
+from rfgs_core.view.radios import RadioShapes
+from rfgs_core.view.room import Room
+
+if TYPE_CHECKING:
+    from viser import ClientHandle, ViserServer
+
+_BACKGROUND = (24, 26, 31)
+_TRUTH = (235, 200, 170)
+_ROOM, _EDGE = (46, 48, 54), (70, 74, 84)
+_TX, _RX = (255, 90, 80), (90, 160, 255)
+_LINK, _HELD_OUT = (20, 150, 60), (255, 110, 0)
+_POINT_M = 0.02
+_BORESIGHT_M = 0.4
+_LINE_PX = 2.0
+
+
+class Stage:
+    """Draws into the scene of a server."""
+
+    def __init__(self, server: ViserServer, bounds_m: Float[np.ndarray, "2 3"]) -> None:
+        self._server, self._scene = server, server.scene
+        self._groups: dict[str, list[Any]] = {}
+        self._scene.set_up_direction("+z")
+        self._scene.set_background_image(np.full((2, 2, 3), _BACKGROUND, np.uint8))
+        low, high = bounds_m
+        centre, reach = (low + high) / 2.0, float(np.linalg.norm(high - low))
+        server.initial_camera.look_at = tuple(centre - [0.0, 0.0, 0.1 * reach])
+        server.initial_camera.position = tuple(centre + reach * np.array([-0.5, -0.6, 0.5]))
+
+    def draw_gaussians(
+        self,
+        frame: ShownFrame,
+        rows: Bool[np.ndarray, "M"],
+        rgb: Float[np.ndarray, "M 3"],
+        choice: Choice,
+    ) -> None:
+        """Replaces the Gaussians by those of the marked rows."""
+        if choice.drawn_as == "points" or not rows.any():
+            handle = self._scene.add_point_cloud(
+                "/points", frame.means[rows], rgb[rows],
+                point_size=_POINT_M, point_shape="circle", precision="float32",
+            )  # fmt: skip
+        else:
+            opacities = np.minimum(frame.opacities[rows] * choice.brightness, 1.0)
+            handle = self._scene.add_gaussian_splats(
+                "/splats", frame.means[rows], frame.covariances[rows], rgb[rows],
+                opacities[:, None],
+            )  # fmt: skip
+        self._replace("gaussians", handle)
+
+    def draw_truth(self, truth: Mesh | None) -> None:
+        """Replaces the true surface of what moves."""
+        if truth is not None:
+            handle = self._scene.add_mesh_simple(
+                "/truth", truth.vertices, truth.faces, color=_TRUTH, opacity=0.4, side="double"
+            )
+            self._groups["truth"] = [handle]
+
+    def draw_room(self, room: Room) -> None:
+        """Draws what stands still."""
+        self._groups["room"] = []
+        if len(room.low.faces):
+            low = self._scene.add_mesh_simple(
+                "/room/low", room.low.vertices, room.low.faces, color=_ROOM, side="double",
+                flat_shading=True, cast_shadow=False, receive_shadow=False,
+            )  # fmt: skip
+            self._groups["room"].append(low)
+        if len(room.edges):
+            edges = self._scene.add_line_segments(
+                "/room/edges", room.edges, _EDGE, thickness=1.0, thickness_units="screen"
+            )
+            self._groups["room"].append(edges)
+
+    def draw_radios(self, radio: RadioShapes) -> None:
+        """Draws elements, boresights, names and links."""
+        ends = radio.places + _BORESIGHT_M * radio.boresights
+        arrows = np.stack([radio.places, ends], axis=1)
+        self._groups["radios"] = [
+            self._scene.add_arrows(
+                "/radios/boresights", arrows, (235, 235, 235),
+                shaft_radius=0.01, head_radius=0.03, head_length=0.08,
+            ),
+            *self._elements("tx", radio.tx_xyz, _TX),
+            *self._elements("rx", radio.rx_xyz, _RX),
+            *(
+                self._scene.add_label(
+                    f"/radios/names/{index}", name, position=place, anchor="bottom-center",
+                    font_screen_scale=0.8,
+                )
+                for index, (name, place) in enumerate(zip(radio.names, radio.places, strict=True))
+            ),
+        ]  # fmt: skip
+        self._groups["links"] = []
+        if len(radio.links):
+            colors = np.where(radio.held_out[:, None, None], _HELD_OUT, _LINK)
+            lines = self._scene.add_line_segments(
+                "/links", radio.links, np.repeat(colors, 2, axis=1).astype(np.uint8),
+                thickness=_LINE_PX, thickness_units="screen",
+            )  # fmt: skip
+            self._groups["links"] = [lines]
+
+    def draw_cameras(self, cameras: list[Camera]) -> None:
+        """Draws a frustum per camera; a click looks through it."""
+        self._groups["cameras"] = []
+        for camera in cameras:
+            frustum = self._scene.add_camera_frustum(
+                f"/cameras/{camera.name}", _fov_rad(camera), camera.width / camera.height,
+                scale=0.15, color=(200, 200, 90), wxyz=_wxyz(camera), position=camera.position_m,
+            )  # fmt: skip
+            frustum.on_click(lambda event, eye=camera: self.look_through(event.client, eye))
+            self._groups["cameras"].append(frustum)
+
+    def look_through(self, client: ClientHandle, camera: Camera) -> None:
+        """Moves the view of one client into a camera."""
+        with client.atomic():
+            client.camera.wxyz = _wxyz(camera)
+            client.camera.position = camera.position_m
+            client.camera.fov = _fov_rad(camera)
+
+    def set_visible(self, choice: Choice) -> None:
+        """Shows and hides groups as chosen."""
+        for name in ("truth", "room", "radios", "links", "cameras"):
+            for handle in self._groups.get(name, []):
+                handle.visible = getattr(choice, name)
+
+    def _replace(self, group: str, handle: Any) -> None:
+        for old in self._groups.get(group, []):
+            if old.name != handle.name:
+                old.remove()
+        self._groups[group] = [handle]
+
+    def _elements(self, name: str, places: np.ndarray, color: tuple[int, int, int]) -> list[Any]:
+        return [
+            self._scene.add_point_cloud(
+                f"/radios/{name}", places, color,
+                point_size=_POINT_M, point_shape="square", precision="float32",
+            )
+        ]  # fmt: skip
+
+
+def _fov_rad(camera: Camera) -> float:
+    """Vertical field of view."""
+    return float(2.0 * np.arctan2(camera.height / 2.0, camera.fl_y))
+
+
+def _wxyz(camera: Camera) -> Float[np.ndarray, "4"]:
+    """Rotation world from view axes (+x right, +y down, +z forward), w first."""
+    from viser.transforms import SO3
+
+    return SO3.from_matrix(camera.view_from_world[:3, :3].T).wxyz

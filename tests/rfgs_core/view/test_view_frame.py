@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a frame holds: values of known Gaussians, distances to a sphere, thresholds."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rfgs_core.errors import RfgsError
+from rfgs_core.render.view import fitted_shader
+from rfgs_core.run import Run
+from rfgs_core.view.frame import ShownFrame, distance_m, load_frame
+from rfgs_core.view.pictures import WIDTH_PX, beside_true
+from rfgs_core.view.radios import radio_shapes
+from rfgs_core.view.room import cut_open, room_of
+from rfgs_core.view.viewer import finished_frames
+
+#: Static Gaussians of the run, and how far its moving ones stand outside the true sphere [m].
+STATIC = 3
+OUTSIDE_M = np.array([0.0, 0.05, 0.1, 0.5])
+
+
+@pytest.fixture(scope="module")
+def shown(known_run: Run) -> ShownFrame:
+    return load_frame(known_run, 1, fitted_shader(known_run))
+
+
+def test_values_stand_behind_unknown_ones_of_the_static_set(
+    known_run: Run, shown: ShownFrame
+) -> None:
+    gaussians = known_run.gaussians(1)
+    np.testing.assert_array_equal(shown.means, gaussians.means.numpy())
+    np.testing.assert_allclose(shown.opacities, gaussians.opacities.numpy(), rtol=1e-6)
+    round_one = np.broadcast_to(0.05**2 * np.eye(3), shown.covariances.shape)
+    np.testing.assert_allclose(shown.covariances, round_one, atol=1e-8)
+    shader = fitted_shader(known_run)
+    assert shader is not None
+    np.testing.assert_allclose(shown.rgb, shader.colors(gaussians.features).numpy(), atol=1e-6)
+    for values in (shown.power_db, shown.phase_rad, shown.error_m):
+        assert np.isnan(values[:STATIC]).all()
+        assert np.isfinite(values[STATIC:]).all()
+    assert shown.power_db[[STATIC, -1]].tolist() == [-90.0, -60.0]
+    phase_rad = np.linspace(-np.pi, np.pi, len(shown) - STATIC, endpoint=False)
+    # The first lies on the cut between −π and π.
+    np.testing.assert_allclose(shown.phase_rad[STATIC + 1 :], phase_rad[1:], atol=1e-4)
+
+
+def test_error_is_the_distance_to_the_true_surface(shown: ShownFrame) -> None:
+    expected = np.resize(OUTSIDE_M, len(shown) - STATIC)
+    too_far = shown.error_m[STATIC:] - expected
+    # The nearest point of the mesh is a corner. Of n samples on the area A, none is within r
+    # of it with probability exp(−n π r² / A): 1e-7 for 17 mm, less where half the disc is cut.
+    assert too_far.min() > -1e-5
+    assert too_far.max() < 0.017 and too_far.mean() < 0.004
+
+
+def test_the_truth_moves_with_the_frame(known_run: Run, shown: ShownFrame) -> None:
+    other = load_frame(known_run, 2, None)
+    assert shown.truth is not None and other.truth is not None
+    shift = other.truth.vertices.mean(axis=0) - shown.truth.vertices.mean(axis=0)
+    np.testing.assert_allclose(shift, [0.2, 0.0, 0.0], atol=1e-5)
+    np.testing.assert_array_equal(other.rgb, 0.5)
+
+
+def test_without_truth_no_distance_is_claimed() -> None:
+    assert np.isnan(distance_m(np.zeros((4, 3)), None)).all()
+
+
+@pytest.mark.parametrize("least", [0.0, 0.3, 0.8, 0.95])
+def test_the_opacity_threshold_hides_the_thinner_ones(shown: ShownFrame, least: float) -> None:
+    expected = np.concatenate([np.full(STATIC, 0.9), np.linspace(0.1, 0.8, len(shown) - STATIC)])
+    np.testing.assert_array_equal(shown.rows(least - 1e-6), expected >= least - 1e-6)
+
+
+def test_the_power_threshold_keeps_what_it_cannot_judge(shown: ShownFrame) -> None:
+    rows = shown.rows(0.0, -70.0)
+    assert rows[:STATIC].all()
+    np.testing.assert_array_equal(rows[STATIC:], shown.power_db[STATIC:] >= -70.0)
+
+
+def test_an_unfinished_run_shows_its_finished_frames(known_run: Run, tmp_path: Path) -> None:
+    (tmp_path / "gaussians").mkdir()
+    run = replace(known_run, path=tmp_path)
+    with pytest.raises(RfgsError, match="no frame has been fitted yet"):
+        finished_frames(run)
+    shutil.copy(known_run.ply_path(2), run.ply_path(2))
+    assert finished_frames(run) == [2]
+
+
+def test_links_and_boresights_follow_the_layout(known_run: Run) -> None:
+    sequence = known_run.sequence
+    radio, elements = radio_shapes(sequence, "wifi"), sequence.layout("wifi")
+    assert radio.names == [device.name for device in sequence.devices("wifi")]
+    centre = sequence.bounds_m.mean(axis=0)
+    # Devices in corners face the room.
+    assert (np.einsum("ij,ij->i", radio.boresights, centre - radio.places) > 0.0).all()
+    np.testing.assert_allclose(np.linalg.norm(radio.boresights, axis=1), 1.0)
+    assert radio.links.shape == (12, 2, 3)
+    np.testing.assert_allclose(radio.links[0, 0], elements.tx_xyz[0], atol=1e-12)
+    mean = elements.rx_xyz[elements.rx_device == 1].mean(axis=0)
+    np.testing.assert_allclose(radio.links[0, 1], mean)
+    # One unordered pair is hidden from training.
+    assert radio.held_out.sum() == 2
+    first, second = radio.links[radio.held_out]
+    np.testing.assert_allclose(first[:, :2], second[::-1, :2], atol=1e-9)
+
+
+def test_a_box_is_cut_open_to_its_floor_and_twelve_edges(known_run: Run) -> None:
+    room = room_of(known_run.sequence)
+    assert room is not None
+    corners = room.low.vertices[room.low.faces]
+    assert len(corners) == 2 and (corners[..., 2] == 0.0).all()
+    lengths = np.sort(np.linalg.norm(room.edges[:, 1] - room.edges[:, 0], axis=1))
+    np.testing.assert_allclose(lengths, [2.5] * 4 + [3.0] * 8, rtol=1e-6)
+
+
+def test_a_smooth_mesh_has_no_edges(shown: ShownFrame) -> None:
+    assert shown.truth is not None
+    assert len(cut_open(shown.truth).edges) == 0
+
+
+def test_the_rendered_picture_stands_left_of_the_true_one(known_run: Run) -> None:
+    seen = {
+        row["name"]: beside_true(known_run, row["name"], 1) for row in known_run.sequence.cameras
+    }
+    held = known_run.sequence.splits["images"]
+    for name, beside in seen.items():
+        unseen = name in held["test_cameras"] or 1 in held["test_frames"]
+        assert beside.caption.endswith("never saw it" if unseen else "was fitted to it")
+    picture = seen["cam00"].picture
+    assert picture.shape[1] >= WIDTH_PX
+    # The gap is white and the true half holds the ball, which is red.
+    width = picture.shape[1]
+    assert (picture[:, width // 2] > 240).all()
+    true = picture[:, width // 2 + width // 26 :].astype(int)
+    assert ((true[..., 0] > 150) & (true[..., 1] < 100)).any()

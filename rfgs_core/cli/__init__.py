@@ -12,6 +12,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "train": ("train", "TrainArgs"),
     "eval": ("eval", "EvalArgs"),
     "render": ("render", "RenderArgs"),
+    "pose": ("pose", "PoseArgs"),
     "export": ("export", "ExportArgs"),
     "view": ("view", "ViewArgs"),
     "report": ("report", "ReportArgs"),

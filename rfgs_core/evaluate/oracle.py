@@ -23,6 +23,7 @@ from rfgs_core.train.observations import Observations, observe
 from rfgs_core.train.refine import refine
 from rfgs_core.train.sampling import encode
 from rfgs_core.train.start import gaussians_at
+from rfgs_core.train.tracks import Tracks
 
 
 def start_on_surface(
@@ -40,7 +41,7 @@ def start_on_surface(
         gaussians=replace(gaussians, features=features),
         power=power,
         head=head,
-        axes_xy=points[:, :2].mean(axis=0, keepdims=True),
+        tracks=Tracks.begun(points[:, :2].mean(axis=0, keepdims=True), observations.time_s),
         track_id=np.arange(len(points), dtype=np.int64),
     )
 

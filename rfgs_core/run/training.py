@@ -27,11 +27,14 @@ from rfgs_core.train.head import HEAD_SHAPES, RadioHead
 from rfgs_core.train.observations import need_still_antennas, observe
 from rfgs_core.train.parameters import GAUSSIAN_SHAPES
 from rfgs_core.train.refine import refine
+from rfgs_core.train.tracks import Tracks
 
 _CHECKPOINT: dict[str, Shape] = {
     **GAUSSIAN_SHAPES,
     "power": ("M",),
     "axes_xy": ("body", 2),
+    "velocity_xy": ("body", 2),
+    "time_s": (),
     "track_id": ("M",),
     **{f"head.{name}": shape for name, shape in HEAD_SHAPES.items()},
 }
@@ -140,6 +143,7 @@ def _store(run: Run, frame: int, state: FrameState) -> None:
             "gamma": gamma[:, None],
             "rf_power_db": power_db,
             "track_id": state.track_id,
+            "body": state.body,
         },
     )
     static = run.path / "gaussians" / "static.ply"
@@ -148,7 +152,8 @@ def _store(run: Run, frame: int, state: FrameState) -> None:
     head = state.head.arrays()
     save_arrays(run.path / "radio_head.npz", head)
     arrays = {name: value.numpy() for name, value in state.gaussians.items()}
-    arrays |= {"power": state.power.numpy(), "axes_xy": state.axes_xy, "track_id": state.track_id}
+    arrays |= {"power": state.power.numpy(), "track_id": state.track_id}
+    arrays |= {name: np.asarray(value) for name, value in asdict(state.tracks).items()}
     save_arrays(_state_path(run, frame), {**arrays, **{f"head.{k}": v for k, v in head.items()}})
     (run.path / "checkpoints" / f"{frame:06d}.partial.npz").unlink(missing_ok=True)
 
@@ -158,13 +163,13 @@ def _finished(run: Run, frame: int) -> FrameState | None:
     path = _state_path(run, frame)
     if not path.exists():
         return None
-    arrays = load_arrays(path, "delete it to fit this frame again", _CHECKPOINT)
+    arrays = load_arrays(path, "delete it to fit this frame again", _CHECKPOINT, ("velocity_xy",))
     fields = {name: torch.from_numpy(arrays[name]) for name in GAUSSIAN_SHAPES}
     return FrameState(
         gaussians=Gaussians(**fields),
         power=torch.from_numpy(arrays["power"]),
         head=RadioHead.of_arrays(arrays, "head."),
-        axes_xy=arrays["axes_xy"],
+        tracks=Tracks(arrays["axes_xy"], arrays["velocity_xy"], float(arrays["time_s"])),
         track_id=arrays["track_id"],
     )
 

@@ -28,8 +28,10 @@ from rfgs_core.train.start import (
     draw_points,
     gaussians_at,
     log_density,
+    nearest_axis,
     outward_normals,
 )
+from rfgs_core.train.tracks import Tracks
 
 #: Range resolution that tells limbs from a trunk [m].
 LIMB_M = 0.1
@@ -47,10 +49,16 @@ class FrameState:
     """Reflected power of each, the prior variance of its reflectivity [m²]."""
     head: RadioHead
     """Decodes reflectivity and ρ from the features."""
-    axes_xy: Float64[np.ndarray, "body 2"]
-    """Ground positions of the bodies [m]."""
+    tracks: Tracks
+    """Where the bodies are and how they move."""
     track_id: Int64[np.ndarray, "M"]
     """Number that a Gaussian keeps from frame to frame."""
+
+    @property
+    def body(self) -> Int64[np.ndarray, "M"]:
+        """Body that each Gaussian belongs to: the one whose axis is nearest."""
+        means = self.gaussians.means.numpy().astype(np.float64)
+        return nearest_axis(means, self.tracks.axes_xy)
 
     @property
     def gamma(self) -> Complex[Tensor, "M"]:
@@ -154,8 +162,8 @@ def start_frame(
         )
     rng = np.random.default_rng(seed)
     maps = pair_maps(observations)
-    near = None if before is None else before.axes_xy
-    axes_xy = locate_bodies(maps, observations.bounds_m, config.bodies, near)
+    tracks = _followed(before, maps, observations, config.bodies)
+    axes_xy = tracks.axes_xy
     points = draw_points(maps, axes_xy, observations.bounds_m, config.num_gaussians, rng)
     track_id = np.arange(len(points), dtype=np.int64)
     if before is not None:
@@ -165,7 +173,18 @@ def start_frame(
     head = before.head if before is not None else new_head(observations, config, power)
     features = head.without_readings(encode(observations, points, encoder).features)
     gaussians = replace(gaussians, features=features)
-    return FrameState(gaussians, power, head, axes_xy, track_id)
+    return FrameState(gaussians, power, head, tracks, track_id)
+
+
+def _followed(
+    before: FrameState | None, maps: PairMaps, observations: Observations, bodies: int
+) -> Tracks:
+    """Finds the bodies, anywhere in a first frame, where they are expected in a later one."""
+    bounds_m, time_s = observations.bounds_m, observations.time_s
+    if before is None:
+        return Tracks.begun(locate_bodies(maps, bounds_m, bodies), time_s)
+    near, reach_m = before.tracks.expected(time_s)
+    return before.tracks.moved(locate_bodies(maps, bounds_m, bodies, near, reach_m), time_s)
 
 
 def _carry_over(
@@ -176,8 +195,7 @@ def _carry_over(
 ) -> tuple[Float64[np.ndarray, "M 3"], Int64[np.ndarray, "M"]]:
     """Moves the earlier Gaussians with their bodies; the least supported third is fresh."""
     points = before.gaussians.means.numpy().astype(np.float64)
-    nearest = np.linalg.norm(points[:, None, :2] - before.axes_xy[None], axis=2).argmin(axis=1)
-    points[:, :2] += (axes_xy - before.axes_xy)[nearest]
+    points[:, :2] += (axes_xy - before.tracks.axes_xy)[before.body]
     support = log_density(maps, axes_xy, points)
     count = min(len(points) // 3, len(fresh))
     weakest = np.argsort(support)[:count]

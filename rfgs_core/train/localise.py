@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Float64
 from scipy.ndimage import gaussian_filter, map_coordinates
+from scipy.optimize import linear_sum_assignment
 
 from rfgs_core.encode.matched_filter import matched_filter_map
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
@@ -24,6 +25,10 @@ BODY_RADIUS_M = 0.12
 BODY_HEIGHTS_M = (0.15, 1.65)
 #: Steepness of the step from the lit to the dark side, per unit of cosine.
 SHARPNESS = 6.0
+#: Distance of neighbouring places that are tried [m].
+GROUND_STEP_M = 0.04
+#: A single body is looked for this far around the strongest column of the map [m].
+FIRST_REACH_M = 0.8
 #: Two bodies stand at least this far apart [m].
 SEPARATION_M = 0.4
 
@@ -122,29 +127,41 @@ def locate_bodies(
     bounds_m: Float64[np.ndarray, "2 3"],
     count: int = 1,
     near: Float[np.ndarray, "count 2"] | None = None,
+    reach_m: Float[np.ndarray, "count"] | float = FIRST_REACH_M,
 ) -> Float64[np.ndarray, "count 2"]:
     """Ground positions of upright bodies.
+
+    All bodies are found together and then told apart: one after the other, the first could take
+    the place of the second.
 
     Args:
         maps: Matched-filter maps of the frame.
         bounds_m: Scene bounds [m].
         count: How many bodies there are.
-        near: Positions in the previous frame; each body is then searched within 0.8 m.
+        near: Where each body is expected; None for anywhere.
+        reach_m: How far around each of `near` to look [m].
 
     Returns:
-        One position per body [m], in the order of `near` or of falling score.
+        One position per body [m], in the order of `near` (least sum of squared distances to
+        it) or of falling score.
     """
-    step = 0.04
-    taken: list[np.ndarray] = []
-    for body in range(count):
-        start = _column_peak(maps) if near is None else near[body]
-        reach = 0.8 if near is not None or count == 1 else 20.0
-        low = np.maximum(start - reach, bounds_m[0, :2] + BODY_RADIUS_M)
-        high = np.minimum(start + reach, bounds_m[1, :2] - BODY_RADIUS_M)
-        axes = [np.arange(low[k], high[k] + 1e-9, step) for k in range(2)]
-        ground = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-        score = _visible_side_score(maps, ground, float(bounds_m[0, 2]))
-        for other in taken:
-            score[np.linalg.norm(ground - other, axis=1) < SEPARATION_M] = -np.inf
+    low, high = bounds_m[:, :2] + np.array([[BODY_RADIUS_M], [-BODY_RADIUS_M]])
+    axes = [np.arange(low[k], high[k] + 1e-9, GROUND_STEP_M) for k in range(2)]
+    ground = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    around = near
+    if around is None and count == 1:
+        around = _column_peak(maps)[None]
+    if around is not None:
+        apart = np.linalg.norm(ground[:, None] - around, axis=2)
+        # Of a reach that holds no ground, the nearest point of it.
+        ground = ground[(apart <= np.maximum(reach_m, apart.min(axis=0))).any(axis=1)]
+    score = _visible_side_score(maps, ground, float(bounds_m[0, 2]))
+    taken = []
+    for _ in range(count):
         taken.append(ground[int(score.argmax())])
-    return np.array(taken)
+        score[np.linalg.norm(ground - taken[-1], axis=1) < SEPARATION_M] = -np.inf
+    found = np.array(taken)
+    if near is None:
+        return found
+    body, place = linear_sum_assignment(np.sum((near[:, None] - found) ** 2, axis=2))
+    return found[place[np.argsort(body)]]

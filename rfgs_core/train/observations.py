@@ -36,6 +36,8 @@ class Observations:
     """Tone frequencies [Hz], equally spaced."""
     bounds_m: Float64[np.ndarray, "2 3"]
     """Scene bounds [m]."""
+    time_s: float = 0.0
+    """When the frame was taken [s]."""
 
     @property
     def centre_hz(self) -> float:
@@ -118,4 +120,5 @@ def observe(
         layout=elements,
         freq_hz=np.asarray(data["freq_hz"].values, dtype=np.float64),
         bounds_m=np.asarray(sequence.bounds_m, dtype=np.float64),
+        time_s=sequence.time_s(frame),
     )

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import torch
-from jaxtyping import Float, Float64
+from jaxtyping import Float, Float64, Int64
 from torch import Tensor
 
 from rfgs_core.gaussians import FEATURE_DIM, Gaussians
@@ -39,13 +39,18 @@ def log_density(
     return prior + EVIDENCE_EXPONENT * evidence
 
 
+def nearest_axis(
+    points: Float[np.ndarray, "N 3"], axes_xy: Float[np.ndarray, "body 2"]
+) -> Int64[np.ndarray, "N"]:
+    """Which body axis is nearest to each point, seen from above."""
+    return np.linalg.norm(points[:, None, :2] - axes_xy[None], axis=2).argmin(axis=1)
+
+
 def outward_normals(
     points: Float[np.ndarray, "N 3"], axes_xy: Float[np.ndarray, "body 2"]
 ) -> Float64[np.ndarray, "N 3"]:
     """Horizontal directions away from the nearest body axis."""
-    offset = points[:, None, :2] - axes_xy[None]
-    nearest = np.linalg.norm(offset, axis=2).argmin(axis=1)
-    flat = offset[np.arange(len(points)), nearest]
+    flat = points[:, :2] - axes_xy[nearest_axis(points, axes_xy)]
     flat = flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-9)
     return np.concatenate([flat, np.zeros((len(points), 1))], axis=1)
 

@@ -127,7 +127,7 @@ def test_later_frames_move_the_earlier_gaussians(tiny_dataset: Path, quick_confi
     kept = np.isin(second.track_id, first.track_id)
     assert kept.sum() == 40 - 13
     moved = (second.gaussians.means - first.gaussians.means).numpy()[kept]
-    shift = (second.axes_xy - first.axes_xy)[0]
+    shift = (second.tracks.axes_xy - first.tracks.axes_xy)[0]
     np.testing.assert_allclose(moved[:, :2], np.tile(shift, (len(moved), 1)), atol=1e-5)
     np.testing.assert_allclose(moved[:, 2], 0, atol=1e-6)
     assert second.head is first.head

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`rfgs pose`: tracks and joints of the people in a run."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+
+@dataclass(frozen=True)
+class PoseArgs:
+    """Fits a 17-joint body to each person's Gaussians and writes RUN/pose.npz and RUN/pose.png.
+
+    The errors are printed beside those of a standing body of average height at the same place,
+    which knows nothing of the limbs: only what beats it was seen by radio. RUN/pose.json holds
+    them.
+    """
+
+    run: tyro.conf.Positional[Path]
+    """Folder of a trained run."""
+
+
+def run(args: PoseArgs) -> int:
+    """Prints the errors; exit code 0."""
+    from tqdm import tqdm
+
+    from rfgs_core.arrays import save_arrays
+    from rfgs_core.files import write_json
+    from rfgs_core.pose import estimate_poses, score_poses
+    from rfgs_core.report.pose_chart import write_pose_chart
+    from rfgs_core.run import open_run
+
+    trained = open_run(args.run)
+    with tqdm(total=len(trained.frames) * trained.config["bodies"], desc="pose") as bar:
+        estimate = estimate_poses(trained, bar.update)
+    scores = score_poses(estimate, trained.sequence)
+    arrays = {name: getattr(estimate, name) for name in ("time_s", "centroid", "joints")}
+    save_arrays(args.run / "pose.npz", {"frames": estimate.frames, **arrays})
+    write_json(args.run / "pose.json", scores)
+    truth = [trained.sequence.joints(frame) for frame in estimate.frames]
+    write_pose_chart(args.run / "pose.png", estimate, truth)
+    for name in ("fit", "standing"):
+        own = scores[name]
+        if own["mpjpe_m"] is None:
+            sys.stdout.write("this scene does not tell its people's joints: no error is known\n")
+            break
+        sys.stdout.write(
+            f"{name:<9} joints {own['mpjpe_m']:.3f} m, with the pelvis in place "
+            f"{own['aligned_m']:.3f} m\n"
+        )
+    else:
+        sys.stdout.write(
+            f"tracked {scores['tracked']:.2f}, identity kept {scores['identity_kept']:.2f}\n"
+        )
+    sys.stdout.write(f"{args.run / 'pose.png'} written\n")
+    return 0

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tracks and poses of all people of a run, from its moving Gaussians alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float64
+
+from rfgs_core.errors import RfgsError
+from rfgs_core.pose.body import index_of, joints_of
+from rfgs_core.pose.fit import Cloud, fit_body, standing
+from rfgs_core.run import Run
+from rfgs_core.seeds import sub_seed
+
+#: Slower people may walk any way [m/s].
+WALKING_M_S = 0.3
+#: Frames further apart than this say nothing about where somebody walks [s].
+LONGEST_STEP_S = 2.0
+
+
+@dataclass(frozen=True)
+class PoseEstimate:
+    """What a run says about its people; a body keeps its place from frame to frame."""
+
+    frames: list[int]
+    """Frames."""
+    time_s: Float64[np.ndarray, "frame"]
+    """Their times [s]."""
+    centroid: Float64[np.ndarray, "frame body 3"]
+    """Centroid of each body's Gaussians [m]."""
+    joints: Float64[np.ndarray, "frame body 17 3"]
+    """Fitted joints [m]."""
+    standing: Float64[np.ndarray, "frame body 17 3"]
+    """Joints of the control: a standing body of average height at the same centroid, which
+    looks where the track leads [m]."""
+
+
+def estimate_poses(run: Run, on_step: Callable[[], Any] = lambda: None) -> PoseEstimate:
+    """Fits one body to each person's Gaussians in every frame.
+
+    Raises:
+        RfgsError: The run does not say which Gaussian belongs to whom.
+    """
+    sequence = run.sequence
+    floor_m = float(np.asarray(sequence.bounds_m)[0, 2])
+    clouds = [_clouds(run, frame, floor_m) for frame in run.frames]
+    time_s = np.array([sequence.time_s(frame) for frame in run.frames])
+    centroid = np.array([[cloud.centre for cloud in row] for row in clouds])
+    joints = np.zeros((*centroid.shape[:2], 17, 3))
+    control = np.zeros_like(joints)
+    for body in range(centroid.shape[1]):
+        headings = headings_of(time_s, centroid[:, body, :2])
+        before = None
+        for k, frame in enumerate(run.frames):
+            cloud, seed = clouds[k][body], sub_seed(0, "pose", frame, body)
+            elapsed_s = float(time_s[k] - time_s[k - 1]) if k else 0.0
+            found = fit_body(cloud, headings[k], before, elapsed_s, seed)
+            before = found.parameters
+            joints[k, body] = joints_of(found.parameters, floor_m)
+            # Of a body at rest the control is told the fit's own heading.
+            own = float(found.parameters[index_of("heading")])
+            looks = headings[k][0] if len(headings[k]) == 1 else own
+            control[k, body] = joints_of(standing(cloud, looks), floor_m)
+            on_step()
+    return PoseEstimate(list(run.frames), time_s, centroid, joints, control)
+
+
+def headings_of(
+    time_s: Float64[np.ndarray, "frame"], track_xy: Float64[np.ndarray, "frame 2"]
+) -> list[list[float]]:
+    """Where somebody may look in each frame [rad]: along the track, or four ways at rest."""
+    result = []
+    for k in range(len(time_s)):
+        first, last = max(k - 1, 0), min(k + 1, len(time_s) - 1)
+        elapsed_s = float(time_s[last] - time_s[first])
+        moved = track_xy[last] - track_xy[first]
+        walks = 0.0 < elapsed_s <= LONGEST_STEP_S * (last - first)
+        if walks and np.linalg.norm(moved) > WALKING_M_S * elapsed_s:
+            result.append([float(np.arctan2(moved[1], moved[0]))])
+        else:
+            result.append([0.0, 0.5 * np.pi, np.pi, -0.5 * np.pi])
+    return result
+
+
+def _clouds(run: Run, frame: int, floor_m: float) -> list[Cloud]:
+    """Moving Gaussians of a frame, one cloud per body."""
+    attributes = run.attributes(frame)
+    if "body" not in attributes:
+        raise RfgsError(
+            f"{run.path}: frame {frame} does not say which Gaussian belongs to which body; train "
+            "this run again"
+        )
+    body, means = attributes["body"], run.moving(frame).means.numpy().astype(np.float64)
+    power = 10.0 ** (attributes["rf_power_db"].astype(np.float64) / 10.0)
+    clouds = []
+    for number in range(run.config["bodies"]):
+        own = body == number
+        if not own.any():
+            raise RfgsError(
+                f"{run.path}: no Gaussian of frame {frame} belongs to body {number}; train with "
+                "more --gaussians"
+            )
+        clouds.append(Cloud(means[own], power[own], floor_m))
+    return clouds

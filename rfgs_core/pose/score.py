@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Estimated people held against the true ones: joint errors, tracks and identities."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float64, Int64
+from scipy.optimize import linear_sum_assignment
+
+from rfgs_core.dataset import Sequence
+from rfgs_core.pose.estimate import PoseEstimate
+from rfgs_core.skeleton import JOINTS
+
+#: A body further than this from everybody has lost its person [m].
+LOST_M = 0.5
+
+
+def score_poses(estimate: PoseEstimate, sequence: Sequence) -> dict[str, Any]:
+    """Errors of joints and tracks, beside the standing control.
+
+    Bodies are matched to people frame by frame by the distance on the ground between pelvis and
+    pelvis. `mpjpe_m` is the mean distance per joint, `aligned_m` the same with pelvis on pelvis;
+    `identity_kept` is the share of matches with the person that a body had at first, and
+    `tracked` the share of people with their body within half a metre. Values are None where no
+    joint is known.
+    """
+    truth = [sequence.joints(frame).astype(np.float64) for frame in estimate.frames]
+    matches = [_matched(estimate.joints[k], true) for k, true in enumerate(truth)]
+    people = sum(int(np.isfinite(true[:, 0]).all(axis=1).sum()) for true in truth)
+    result: dict[str, Any] = {"frames": len(estimate.frames), "people": people}
+    for name, joints in (("fit", estimate.joints), ("standing", estimate.standing)):
+        result[name] = _errors(joints, truth, matches)
+    distance = [
+        np.linalg.norm(estimate.joints[k, body, 0, :2] - truth[k][person, 0, :2])
+        for k, row in enumerate(matches)
+        for body, person in row
+    ]
+    result["tracked"] = float(np.sum(np.array(distance) < LOST_M) / people) if people else None
+    result["identity_kept"] = _identity_kept(matches)
+    return result
+
+
+def _matched(
+    joints: Float64[np.ndarray, "body 17 3"], truth: Float64[np.ndarray, "person 17 3"]
+) -> Int64[np.ndarray, "match 2"]:
+    """Body and person of each match."""
+    known = np.flatnonzero(np.isfinite(truth[:, 0]).all(axis=1))
+    offset = joints[:, None, 0, :2] - truth[known, 0, :2]
+    body, person = linear_sum_assignment(np.linalg.norm(offset, axis=2))
+    return np.stack([body, known[person]], axis=1)
+
+
+def _errors(
+    joints: Float64[np.ndarray, "frame body 17 3"],
+    truth: list[Float64[np.ndarray, "person 17 3"]],
+    matches: list[Int64[np.ndarray, "match 2"]],
+) -> dict[str, Any]:
+    """Mean joint errors, as they are and with the pelvis in place, and those of each joint."""
+    offsets = [
+        joints[k, body] - truth[k][person] for k, row in enumerate(matches) for body, person in row
+    ]
+    if not offsets:
+        return {"mpjpe_m": None, "aligned_m": None, "joints_m": None}
+    offset = np.array(offsets)
+    each = np.linalg.norm(offset, axis=2)
+    aligned = np.linalg.norm(offset - offset[:, :1], axis=2)
+    return {
+        "mpjpe_m": float(each.mean()),
+        "aligned_m": float(aligned.mean()),
+        "joints_m": {name: float(each[:, j].mean()) for j, name in enumerate(JOINTS)},
+    }
+
+
+def _identity_kept(matches: list[Int64[np.ndarray, "match 2"]]) -> float | None:
+    """Share of matches with the person that the body was matched to first."""
+    first: dict[int, int] = {}
+    kept = [first.setdefault(body, person) == person for row in matches for body, person in row]
+    return float(np.mean(kept)) if kept else None

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A body keeps its bones, is found again in a cloud around it, and errors are what they are."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from rfgs_core.pose.body import (
+    BONES,
+    PARAMETERS,
+    RADIUS_M,
+    distance_to_bones,
+    index_of,
+    joints_of,
+)
+from rfgs_core.pose.estimate import PoseEstimate, headings_of
+from rfgs_core.pose.fit import Cloud, fit_body, standing
+from rfgs_core.pose.score import score_poses
+from rfgs_core.skeleton import JOINTS
+
+STRIDE = {
+    "x": 1.0,
+    "y": -0.5,
+    "height": 1.78,
+    "heading": 0.7,
+    "sink": 0.04,
+    "left_hip": 0.5,
+    "right_hip": -0.35,
+    "left_knee": 0.1,
+    "right_knee": 0.5,
+    "left_shoulder": -0.5,
+    "right_shoulder": 0.6,
+    "left_elbow": 0.2,
+    "right_elbow": 0.5,
+}
+
+
+def parameters(**values: float) -> np.ndarray:
+    """A body with the given parameters and zeros elsewhere."""
+    return np.array([values.get(name, 0.0) for name in PARAMETERS])
+
+
+def around(joints: np.ndarray, count: int, seed: int = 0) -> np.ndarray:
+    """Points on the surface around the bones."""
+    rng = np.random.default_rng(seed)
+    length = np.linalg.norm(joints[BONES[:, 1]] - joints[BONES[:, 0]], axis=1)
+    area = length * RADIUS_M
+    bone = rng.choice(len(BONES), count, p=area / area.sum())
+    start, end = joints[BONES[bone, 0]], joints[BONES[bone, 1]]
+    along = (end - start) / length[bone, None]
+    across = np.cross(along, rng.normal(size=(count, 3)))
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    return start + rng.uniform(size=(count, 1)) * (end - start) + RADIUS_M[bone, None] * across
+
+
+def test_a_standing_body_has_its_proportions() -> None:
+    joints = joints_of(parameters(height=2.0), floor_m=0.1)
+    place = dict(zip(JOINTS, joints, strict=True))
+    assert place["pelvis"] == pytest.approx([0.0, 0.0, 0.1 + 1.06])
+    assert place["left_ankle"][2] == pytest.approx(0.1 + 0.078)
+    # Looking along x, left is along y; arms hang.
+    assert place["left_shoulder"] == pytest.approx([0.0, 0.259, 0.1 + 1.636])
+    assert place["right_wrist"] == pytest.approx([0.0, -0.259, 0.1 + 1.636 - 2 * 0.332])
+
+
+def test_bones_keep_their_length_in_every_pose() -> None:
+    still = joints_of(parameters(height=1.78), 0.0)
+    moving = joints_of(parameters(**STRIDE, pitch=0.3, roll=-0.2), 0.0)
+
+    def lengths(joints: np.ndarray) -> np.ndarray:
+        return np.linalg.norm(joints[BONES[:, 1]] - joints[BONES[:, 0]], axis=1)
+
+    np.testing.assert_allclose(lengths(moving), lengths(still), rtol=1e-12)
+    # The left leg swings ahead along the heading.
+    ahead = np.array([np.cos(0.7), np.sin(0.7)])
+    knee = moving[JOINTS.index("left_knee"), :2] - moving[JOINTS.index("left_hip"), :2]
+    assert knee @ ahead == pytest.approx(0.245 * 1.78 * np.sin(0.5))
+
+
+def test_distance_to_a_bone_is_that_to_a_capsule() -> None:
+    joints = joints_of(parameters(height=1.7), 0.0)
+    shank = int(np.flatnonzero(BONES[:, 1] == JOINTS.index("left_ankle"))[0])
+    ankle = joints[JOINTS.index("left_ankle")]
+    points = np.array([ankle + np.array([0.2, 0.0, 0.1]), ankle - np.array([0.0, 0.0, 0.3])])
+    found = distance_to_bones(points, joints)[:, shank]
+    np.testing.assert_allclose(found, np.array([0.2, 0.3]) - RADIUS_M[shank], atol=1e-12)
+
+
+def test_a_stride_is_found_in_its_own_cloud() -> None:
+    truth = parameters(**STRIDE)
+    joints = joints_of(truth, 0.0)
+    cloud = Cloud(around(joints, 1500), np.ones(1500), floor_m=0.0)
+    found = fit_body(cloud, [0.0, np.pi / 2, np.pi, -np.pi / 2])
+    error = np.linalg.norm(joints_of(found.parameters, 0.0) - joints, axis=1)
+    control = np.linalg.norm(joints_of(standing(cloud, 0.7), 0.0) - joints, axis=1)
+    # The prior of the height costs some 4 cm.
+    assert error.mean() < 0.065
+    assert error.mean() < 0.4 * control.mean()
+    turned = found.parameters[index_of("heading")] - 0.7
+    assert abs(np.angle(np.exp(1j * turned))) < 0.25
+
+
+def test_limbs_that_are_not_seen_keep_the_earlier_pose_for_a_while() -> None:
+    still = around(joints_of(parameters(height=1.78, x=1.0, y=-0.5, heading=0.7), 0.0), 3000)
+    trunk = still[still[:, 2] > 1.0]
+    cloud = Cloud(trunk, np.ones(len(trunk)), floor_m=0.0)
+    hip = index_of("left_hip")
+    soon = fit_body(cloud, [0.7], parameters(**STRIDE), elapsed_s=0.01).parameters[hip]
+    later = fit_body(cloud, [0.7], parameters(**STRIDE), elapsed_s=3.0).parameters[hip]
+    assert abs(soon - 0.5) < 0.15
+    assert abs(later) < 0.15
+
+
+def test_headings_follow_the_track_and_are_open_at_rest() -> None:
+    time_s = np.array([0.0, 0.5, 1.0, 1.5])
+    walking = np.array([[0.0, 0.0], [0.5, 0.5], [1.0, 1.0], [1.5, 1.5]])
+    assert headings_of(time_s, walking) == [[pytest.approx(np.pi / 4)]] * 4
+    assert [len(ways) for ways in headings_of(time_s, 0.01 * walking)] == [4] * 4
+    # Ten seconds apart, nobody knows the way.
+    assert [len(ways) for ways in headings_of(20 * time_s, 20 * walking)] == [4] * 4
+    assert headings_of(time_s[:1], walking[:1]) == [[0.0, np.pi / 2, np.pi, -np.pi / 2]]
+
+
+def scored(joints: np.ndarray, truth: np.ndarray) -> dict:
+    """Scores of estimated joints (frame, body, 17, 3) against true ones."""
+    estimate = PoseEstimate(
+        list(range(len(joints))), np.arange(len(joints)), joints[:, :, 0], joints, joints + 0.3
+    )
+    sequence = SimpleNamespace(joints=lambda frame: truth[frame].astype(np.float32))
+    return score_poses(estimate, sequence)  # type: ignore[arg-type]
+
+
+def test_scores_of_shifted_and_swapped_people() -> None:
+    people = np.stack([joints_of(parameters(height=1.7, x=x), 0.0) for x in (0.0, 2.0)])
+    truth = np.stack([people, people, people])
+    shifted = scored(truth + np.array([0.0, 0.03, 0.04]), truth)
+    assert shifted["fit"]["mpjpe_m"] == pytest.approx(0.05, abs=1e-6)
+    assert shifted["fit"]["aligned_m"] == pytest.approx(0.0, abs=1e-6)
+    assert shifted["fit"]["joints_m"]["left_wrist"] == pytest.approx(0.05, abs=1e-6)
+    assert shifted["standing"]["mpjpe_m"] > 0.4
+    assert shifted["tracked"] == 1.0 and shifted["identity_kept"] == 1.0
+    swapped = truth.copy()
+    swapped[2] = truth[2, ::-1]
+    found = scored(swapped, truth)
+    assert found["fit"]["mpjpe_m"] == pytest.approx(0.0, abs=1e-6)
+    assert found["identity_kept"] == pytest.approx(4 / 6)
+    away = scored(truth + np.array([0.6, 0.0, 0.0]), truth)
+    assert away["tracked"] == 0.0
+
+
+def test_unknown_joints_have_no_error() -> None:
+    truth = np.full((2, 1, 17, 3), np.nan)
+    found = scored(np.zeros((2, 1, 17, 3)), truth)
+    assert found["fit"]["mpjpe_m"] is None
+    assert found["tracked"] is None and found["identity_kept"] is None

@@ -28,7 +28,7 @@ class StudyArgs:
     """Which scenes."""
     conditions: tuple[str, ...] = field(default_factory=lambda: tuple(CONDITIONS))
     """Which conditions."""
-    radios: tuple[str, ...] = field(default_factory=lambda: tuple(RADIOS))
+    radios: tuple[str, ...] = RADIOS
     """Which radios."""
     seeds: int = 3
     """Trainings of each case, with root seeds 0, 1, ..."""

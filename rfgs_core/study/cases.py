@@ -9,6 +9,7 @@ from pathlib import Path
 
 from rfgs_core.dataset.observed import Observed
 from rfgs_core.errors import RfgsError
+from rfgs_core.radio import preset
 
 
 @dataclass(frozen=True)
@@ -47,12 +48,8 @@ CONDITIONS: dict[str, Condition] = {
     "walls": Condition("clean, up to two wall bounces", 3, "clean"),
 }
 
-#: An ultra-wide band is traced at depth 1 only, so that it has no case with walls.
-RADIOS: dict[str, tuple[str, ...]] = {
-    "wifi": ("clean", "impaired", "walls"),
-    "mmwave": ("clean", "impaired", "walls"),
-    "uwb": ("clean", "impaired"),
-}
+#: Radios of the study. Those that are not traced deep enough have no case of a condition or scene.
+RADIOS = ("wifi", "mmwave", "uwb")
 
 #: Impairments that every dataset of the study carries beside its clean channels.
 IMPAIRMENTS = "lab"
@@ -131,9 +128,12 @@ def cases(
         for scene in scenes
         for radio in radios
         for condition in conditions
-        if condition in RADIOS[radio]
         for seed in range(seeds)
     ]
-    if not chosen:
-        raise RfgsError(f"no case: {', '.join(radios)} is not traced under {', '.join(conditions)}")
-    return chosen
+    traced = [case for case in chosen if case.depth <= preset(case.radio).deepest]
+    if not traced:
+        raise RfgsError(
+            f"no case: {', '.join(radios)} is not traced as deep as {', '.join(scenes)} under "
+            f"{', '.join(conditions)} needs"
+        )
+    return traced

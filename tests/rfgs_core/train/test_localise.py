@@ -81,18 +81,27 @@ def test_two_bodies_are_found(maps_of) -> None:
     assert np.linalg.norm(found - bodies[order], axis=1).max() < 0.06
 
 
-def test_the_previous_frame_restricts_the_search(maps_of) -> None:
-    """Each body is the one near its earlier place, in the same order."""
+def test_what_is_expected_restricts_the_search_and_tells_bodies_apart(maps_of) -> None:
+    """Each body is the one near its expected place, in the same order."""
     bodies = ((1.0, 1.1), (2.5, 2.1))
     maps = maps_of(*bodies)
     for order in ([0, 1], [1, 0]):
         near = np.array(bodies)[order] + np.array([0.15, -0.2])
         found = locate_bodies(maps, ROOM_M, count=2, near=near)
         assert np.linalg.norm(found - np.array(bodies)[order], axis=1).max() < 0.06
+    # With a reach that holds both, the first does not take the place of the second.
+    for order in ([0, 1], [1, 0]):
+        near = np.array(bodies)[order] + np.array([0.3, 0.3])
+        found = locate_bodies(maps, ROOM_M, 2, near, reach_m=np.array([3.0, 3.0]))
+        assert np.linalg.norm(found - np.array(bodies)[order], axis=1).max() < 0.06
     # Far from both the answer stays within the reach, though nothing is there.
     corner = np.array([[3.4, 0.2]])
     found = locate_bodies(maps, ROOM_M, count=1, near=corner)
-    assert np.abs(found - corner).max() <= 0.8 + 1e-9
+    assert np.linalg.norm(found - corner) <= 0.8 + 1e-9
+    # Expected outside of the room, a body is taken to stand at its edge.
+    outside = np.array([[9.0, 1.5]])
+    found = locate_bodies(maps, ROOM_M, count=1, near=outside, reach_m=np.array([0.5]))
+    assert found[0, 0] > ROOM_M[1, 0] - 0.12 - 0.04 - 1e-9
 
 
 def test_bodies_do_not_stand_in_walls_or_in_each_other(maps_of) -> None:

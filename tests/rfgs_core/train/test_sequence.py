@@ -77,7 +77,7 @@ def test_a_run_holds_the_documented_files(trained_run: Run, quick_config) -> Non
         attributes = trained_run.attributes(frame)
         shapes = {name: value.shape for name, value in attributes.items()}
         expected = {"features": (40, 32), "gamma": (40, 1), "rf_power_db": (40,)}
-        assert shapes == {**expected, "track_id": (40,)}
+        assert shapes == {**expected, "track_id": (40,), "body": (40,)}
         assert attributes["gamma"].dtype == np.complex64
         cloud = read_ply(trained_run.ply_path(frame))
         assert len(cloud) == 40
@@ -136,10 +136,10 @@ def test_a_stopped_run_ends_where_an_undisturbed_one_does(
         if when == "before frame 2":
             real = training_module.observe
 
-            def stop(sequence, radio, frame):
+            def stop(sequence, radio, frame, channel):
                 if frame == 2:
                     raise KeyboardInterrupt
-                return real(sequence, radio, frame)
+                return real(sequence, radio, frame, channel)
 
             patch.setattr(training_module, "observe", stop)
         else:

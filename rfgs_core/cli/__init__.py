@@ -9,6 +9,7 @@ from collections.abc import Sequence
 COMMANDS: dict[str, tuple[str, str]] = {
     "info": ("info", "InfoArgs"),
     "demo": ("demo", "DemoArgs"),
+    "encode": ("encode", "EncodeArgs"),
     "train": ("train", "TrainArgs"),
     "eval": ("eval", "EvalArgs"),
     "render": ("render", "RenderArgs"),

@@ -34,6 +34,9 @@ class TrainArgs:
     """Frames A:B[:STEP] (inclusive), or one number; all when left out."""
     objective: Objective = "csi"
     """csi: the propagation model; paper: eq. 4-7 of the paper; both: their sum."""
+    encoder: str = "matched_filter"
+    """What gives the 32 features at a point: matched_filter, or cnn:FILE with a file of
+    `rfgs encode`."""
     channel: Observed = "clean"
     """clean: the traced channel; impaired: what `rfgs-factory impair` made of it. The empty room
     stays clean, since its capture can be averaged."""
@@ -56,6 +59,7 @@ def run(args: TrainArgs) -> int:
     from rfgs_core.frames import chosen_frames
     from rfgs_core.render.shader import ShaderConfig
     from rfgs_core.render.view import fit_run_shader
+    from rfgs_core.run.encoders import with_encoder
     from rfgs_core.run.training import train_sequence
     from rfgs_core.seeds import sub_seed
 
@@ -69,6 +73,7 @@ def run(args: TrainArgs) -> int:
         if args.gaussians < 1:
             raise RfgsError(f"--gaussians {args.gaussians}: expected at least 1")
         config = replace(config, num_gaussians=args.gaussians)
+    config, encoder_file = with_encoder(config, args.encoder)
     dataset = open_dataset(args.dataset)
     sequence = dataset.sequence(args.sequence)
     if args.radio not in sequence.radios:
@@ -77,7 +82,7 @@ def run(args: TrainArgs) -> int:
             f"it has {', '.join(sequence.radios)}"
         )
     frames = chosen_frames(args.frames, sequence.frames)
-    trained = train_sequence(dataset, sequence, args.radio, frames, config, args.out)
+    trained = train_sequence(dataset, sequence, args.radio, frames, config, args.out, encoder_file)
     pictures = {"images", "mask"} <= set(dataset.has)
     if args.shader and pictures and not (args.out / "shader.npz").exists():
         seed = sub_seed(args.seed, "shader")

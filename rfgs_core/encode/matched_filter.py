@@ -24,6 +24,8 @@ OVERSAMPLING = 16
 
 #: Points that share one pass over all links, so that a link's profile stays in cache.
 CHUNK = 64
+#: Points that an encoder reads at once; whole chunks, so that it makes no difference.
+POINTS = 256 * CHUNK
 
 
 @numba.njit(fastmath=True, cache=True)
@@ -308,8 +310,13 @@ class MatchedFilter:
     ) -> Float32[np.ndarray, "N 32"]:
         """Amplitude of each of 32 sub-bands, see `Encoder`."""
         elements, (pair, _) = seen.layout, seen.pairs
-        geometry = (elements.tx_xyz, elements.rx_xyz, pair, seen.freq_hz, points)
-        return _sub_band_amplitudes(seen.delta, *geometry, FEATURES).astype(np.float32)
+        rows = [np.zeros((0, FEATURES), np.float32)]
+        # Images of all pairs and sub-bands at once would take a gigabyte for the paper's grid.
+        for start in range(0, len(points), POINTS):
+            geometry = (elements.tx_xyz, elements.rx_xyz, pair, seen.freq_hz)
+            here = points[start : start + POINTS]
+            rows.append(_sub_band_amplitudes(seen.delta, *geometry, here, FEATURES))
+        return np.concatenate(rows)
 
 
 #: It has no settings, so one is enough.

@@ -10,8 +10,8 @@ from jaxtyping import Float
 
 #: Collapsed below this standard deviation over points, relative to the RMS of ‖φ‖ …
 LEAST_DEVIATION = 0.1
-#: … or below this effective number of dimensions.
-LEAST_RANK = 1.5
+#: … or below this effective number of dimensions; sub-bands of a narrow band reach 1.2.
+LEAST_RANK = 1.1
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,12 @@ import torch
 from jaxtyping import Float32
 from tqdm import tqdm
 
-from rfgs_core.encode import MATCHED_FILTER
+from rfgs_core.encode import Encoder
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.evaluate.geometry import surface_samples
 from rfgs_core.evaluate.grid import splat_gaussians
 from rfgs_core.evaluate.scene import EvaluatedRun, Scene
+from rfgs_core.run.encoders import run_encoder
 from rfgs_core.seeds import sub_seed
 from rfgs_core.threads import one_torch_thread
 from rfgs_core.train.config import TrainConfig
@@ -27,7 +28,11 @@ from rfgs_core.train.tracks import Tracks
 
 
 def start_on_surface(
-    run: EvaluatedRun, observations: Observations, config: TrainConfig, frame: int
+    run: EvaluatedRun,
+    observations: Observations,
+    config: TrainConfig,
+    frame: int,
+    encoder: Encoder,
 ) -> FrameState:
     """The state that training starts from, had it been told the answer."""
     vertices, faces, _ = run.sequence.moving_mesh(frame)
@@ -36,7 +41,7 @@ def start_on_surface(
     gaussians = gaussians_at(points, normals)
     power = fit_power(observations, gaussians, config)
     head = new_head(observations, config, power)
-    features = head.without_readings(encode(observations, points, MATCHED_FILTER).features)
+    features = head.without_readings(encode(observations, points, encoder).features)
     return FrameState(
         gaussians=replace(gaussians, features=features),
         power=power,
@@ -48,10 +53,12 @@ def start_on_surface(
 
 def _fit_from_surface(run: EvaluatedRun, config: TrainConfig, frame: int) -> FrameState:
     observations = observe(run.sequence, run.config["radio"], frame, config.channel)
-    state = start_on_surface(run, observations, config, frame)
+    encoder = run_encoder(run.path, run.config)
+    state = start_on_surface(run, observations, config, frame, encoder)
     if config.objective != "paper":
         state = solve_reflectivity(observations, state, config)
-    return refine(observations, state, config, sub_seed(config.seed, "oracle", frame))
+    seed = sub_seed(config.seed, "oracle", frame)
+    return refine(observations, state, config, seed, encoder=encoder)
 
 
 def oracle_scores(scene: Scene) -> dict[int, Float32[np.ndarray, "x y z"]]:

@@ -18,6 +18,12 @@ from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json, write_json
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.gaussians.ply import cloud_of, read_ply, write_ply
+from rfgs_core.run.encoders import (
+    ENCODER_FILE,
+    keep_encoder,
+    refuse_other_radios,
+    run_encoder,
+)
 from rfgs_core.run.folder import SCHEMA, Run, open_run, relative_dataset
 from rfgs_core.seeds import sub_seed
 from rfgs_core.threads import one_torch_thread
@@ -47,13 +53,26 @@ def train_sequence(
     frames: list[int],
     config: TrainConfig,
     out: Path,
+    encoder_file: Path | None = None,
 ) -> Run:
     """Fits every frame, each starting from the one before; finished frames are kept.
 
+    Args:
+        dataset: Where the sequence comes from.
+        sequence: What to fit.
+        radio: Which radio.
+        frames: Which frames.
+        config: Settings.
+        out: Folder of the run.
+        encoder_file: Learned encoder of the settings, copied into the run.
+
     Raises:
-        RfgsError: `out` holds a run with other settings, or the radio's antennas move.
+        RfgsError: `out` holds a run with other settings, the radio's antennas move, or the encoder
+            is for another radio.
     """
     need_still_antennas(sequence, radio)
+    if encoder_file is not None:
+        refuse_other_radios(encoder_file, observe(sequence, radio, frames[0], config.channel))
     bodies = sum(1 for row in sequence.instances if row["class"] == "person")
     config = replace(config, bodies=max(bodies, 1))
     settings: dict[str, Any] = {
@@ -66,6 +85,8 @@ def train_sequence(
         **asdict(config),
     }
     run = _open_or_create(out, settings)
+    if encoder_file is not None and not (out / ENCODER_FILE).exists():
+        keep_encoder(encoder_file, out)
     spent = float(run.config.get("train_s", 0.0))
     before: FrameState | None = None
     with tqdm(total=len(frames) * (config.iterations + 2), desc=f"train {radio}") as bar:
@@ -91,7 +112,8 @@ def fit_frame(
     """Runs all stages on one frame."""
     observations = observe(run.sequence, run.config["radio"], frame, config.channel)
     seed = sub_seed(config.seed, run.config["sequence"], run.config["radio"], frame, "fit")
-    state = start_frame(observations, config, seed, before)
+    encoder = run_encoder(run.path, run.config)
+    state = start_frame(observations, config, seed, before, encoder)
     bar.update(1)
     if config.objective != "paper":
         state = solve_reflectivity(observations, state, config)
@@ -102,7 +124,7 @@ def fit_frame(
         bar.set_postfix_str(f"frame {frame}, loss {loss:.3g}, {count} Gaussians")
 
     checkpoint = run.path / "checkpoints" / f"{frame:06d}.partial.npz"
-    state = refine(observations, state, config, seed, checkpoint, on_step)
+    state = refine(observations, state, config, seed, checkpoint, on_step, encoder)
     if config.objective == "paper":
         state = solve_reflectivity(observations, state, config)
     return state

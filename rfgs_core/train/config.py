@@ -10,6 +10,7 @@ from rfgs_core.dataset.observed import Observed
 
 Objective = Literal["paper", "csi", "both"]
 Recipe = Literal["rfgs", "paper"]
+EncoderKind = Literal["matched_filter", "cnn"]
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,10 @@ class TrainConfig:
     """Voxels per side of the paper's sample grid (section 3.2)."""
     refine_levels: int = 2
     """How often sample points are refined around energy (the paper: not at all)."""
+    encoder: EncoderKind = "matched_filter"
+    """What gives φ (eq. 2)."""
+    encoder_sha256: str = ""
+    """Digest of the learned encoder's file; empty for the others."""
     unexplained: float = 0.5
     """Share of each device pair's power that the model is not asked to explain."""
     seed: int = 0

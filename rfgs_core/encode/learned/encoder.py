@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A learned encoder: network, propagation to the points, attention over device pairs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from jaxtyping import Complex, Float, Float32, Float64
+from torch import Tensor, nn
+
+from rfgs_core.encode.learned.attention import PairAttention
+from rfgs_core.encode.learned.blocks import Blocks
+from rfgs_core.encode.learned.networks import NETWORKS, NetworkKind
+from rfgs_core.encode.learned.signature import RadioSignature
+from rfgs_core.encode.learned.steering import focus, steering
+from rfgs_core.encode.matched_filter import POINTS, images, oversampled_profiles
+from rfgs_core.encode.protocol import FEATURES, FrameChannel
+from rfgs_core.threads import one_torch_thread
+
+#: Features that are read at once.
+_CHANNELS = 8
+
+
+class EncoderModel(nn.Module):
+    """Everything that is trained and stored."""
+
+    def __init__(self, kind: NetworkKind, seed: int) -> None:
+        super().__init__()
+        with torch.random.fork_rng(devices=[]):
+            torch.manual_seed(seed)
+            self.network = NETWORKS[kind]()
+            self.attention = PairAttention()
+
+    def join(
+        self,
+        focused: Complex[Tensor, "pair 32 N"],
+        blocks: Blocks,
+        points: Float64[Tensor, "N 3"],
+    ) -> Float[Tensor, "N 32"]:
+        """φ from what each device pair says at the points."""
+        ends = [blocks.tx_xyz.mean(dim=1), blocks.rx_xyz.mean(dim=1)]
+        legs_m = torch.stack([torch.linalg.norm(points - end[:, None], dim=-1) for end in ends], -1)
+        power = focused.real.square() + focused.imag.square()
+        return self.attention(power.transpose(1, 2), legs_m.float())
+
+    def at_points(
+        self, blocks: Blocks, points: Float64[Tensor, "N 3"]
+    ) -> tuple[Float[Tensor, "N 32"], list[Complex[Tensor, "N"]], list[Tensor]]:
+        """φ at few points, with gradients.
+
+        Returns:
+            φ, the image of each device pair summed over features, and its steering.
+        """
+        weighed, steer, focused = self.network(blocks), [], []
+        for pair in range(len(blocks)):
+            links = max(1, int(blocks.visible[pair].any(dim=-1).sum()))
+            steer.append(steering(blocks, pair, points))
+            focused.append(focus(weighed[pair], steer[-1], links))
+        features = self.join(torch.stack(focused), blocks, points)
+        return features, [image.sum(dim=0) for image in focused], steer
+
+
+@dataclass(frozen=True)
+class LearnedEncoder:
+    """`Encoder` that reads its model at any number of points, without gradients."""
+
+    kind: NetworkKind
+    """Which network."""
+    model: EncoderModel
+    """Its weights."""
+    radio: RadioSignature
+    """What radio it was made for."""
+    name: str = "this encoder"
+    """Its file, for messages."""
+
+    @staticmethod
+    def untrained(kind: NetworkKind, seen: FrameChannel, seed: int) -> LearnedEncoder:
+        """An encoder for the radio of a frame, its weights all one.
+
+        Raises:
+            RfgsError: The network cannot take this radio's arrays.
+        """
+        radio = RadioSignature.of(seen)
+        if kind == "cube":
+            radio.need_linear_arrays()
+        return LearnedEncoder(kind, EncoderModel(kind, seed), radio)
+
+    def __call__(
+        self, seen: FrameChannel, points: Float64[np.ndarray, "N 3"]
+    ) -> Float32[np.ndarray, "N 32"]:
+        """Features at points, see `Encoder`.
+
+        Raises:
+            RfgsError: The frame is of another radio.
+        """
+        self.radio.refuse_others(RadioSignature.of(seen), self.name)
+        blocks = Blocks.of(seen)
+        pair, _ = seen.pairs
+        with torch.no_grad(), one_torch_thread():
+            weighed = _per_link(self.model.network(blocks), blocks, pair)
+            rows = [
+                self._read(weighed, seen, blocks, pair, points[start : start + POINTS])
+                for start in range(0, len(points), POINTS)
+            ]
+        return np.concatenate([np.zeros((0, FEATURES), np.float32), *rows])
+
+    def _read(
+        self,
+        weighed: Complex[np.ndarray, "link 32 subcarrier"],
+        seen: FrameChannel,
+        blocks: Blocks,
+        pair: np.ndarray,
+        points: Float64[np.ndarray, "N 3"],
+    ) -> Float32[np.ndarray, "N 32"]:
+        parts = []
+        for first in range(0, FEATURES, _CHANNELS):
+            chosen = weighed[:, first : first + _CHANNELS]
+            profiles, centre_k, samples_per_m = oversampled_profiles(chosen, seen.freq_hz)
+            geometry = (seen.layout.tx_xyz, seen.layout.rx_xyz, pair, points)
+            parts.append(images(profiles, np.full(_CHANNELS, centre_k), samples_per_m, *geometry))
+        focused = torch.from_numpy(np.concatenate(parts, axis=1))
+        return self.model.join(focused, blocks, torch.from_numpy(points)).numpy()
+
+
+def _per_link(
+    weighed: Complex[Tensor, "pair 32 tx rx subcarrier"], blocks: Blocks, pair: np.ndarray
+) -> Complex[np.ndarray, "link 32 subcarrier"]:
+    """The weighed channel in the order of the visible links."""
+    of_pair, t, r = blocks.visible.any(dim=-1).nonzero().T.numpy()
+    row = np.zeros(pair.shape, dtype=np.int64)
+    row[pair >= 0] = np.arange((pair >= 0).sum())
+    links = np.zeros((len(of_pair), FEATURES, len(blocks.freq_hz)), dtype=np.complex64)
+    links[row[blocks.tx[of_pair, t], blocks.rx[of_pair, r]]] = weighed[of_pair, :, t, r].numpy()
+    return links

@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Three-layer networks (→ 64 → 32 → 32, paper section 3.2) that weigh a channel 32 times over.
+
+| network | radio | convolves | sees |
+|---|---|---|---|
+| csi | Wi-Fi | 2D: receiving antennas × subcarriers | amplitude, unwrapped phase |
+| cube | mmWave | 3D: range × angle of departure × angle of arrival | range–angle cube |
+| range | UWB | 1D: range | range profile of each link |
+
+Output c is the channel times the network's weight c (between 0 and 2; in the network's own
+domain) and times a Hamming window over a quarter of the band centred on part c of 32, so that
+features stay ordered by frequency and keep range resolution. Untrained, every weight is 1.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Literal
+
+import torch
+from jaxtyping import Bool, Complex, Float
+from torch import Tensor, nn
+
+from rfgs_core.encode.learned.blocks import Blocks
+from rfgs_core.encode.preprocess import hamming, unwrap_phase
+from rfgs_core.encode.protocol import FEATURES, FrameChannel
+from rfgs_core.radio.presets import ULTRA_WIDE_BAND
+
+NetworkKind = Literal["csi", "cube", "range"]
+
+#: Channels after each layer (paper section 3.2).
+LAYERS = (64, 32, FEATURES)
+#: Width of the window of each feature, as a share of the band.
+WINDOW_SHARE = 0.25
+
+
+def feature_windows(freq_hz: Float[Tensor, "subcarrier"]) -> Float[Tensor, "32 subcarrier"]:
+    """Hamming windows centred on equal parts of the band, each of mean square one."""
+    tones = freq_hz.numpy()
+    spacing_hz = tones[1] - tones[0]
+    width_hz = spacing_hz * len(tones)
+    rows = []
+    for part in range(FEATURES):
+        centre_hz = tones[0] - 0.5 * spacing_hz + (part + 0.5) / FEATURES * width_hz
+        row = torch.from_numpy(hamming(tones, centre_hz, WINDOW_SHARE * width_hz))
+        rows.append(row / row.square().mean().sqrt())
+    return torch.stack(rows).float()
+
+
+class Gates(nn.Module):
+    """Base of the networks: `weigh` is theirs, windows and hidden entries are common."""
+
+    def __init__(self, convolution: type[nn.Module], kernel: int | tuple[int, ...]) -> None:
+        super().__init__()
+        sizes = (3, *LAYERS)
+        layers: list[nn.Module] = []
+        for before, after in pairwise(sizes):
+            layers += [convolution(before, after, kernel, padding="same"), nn.ReLU()]
+        self.layers = nn.Sequential(*layers[:-1])
+        last = self.layers[-1]
+        nn.init.zeros_(last.weight)  # type: ignore[arg-type]
+        nn.init.zeros_(last.bias)  # type: ignore[arg-type]
+
+    def gates(self, picture: Float[Tensor, "batch 3 *axes"]) -> Float[Tensor, "batch 32 *axes"]:
+        """Weights between 0 and 2."""
+        return 2.0 * torch.sigmoid(self.layers(picture))
+
+    def weigh(self, blocks: Blocks) -> Complex[Tensor, "pair 32 tx rx subcarrier"]:
+        """The channel times the weights."""
+        raise NotImplementedError
+
+    def forward(self, blocks: Blocks) -> Complex[Tensor, "pair 32 tx rx subcarrier"]:
+        """The channel as each of the 32 features reads it; hidden entries stay silent."""
+        window = feature_windows(blocks.freq_hz)[:, None, None, :]
+        return self.weigh(blocks) * window * blocks.visible[:, None]
+
+
+class CsiGates(Gates):
+    """Wi-Fi: amplitude and unwrapped phase over antennas and subcarriers."""
+
+    def __init__(self) -> None:
+        super().__init__(nn.Conv2d, 3)
+
+    def weigh(self, blocks: Blocks) -> Complex[Tensor, "pair 32 tx rx subcarrier"]:
+        """Weights per antenna and subcarrier."""
+        picture = csi_picture(blocks.csi, blocks.visible, blocks.freq_hz)
+        gates = self.gates(picture.flatten(0, 1)).unflatten(0, blocks.csi.shape[:2])
+        return gates.transpose(1, 2) * blocks.csi[:, None]
+
+
+class CubeGates(Gates):
+    """MmWave: the range–angle cube of a device pair with linear arrays."""
+
+    def __init__(self) -> None:
+        super().__init__(nn.Conv3d, 3)
+
+    def weigh(self, blocks: Blocks) -> Complex[Tensor, "pair 32 tx rx subcarrier"]:
+        """Weights per cell of the cube; the weighed cube is turned back to antennas and tones."""
+        window = _band_window(blocks.freq_hz)
+        gates = self.gates(_parts(_cube(blocks.csi * window)))
+        cube = gates * _cube(blocks.csi)[:, None]
+        return torch.fft.fft(torch.fft.fftn(cube, dim=(2, 3), norm="ortho"), norm="ortho")
+
+
+class RangeGates(Gates):
+    """UWB: the range profile of each link."""
+
+    def __init__(self) -> None:
+        super().__init__(nn.Conv1d, 5)
+
+    def weigh(self, blocks: Blocks) -> Complex[Tensor, "pair 32 tx rx subcarrier"]:
+        """Weights per delay; the weighed profile is turned back to tones."""
+        window = _band_window(blocks.freq_hz)
+        picture = _parts(torch.fft.ifft(blocks.csi * window, norm="ortho"))
+        links = picture.permute(0, 2, 3, 1, 4)
+        gates = self.gates(links.flatten(0, 2)).unflatten(0, links.shape[:3])
+        profile = torch.fft.ifft(blocks.csi, norm="ortho")
+        return torch.fft.fft(gates.permute(0, 3, 1, 2, 4) * profile[:, None], norm="ortho")
+
+
+def csi_picture(
+    csi: Complex[Tensor, "pair tx rx subcarrier"],
+    visible: Bool[Tensor, "pair tx rx subcarrier"],
+    freq_hz: Float[Tensor, "subcarrier"],
+) -> Float[Tensor, "pair tx 3 rx subcarrier"]:
+    """Amplitude, phase in half turns less its bulk slope, and what is visible.
+
+    The phase is unwrapped over the visible tones of each link at their own frequencies, and
+    zero elsewhere.
+    """
+    phase = torch.zeros(csi.shape, dtype=torch.float64)
+    shown = visible.flatten(0, 2).any(dim=0).numpy()
+    if shown.sum() > 1:
+        tones = freq_hz.numpy()[shown]
+        unwrapped, slope = unwrap_phase(csi[..., shown].numpy(), tones)
+        line = slope[..., None] * (tones - tones[0])
+        phase[..., shown] = torch.from_numpy((unwrapped - line) / torch.pi)
+    return torch.stack([csi.abs(), (phase * visible).float(), visible.float()], dim=2)
+
+
+def _band_window(freq_hz: Float[Tensor, "subcarrier"]) -> Float[Tensor, "subcarrier"]:
+    """Hamming window over the whole band."""
+    tones = freq_hz.numpy()
+    return torch.from_numpy(hamming(tones, tones.mean(), tones[-1] - tones[0])).float()
+
+
+def _cube(
+    csi: Complex[Tensor, "pair tx rx subcarrier"],
+) -> Complex[Tensor, "pair departure arrival range"]:
+    """Range–angle cube: directions of the two linear arrays, and delays."""
+    return torch.fft.ifftn(torch.fft.ifft(csi, norm="ortho"), dim=(1, 2), norm="ortho")
+
+
+def _parts(values: Complex[Tensor, "pair *axes"]) -> Float[Tensor, "pair 3 *axes"]:
+    """Real part, imaginary part and amplitude."""
+    return torch.stack([values.real, values.imag, values.abs()], dim=1)
+
+
+NETWORKS: dict[NetworkKind, type[Gates]] = {"csi": CsiGates, "cube": CubeGates, "range": RangeGates}
+
+
+def network_for(seen: FrameChannel) -> NetworkKind:
+    """The network of a kind of radio: bandwidth and who hears whom decide."""
+    freq_hz = seen.freq_hz
+    if (freq_hz[-1] - freq_hz[0]) / freq_hz.mean() > ULTRA_WIDE_BAND:
+        return "range"
+    tx, rx = seen.links.nonzero()
+    radar = bool((seen.layout.tx_device[tx] == seen.layout.rx_device[rx]).all())
+    return "cube" if radar else "csi"

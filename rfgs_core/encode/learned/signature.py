@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What of a radio a learned encoder depends on: its tones and the arrays of one device."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64
+
+from rfgs_core.encode.protocol import FrameChannel
+from rfgs_core.errors import RfgsError
+from rfgs_core.radio.layout import rotation
+
+
+@dataclass(frozen=True)
+class RadioSignature:
+    """Tones, and antennas in their device's own axes; where devices stand does not count."""
+
+    freq_hz: Float64[np.ndarray, "subcarrier"]
+    """Tones [Hz]."""
+    tx_offset_m: Float64[np.ndarray, "tx 3"]
+    """Transmitting elements of a device from their centre [m]."""
+    rx_offset_m: Float64[np.ndarray, "rx 3"]
+    """Receiving elements of a device from their centre [m]."""
+
+    @staticmethod
+    def of(seen: FrameChannel) -> RadioSignature:
+        """The signature of a frame's radio."""
+        layout = seen.layout
+        return RadioSignature(
+            seen.freq_hz,
+            _offsets_m(layout.tx_xyz, layout.tx_quat_wxyz, layout.tx_device),
+            _offsets_m(layout.rx_xyz, layout.rx_quat_wxyz, layout.rx_device),
+        )
+
+    def __str__(self) -> str:
+        low, high = self.freq_hz[[0, -1]] * 1e-9
+        arrays = f"{len(self.tx_offset_m)} TX and {len(self.rx_offset_m)} RX antennas per device"
+        return f"{len(self.freq_hz)} tones from {low:.4g} to {high:.4g} GHz, {arrays}"
+
+    def refuse_others(self, other: RadioSignature, name: str) -> None:
+        """Refuses another radio.
+
+        Raises:
+            RfgsError: Tones or antennas differ.
+        """
+        for mine, theirs, tolerance in (
+            (self.freq_hz, other.freq_hz, 1.0),
+            (self.tx_offset_m, other.tx_offset_m, 1e-6),
+            (self.rx_offset_m, other.rx_offset_m, 1e-6),
+        ):
+            if mine.shape != theirs.shape or np.abs(mine - theirs).max() > tolerance:
+                also = ", spaced otherwise" if str(self) == str(other) else ""
+                raise RfgsError(
+                    f"{name} was made for a radio of {self}; this one has {other}{also}; make one "
+                    "for it with `rfgs encode`"
+                )
+
+    def need_linear_arrays(self) -> None:
+        """Refuses arrays that have no single row of directions.
+
+        Raises:
+            RfgsError: An array is not a line of evenly spaced antennas.
+        """
+        for offsets_m in (self.tx_offset_m, self.rx_offset_m):
+            steps_m = np.diff(offsets_m, axis=0)
+            if len(steps_m) and np.abs(steps_m - steps_m[0]).max() > 1e-6:
+                raise RfgsError(
+                    "the cube network expects evenly spaced antennas in a line, this radio has "
+                    f"{len(offsets_m)} in another arrangement; use --network csi"
+                )
+
+
+def _offsets_m(
+    xyz: Float64[np.ndarray, "element 3"],
+    quat_wxyz: Float64[np.ndarray, "element 4"],
+    device: np.ndarray,
+) -> Float64[np.ndarray, "element 3"]:
+    """Elements of the first device from their centre, in the device's axes [m]."""
+    first = device == device[0]
+    w, x, y, z = quat_wxyz[0]
+    return (xyz[first] - xyz[first].mean(axis=0)) @ rotation((w, x, y, z))

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which encoder a run uses: named on the command line, kept inside the run's folder."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from rfgs_core.encode import MATCHED_FILTER, Encoder
+from rfgs_core.encode.learned import load_encoder
+from rfgs_core.encode.learned.signature import RadioSignature
+from rfgs_core.errors import RfgsError
+from rfgs_core.files import sha256, write_bytes
+from rfgs_core.train.config import TrainConfig
+from rfgs_core.train.observations import Observations
+
+#: Name of a learned encoder inside a run.
+ENCODER_FILE = "encoder.npz"
+
+
+def with_encoder(config: TrainConfig, text: str) -> tuple[TrainConfig, Path | None]:
+    """Settings with the encoder that a command line names, and its file.
+
+    Args:
+        config: Settings of the run.
+        text: `matched_filter`, or `cnn:FILE` with a file of `rfgs encode`.
+
+    Raises:
+        RfgsError: Nothing like that exists, or the file is no encoder.
+    """
+    kind, _, name = text.partition(":")
+    if kind == "matched_filter" and not name:
+        return replace(config, encoder="matched_filter"), None
+    if kind != "cnn" or not name:
+        raise RfgsError(f"--encoder {text}: expected matched_filter or cnn:FILE")
+    file = Path(name)
+    load_encoder(file)
+    return replace(config, encoder="cnn", encoder_sha256=sha256(file)), file
+
+
+def keep_encoder(file: Path, out: Path) -> None:
+    """Copies a learned encoder into a run, so that both stay together."""
+    write_bytes(out / ENCODER_FILE, file.read_bytes())
+
+
+def refuse_other_radios(file: Path, observations: Observations) -> None:
+    """Refuses an encoder that was made for another radio.
+
+    Raises:
+        RfgsError: Tones or antennas differ.
+    """
+    encoder = load_encoder(file)
+    encoder.radio.refuse_others(RadioSignature.of(observations), encoder.name)
+
+
+def run_encoder(run: Path, config: Mapping[str, Any]) -> Encoder:
+    """The encoder of a run with the given settings.
+
+    Raises:
+        RfgsError: Its learned encoder is missing, damaged or another one.
+    """
+    if config["encoder"] != "cnn":
+        return MATCHED_FILTER
+    file = run / ENCODER_FILE
+    expected = config["encoder_sha256"]
+    if file.is_file() and sha256(file) != expected:
+        raise RfgsError(
+            f"{file} is not the encoder that this run began with (expected digest "
+            f"{expected[:12]}, found {sha256(file)[:12]}); restore it or train again"
+        )
+    return load_encoder(file)

@@ -122,6 +122,17 @@ def _visible_side_score(
     return score / len(power)
 
 
+def _sharpened(
+    maps: PairMaps, place: Float64[np.ndarray, "2"], bounds_m: Float64[np.ndarray, "2 3"]
+) -> Float64[np.ndarray, "2"]:
+    """The best place in the cell of a grid point."""
+    offset = np.linspace(-0.5 * GROUND_STEP_M, 0.5 * GROUND_STEP_M, 5)
+    around = place + np.stack(np.meshgrid(offset, offset, indexing="ij"), axis=-1).reshape(-1, 2)
+    inner = bounds_m[:, :2] + np.array([[BODY_RADIUS_M], [-BODY_RADIUS_M]])
+    around = np.clip(around, *inner)
+    return around[int(_visible_side_score(maps, around, float(bounds_m[0, 2])).argmax())]
+
+
 def locate_bodies(
     maps: PairMaps,
     bounds_m: Float64[np.ndarray, "2 3"],
@@ -153,14 +164,16 @@ def locate_bodies(
         around = _column_peak(maps)[None]
     if around is not None:
         apart = np.linalg.norm(ground[:, None] - around, axis=2)
-        # Of a reach that holds no ground, the nearest point of it.
-        ground = ground[(apart <= np.maximum(reach_m, apart.min(axis=0))).any(axis=1)]
+        # Of a reach that holds no ground, the nearest point of it. Cells lie within the reach.
+        within = np.maximum(np.asarray(reach_m) - GROUND_STEP_M, apart.min(axis=0))
+        ground = ground[(apart <= within).any(axis=1)]
     score = _visible_side_score(maps, ground, float(bounds_m[0, 2]))
     taken = []
     for _ in range(count):
         taken.append(ground[int(score.argmax())])
-        score[np.linalg.norm(ground - taken[-1], axis=1) < SEPARATION_M] = -np.inf
-    found = np.array(taken)
+        near_it = np.linalg.norm(ground - taken[-1], axis=1) < SEPARATION_M + 2 * GROUND_STEP_M
+        score[near_it] = -np.inf
+    found = np.array([_sharpened(maps, place, bounds_m) for place in taken])
     if near is None:
         return found
     body, place = linear_sum_assignment(np.sum((near[:, None] - found) ** 2, axis=2))

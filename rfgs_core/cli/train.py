@@ -11,7 +11,7 @@ from typing import Annotated
 import tyro
 
 from rfgs_core.dataset.observed import Observed
-from rfgs_core.train.config import Objective, Recipe, TrainConfig
+from rfgs_core.train.config import Objective, Observe, Recipe, TrainConfig
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,9 @@ class TrainArgs:
     channel: Observed = "clean"
     """clean: the traced channel; impaired: what `rfgs-factory impair` made of it. The empty room
     stays clean, since its capture can be averaged."""
+    observe: Observe = "complex"
+    """What the radio reports, and all that any stage sees: complex, the channel itself; power,
+    |CSI|^2 per link and tone; delay_power, the power of each link's delay profile."""
     recipe: Recipe = "rfgs"
     """rfgs: our start, rates and steps; paper: the paper's numbers."""
     seed: int = 0
@@ -64,7 +67,7 @@ def run(args: TrainArgs) -> int:
     from rfgs_core.seeds import sub_seed
 
     config = TrainConfig.of_recipe(args.recipe, args.objective, args.seed)
-    config = replace(config, channel=args.channel)
+    config = replace(config, channel=args.channel, observe=args.observe)
     if args.iterations is not None:
         if args.iterations < 0:
             raise RfgsError(f"--iterations {args.iterations}: expected at least 0")

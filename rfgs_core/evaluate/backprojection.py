@@ -3,18 +3,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Complex, Float, Float32
+from jaxtyping import Bool, Float, Float32
 
-from rfgs_core.encode.matched_filter import device_pairs, matched_filter_map
 from rfgs_core.evaluate.grid import Grid
-from rfgs_core.radio import Layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
 #: Maps whose range cells are wider than this are computed on every second voxel only [m].
 COARSE_RANGE_M = 0.15
+#: Power of each device pair, (pair, N), at points (N, 3) [m].
+PowerMap = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -56,18 +57,16 @@ def _interpolation(
 
 
 def thinned_maps(
-    delta: Complex[np.ndarray, "tx rx subcarrier"],
-    link_visible: Bool[np.ndarray, "tx rx"],
-    layout: Layout,
+    power_map: PowerMap,
+    pairs: list[tuple[int, int]],
     freq_hz: Float[np.ndarray, "subcarrier"],
     grid: Grid,
 ) -> ThinnedMaps:
-    """Matched-filter power of every device pair with a visible link.
+    """Power of every device pair with a visible link.
 
     Args:
-        delta: csi − csi_static, zero where hidden.
-        link_visible: Links to use.
-        layout: Antenna elements.
+        power_map: Gives the power of each of `pairs` at points.
+        pairs: Transmitting and receiving device of each row.
         freq_hz: Tone frequencies [Hz].
         grid: Where to evaluate.
     """
@@ -75,8 +74,5 @@ def thinned_maps(
     stride = 2 if SPEED_OF_LIGHT / (2.0 * bandwidth_hz) > COARSE_RANGE_M else 1
     axes = [grid.axis_m(axis, stride) for axis in range(3)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    pair, pairs = device_pairs(layout.tx_device, layout.rx_device, link_visible)
-    power = matched_filter_map(
-        delta, layout.tx_xyz, layout.rx_xyz, pair, freq_hz, points.reshape(-1, 3)
-    )
+    power = power_map(points.reshape(-1, 3))
     return ThinnedMaps(power.reshape(len(pairs), *points.shape[:3]), pairs, grid, stride)

@@ -5,12 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from jaxtyping import Bool, Complex, Float
 
-from rfgs_core.evaluate.backprojection import ThinnedMaps, thinned_maps
+from rfgs_core.encode.matched_filter import device_pairs, matched_filter_map
+from rfgs_core.evaluate.backprojection import PowerMap, ThinnedMaps, thinned_maps
 from rfgs_core.evaluate.grid import Grid
 from rfgs_core.evaluate.rf import HeldOut
 from rfgs_core.radio import Layout
@@ -36,6 +37,8 @@ class Evidence:
     """Grid to score."""
     voxels: int
     """Number of voxels a prediction has."""
+    power_map: PowerMap | None = None
+    """Power maps where antennas are not coherent; None: the matched filter of `delta`."""
     method_centroid_m: Float[np.ndarray, "3"] | None = None
     """Centroid of the evaluated method's own prediction [m]; None if it predicts nothing."""
 
@@ -48,6 +51,7 @@ class Evidence:
         freq_hz: Float[np.ndarray, "subcarrier"],
         grid: Grid,
         voxels: int,
+        power_map: PowerMap | None = None,
     ) -> Evidence:
         """Evidence of one frame: everything that is held out or lost becomes NaN."""
         visible = held_out.visible & np.isfinite(csi)
@@ -61,6 +65,7 @@ class Evidence:
             tone_visible=visible.any(axis=(0, 1)),
             grid=grid,
             voxels=voxels,
+            power_map=power_map,
         )
 
     def with_centroid(self, centroid_m: Float[np.ndarray, "3"] | None) -> Evidence:
@@ -69,10 +74,12 @@ class Evidence:
 
     @cached_property
     def maps(self) -> ThinnedMaps:
-        """Matched-filter maps of the visible entries, computed once."""
-        return thinned_maps(
-            self.delta_or_zero, self.link_visible, self.layout, self.freq_hz, self.grid
-        )
+        """Power maps of the visible entries, computed once."""
+        layout = self.layout
+        pair, pairs = device_pairs(layout.tx_device, layout.rx_device, self.link_visible)
+        geometry = (layout.tx_xyz, layout.rx_xyz, pair, self.freq_hz)
+        matched_filter = partial(matched_filter_map, self.delta_or_zero, *geometry)
+        return thinned_maps(self.power_map or matched_filter, pairs, self.freq_hz, self.grid)
 
     @property
     def delta_or_zero(self) -> Complex[np.ndarray, "tx rx subcarrier"]:

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 from tqdm import tqdm
 
-from rfgs_core.evaluate.controls import CONTROLS, ControlResult
+from rfgs_core.evaluate.controls import CONTROLS, ControlResult, phase_free
 from rfgs_core.evaluate.geometry import GEOMETRY_KEYS, geometry_metrics
 from rfgs_core.evaluate.image import IMAGE_KEYS
 from rfgs_core.evaluate.oracle import oracle_scores
@@ -154,7 +154,7 @@ def _evaluate_frame(scene: Scene, frame: int, table: _Table, on_step: Callable[[
     _add(scene, table, METHOD, frame, own, reference, csi)
     on_step()
     for name, control in CONTROLS.items():
-        result = control(evidence)
+        result = phase_free.answer(name, control, evidence, scene.observe)
         _add(scene, table, name, frame, result, reference, csi)
         on_step()
 

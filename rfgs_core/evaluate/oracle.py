@@ -20,7 +20,7 @@ from rfgs_core.seeds import sub_seed
 from rfgs_core.threads import one_torch_thread
 from rfgs_core.train.config import TrainConfig
 from rfgs_core.train.frame import FrameState, fit_power, new_head, solve_reflectivity
-from rfgs_core.train.observations import Observations, observe
+from rfgs_core.train.observations import Observations
 from rfgs_core.train.refine import refine
 from rfgs_core.train.sampling import encode
 from rfgs_core.train.start import gaussians_at
@@ -52,7 +52,7 @@ def start_on_surface(
 
 
 def _fit_from_surface(run: EvaluatedRun, config: TrainConfig, frame: int) -> FrameState:
-    observations = observe(run.sequence, run.config["radio"], frame, config.channel)
+    observations = run.observations(frame)
     encoder = run_encoder(run.path, run.config)
     state = start_on_surface(run, observations, config, frame, encoder)
     if config.objective != "paper":

@@ -82,6 +82,7 @@ def conditions(scene: Scene) -> dict[str, Any]:
         "voxels_predicted": scene.voxels,
         "voxel_m": scene.grid.voxel_m,
         "objective": scene.run.config.get("objective"),
+        "observe": scene.observe,
         "recipe": scene.run.config.get("recipe"),
         "seed": scene.run.config.get("seed"),
         "prior": "the person's position is not given; search is over the whole scene",

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -23,6 +24,9 @@ from rfgs_core.gaussians.model import Gaussians
 from rfgs_core.radio import Layout, Radio
 from rfgs_core.render.view import moving_gaussians
 from rfgs_core.seeds import sub_seed
+from rfgs_core.train.config import Observe
+from rfgs_core.train.delay_maps import delay_power_map
+from rfgs_core.train.observations import Observations
 
 
 class EvaluatedRun(Protocol):
@@ -59,6 +63,10 @@ class EvaluatedRun(Protocol):
 
     def attributes(self, frame: int) -> dict[str, np.ndarray]:
         """Per-Gaussian arrays of the moving ones."""
+        ...
+
+    def observations(self, frame: int) -> Observations:
+        """What training sees of a frame."""
         ...
 
     def predict(self, frame: int) -> Complex[np.ndarray, "tx rx subcarrier"]:
@@ -112,20 +120,34 @@ class Scene:
         environment = fill(evidence.static, evidence, krige, krige_level)
         return Scene(run, radio, layout, held_out, grid, voxels, static, environment)
 
+    @property
+    def observe(self) -> Observe:
+        """What the radio reports."""
+        return self.run.config.get("observe", "complex")
+
     def csi(self, frame: int) -> Complex[np.ndarray, "tx rx subcarrier"]:
         """True channel of a frame: predictions are held against it, whatever was observed."""
         return self.run.sequence.csi(self.radio.name, frame)
 
     def evidence(self, frame: int, score: Float[np.ndarray, "x y z"]) -> Evidence:
         """What controls may see of a frame, and where the method's own `score` is centred."""
+        csi = observed_csi(self.run.sequence, self.radio.name, frame, self.run.channel)
+        static, power_map = self.csi_static, None
+        if self.observe != "complex":
+            seen = self.run.observations(frame)
+            hidden = ~(seen.links[..., None] & seen.tones)
+            csi, static = np.where(hidden, np.nan, seen.delta + seen.static), seen.static
+            if seen.kind == "delay_power":
+                power_map = partial(delay_power_map, seen)
         evidence = Evidence.hide(
-            observed_csi(self.run.sequence, self.radio.name, frame, self.run.channel),
-            self.csi_static,
+            csi,
+            static,
             self.held_out,
             self.layout,
             self.radio.freq_hz,
             self.grid,
             self.voxels,
+            power_map,
         )
         best = best_voxels(score, self.voxels)
         return evidence.with_centroid(self.grid.centres(best).mean(axis=0) if len(best) else None)

@@ -13,7 +13,15 @@ from rfgs_core.files import read_json
 from rfgs_core.report.tables import GROUPS, align, show
 
 #: Conditions that must agree for a comparison to mean anything.
-CONDITIONS = ("scene", "sequence", "radio", "num_frames", "voxels_predicted", "impairments")
+CONDITIONS = (
+    "scene",
+    "sequence",
+    "radio",
+    "num_frames",
+    "voxels_predicted",
+    "impairments",
+    "observe",
+)
 
 
 def read_metrics(run: Path) -> dict[str, Any]:

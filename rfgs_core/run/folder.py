@@ -22,7 +22,7 @@ from rfgs_core.gaussians import FEATURE_DIM, Gaussians
 from rfgs_core.gaussians.ply import read_ply
 from rfgs_core.train.channel import Channel
 from rfgs_core.train.head import HEAD_SHAPES, RadioHead
-from rfgs_core.train.observations import observe
+from rfgs_core.train.observations import Observations, observe
 
 #: Schema of `config.json`.
 SCHEMA = "rfgs-run/1"
@@ -60,6 +60,13 @@ class Run:
         place = (self.path / self.config["dataset"]).resolve()
         return _sequence(
             self.path, place, self.config["sequence"], self.config["dataset_fingerprint"]
+        )
+
+    def observations(self, frame: int) -> Observations:
+        """What training sees of a frame: the channel as the run's radios report it."""
+        return observe(
+            *(self.sequence, self.config["radio"], frame, self.channel),
+            kind=self.config.get("observe", "complex"),
         )
 
     def ply_path(self, frame: int) -> Path:
@@ -112,7 +119,7 @@ class Run:
 
     def predict(self, frame: int) -> Complex64[np.ndarray, "tx rx subcarrier"]:
         """Predicted csi − csi_static on every measured link, held-out ones included."""
-        observations = observe(self.sequence, self.config["radio"], frame, self.channel)
+        observations = self.observations(frame)
         everything = np.ones(len(observations.freq_hz), dtype=bool)
         channel = Channel.of(observations, observations.layout.measured, everything)
         with torch.no_grad():

@@ -110,7 +110,7 @@ def fit_frame(
     run: Run, frame: int, config: TrainConfig, before: FrameState | None, bar: Any
 ) -> FrameState:
     """Runs all stages on one frame."""
-    observations = observe(run.sequence, run.config["radio"], frame, config.channel)
+    observations = run.observations(frame)
     seed = sub_seed(config.seed, run.config["sequence"], run.config["radio"], frame, "fit")
     encoder = run_encoder(run.path, run.config)
     state = start_frame(observations, config, seed, before, encoder)

@@ -11,6 +11,11 @@ from rfgs_core.dataset.observed import Observed
 Objective = Literal["paper", "csi", "both"]
 Recipe = Literal["rfgs", "paper"]
 EncoderKind = Literal["matched_filter", "cnn"]
+#: complex: the channel itself; power: |csi|² per link and tone; delay_power: the power of each
+#: link's delay profile.
+Observe = Literal["complex", "power", "delay_power"]
+#: empty_room: the capture without anything that moves; learned: the median over the frames.
+Background = Literal["empty_room", "learned"]
 
 
 @dataclass(frozen=True)
@@ -21,6 +26,10 @@ class TrainConfig:
     """paper: eq. 4–7; csi: the propagation model; both: their sum."""
     channel: Observed = "clean"
     """clean: the traced channel; impaired: what imperfect radios make of it."""
+    observe: Observe = "complex"
+    """What the radio reports of that channel; no stage sees more."""
+    background: Background = "empty_room"
+    """What the moving part is told from."""
     recipe: Recipe = "rfgs"
     """rfgs: our start, rates and steps; paper: the paper's numbers (sections 3.2–3.6)."""
     num_gaussians: int = 6000

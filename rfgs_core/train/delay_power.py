@@ -23,6 +23,7 @@ from jaxtyping import Float, Float32, Float64
 
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.train.observations import Observations
+from rfgs_core.train.phase_free import band_window
 
 #: Delay samples and beams per resolution cell.
 OVERSAMPLING = 2
@@ -73,8 +74,9 @@ def power_maps(observations: Observations) -> list[PowerMap]:
     map of its own. A pair that nothing changes, say behind furniture, has no map: it tells no
     direction, and its ratio of measured to expected power would be zero over zero.
     """
-    window = np.hamming(len(observations.freq_hz)) * observations.tones
-    window = window / window.sum()
+    if observations.kind == "delay_power":
+        return delay_maps(observations)
+    window = band_window(observations.tones)
     wavelength_m = SPEED_OF_LIGHT / observations.centre_hz
     pair, names = observations.pairs
     maps = []
@@ -94,13 +96,43 @@ def power_maps(observations: Observations) -> list[PowerMap]:
     return maps
 
 
+def delay_maps(observations: Observations) -> list[PowerMap]:
+    """Power over delay alone, one map per device pair, or per link of wide arrays.
+
+    Links of a pair are averaged where their antennas stand within one resolution cell of
+    each other, so that a place has the same delay in all of them.
+    """
+    change = observations.delay_change
+    assert change is not None
+    layout = observations.layout
+    pair, names = observations.pairs
+    cell_m = SPEED_OF_LIGHT / float(np.ptp(observations.freq_hz))
+    maps = []
+    for index in range(len(names)):
+        tx, rx = np.nonzero(pair == index)
+        width_m = sum(
+            float(np.linalg.norm(np.ptp(xyz, axis=0)))
+            for xyz in (layout.tx_xyz[tx], layout.rx_xyz[rx])
+        )
+        groups = [np.arange(len(tx))] if width_m <= cell_m else np.arange(len(tx))[:, None]
+        for group in groups:
+            t, r = tx[group], rx[group]
+            power = (change[t, r] ** 2).mean(axis=0)
+            if not power.any():
+                continue
+            centres = layout.tx_xyz[t].mean(axis=0), layout.rx_xyz[r].mean(axis=0)
+            everywhere = np.ones((1, 1), dtype=np.complex64)
+            maps.append(PowerMap(power[:, None], everywhere, centres[0][None], centres[1][None]))
+    return maps
+
+
 class DelayPowerModel:
     """Expected delay–angle power of points, linear in their reflected power."""
 
     def __init__(self, observations: Observations, points: Float[np.ndarray, "M 3"]) -> None:
         self.maps = power_maps(observations)
         self._spacing_hz = float(observations.freq_hz[1] - observations.freq_hz[0])
-        self._window = np.hamming(len(observations.freq_hz)) * observations.tones
+        self._window = band_window(observations.tones)
         self._wavelength_m = SPEED_OF_LIGHT / observations.centre_hz
         parts = [self._factors(entry, points.astype(np.float64)) for entry in self.maps]
         #: Per map: delay response times spreading (delay, M), beam response (M, beam), data.
@@ -111,7 +143,7 @@ class DelayPowerModel:
         period = 1.0 / self._spacing_hz
         delay = np.linspace(-0.5 * period, 0.5 * period, 16 * len(self._window) + 1)
         phase = 2 * np.pi * self._spacing_hz * np.outer(delay, np.arange(len(self._window)))
-        response = np.abs(np.exp(1j * phase) @ self._window) / self._window.sum()
+        response = np.abs(np.exp(1j * phase) @ self._window)
         return delay, response**2
 
     def _factors(self, entry: PowerMap, points: np.ndarray) -> tuple[np.ndarray, ...]:

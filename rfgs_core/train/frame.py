@@ -16,6 +16,7 @@ from rfgs_core.gaussians import Gaussians
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.seeds import sub_seed
 from rfgs_core.train.channel import Channel
+from rfgs_core.train.comparison import comparison_of
 from rfgs_core.train.config import TrainConfig
 from rfgs_core.train.delay_power import DelayPowerModel
 from rfgs_core.train.head import SHARPNESS, RadioHead
@@ -111,7 +112,7 @@ def fit_power(
 
 
 def noise_per_link(
-    observations: Observations, target: Complex[Tensor, "link subcarrier"], share: float
+    observations: Observations, target: Tensor, share: float
 ) -> Float[Tensor, "link"]:
     """Variance per link: a share of the mean power of its device pair."""
     pair, names = observations.pairs
@@ -120,11 +121,6 @@ def noise_per_link(
     mean = np.bincount(index, power, len(names)) / np.bincount(index, minlength=len(names))
     floor = 1e-3 * mean.max() if len(mean) else 0.0
     return torch.from_numpy((share * np.maximum(mean, floor * 1e-3))[index].astype(np.float32))
-
-
-def target_of(observations: Observations) -> Complex[Tensor, "link subcarrier"]:
-    """The visible channel change, links in row-major order, visible tones only."""
-    return torch.from_numpy(observations.delta[observations.links][:, observations.tones].copy())
 
 
 def new_head(
@@ -155,7 +151,7 @@ def start_frame(
     Raises:
         RfgsError: Nobody changes the channel.
     """
-    if not observations.delta.any():
+    if not observations.changed:
         raise RfgsError(
             "the channel of this frame is that of the empty scene, nobody is in it; choose other "
             "--frames, or generate the dataset with a larger --depth"
@@ -208,14 +204,30 @@ def _carry_over(
 def solve_reflectivity(
     observations: Observations, state: FrameState, config: TrainConfig
 ) -> FrameState:
-    """Writes posterior-mean reflectivities into the features."""
+    """Writes posterior-mean reflectivities into the features.
+
+    Powers per delay know nothing of phases: there each Gaussian gets the root of its reflected
+    power and a phase drawn for it, the model that the power fit assumes.
+    """
+    comparison = comparison_of(observations)
     channel = Channel.of(observations, observations.links, observations.tones)
     with torch.no_grad():
-        target = target_of(observations) - channel.shadowed(state.head, state.gaussians)
-    noise = noise_per_link(observations, target_of(observations), config.unexplained)
-    gamma = posterior_mean(
-        *(channel, state.head, state.gaussians, target, noise, state.power),
-        iterations=config.solver_steps,
-    )
+        shadow = comparison.linear(channel.shadowed(state.head, state.gaussians))
+    if shadow is None:
+        gamma = _drawn_phases(state, config.seed)
+    else:
+        measured = comparison.measured()
+        noise = noise_per_link(observations, measured, config.unexplained)
+        gamma = posterior_mean(
+            *(channel, state.head, state.gaussians, measured - shadow, noise, state.power),
+            *(config.solver_steps, comparison),
+        )
     features = state.head.with_gamma(state.gaussians.features, gamma)
     return replace(state, gaussians=replace(state.gaussians, features=features))
+
+
+def _drawn_phases(state: FrameState, seed: int) -> Complex[Tensor, "M"]:
+    """√p with uniform phases; a track keeps its phase from frame to frame."""
+    rng = np.random.default_rng(sub_seed(seed, "phase"))
+    phase = torch.from_numpy(rng.uniform(0, 2 * np.pi, int(state.track_id.max()) + 1)).float()
+    return torch.polar(state.power.sqrt(), phase[torch.from_numpy(state.track_id)])

@@ -17,6 +17,7 @@ from scipy.optimize import linear_sum_assignment
 
 from rfgs_core.encode.matched_filter import matched_filter_map
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.train.delay_maps import delay_power_map
 from rfgs_core.train.observations import Observations
 
 #: Radius of the cylinder whose visible side is scored [m].
@@ -69,14 +70,18 @@ def pair_maps(observations: Observations) -> PairMaps:
     axes = [np.arange(low[k] + spacing_m / 2, high[k], spacing_m) for k in range(3)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     pair, names = observations.pairs
-    power = matched_filter_map(
-        observations.delta,
-        observations.layout.tx_xyz,
-        observations.layout.rx_xyz,
-        pair,
-        freq_hz,
-        points.reshape(-1, 3),
-    ).reshape(len(names), *points.shape[:3])
+    if observations.kind == "delay_power":
+        power = delay_power_map(observations, points.reshape(-1, 3))
+    else:
+        power = matched_filter_map(
+            observations.delta,
+            observations.layout.tx_xyz,
+            observations.layout.rx_xyz,
+            pair,
+            freq_hz,
+            points.reshape(-1, 3),
+        )
+    power = power.reshape(len(names), *points.shape[:3])
     power /= np.maximum(power.mean(axis=(1, 2, 3), keepdims=True), 1e-30)
     centres = [
         [

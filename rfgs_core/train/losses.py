@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from jaxtyping import Complex, Float, Int64
+from jaxtyping import Float, Int64
 from scipy.spatial import KDTree
 from torch import Tensor
 
@@ -75,9 +75,12 @@ def paper_loss(gaussians: Gaussians, points: SamplePoints) -> Float[Tensor, ""]:
 
 
 def channel_loss(
-    predicted: Complex[Tensor, "link subcarrier"],
-    target: Complex[Tensor, "link subcarrier"],
+    predicted: Tensor,
+    target: Tensor,
     noise: Float[Tensor, "link"],
 ) -> Float[Tensor, ""]:
-    """Mean squared channel error in units of each link's own noise variance."""
+    """Mean squared channel error in units of each link's own noise variance.
+
+    Predicted and measured entries (link, entry) may be complex or, of radios without phase, real.
+    """
     return torch.mean((predicted - target).abs() ** 2 / noise[:, None])

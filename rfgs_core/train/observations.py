@@ -7,15 +7,26 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from jaxtyping import Bool, Complex64, Float64, Int64
+from jaxtyping import Bool, Complex64, Float32, Float64, Int64
 
 from rfgs_core.dataset.observed import Observed, observed_csi
 from rfgs_core.encode.matched_filter import device_pairs
 from rfgs_core.errors import RfgsError
 from rfgs_core.radio import Layout
+from rfgs_core.train.config import Observe
+from rfgs_core.train.phase_free import (
+    delay_amplitude,
+    direct_amplitude,
+    direct_wave,
+    hologram,
+)
 
 if TYPE_CHECKING:
     from rfgs_core.dataset import Sequence
+
+
+#: What a radio reports of a channel; the last axis is subcarrier or delay.
+Reported = Complex64[np.ndarray, "tx rx entry"] | Float32[np.ndarray, "tx rx entry"]
 
 
 @dataclass(frozen=True)
@@ -23,9 +34,11 @@ class Observations:
     """Channel change of one frame on the links and tones that training may use."""
 
     delta: Complex64[np.ndarray, "tx rx subcarrier"]
-    """csi − csi_static where visible, zero elsewhere."""
+    """csi − csi_static where visible, zero elsewhere; of powers per tone the hologram of
+    `phase_free`, of powers per delay nothing."""
     static: Complex64[np.ndarray, "tx rx subcarrier"]
-    """csi_static where visible, zero elsewhere."""
+    """csi_static where visible, zero elsewhere; without phases its amplitude (of powers per
+    delay: that of the direct path) on the phase of the direct path."""
     links: Bool[np.ndarray, "tx rx"]
     """Links that training may use."""
     tones: Bool[np.ndarray, "subcarrier"]
@@ -38,6 +51,15 @@ class Observations:
     """Scene bounds [m]."""
     time_s: float = 0.0
     """When the frame was taken [s]."""
+    kind: Observe = "complex"
+    """What the radio reports."""
+    delay_change: Float32[np.ndarray, "tx rx delay"] | None = None
+    """||h(τ)| − |h₀(τ)|| of each visible link, zero elsewhere; only of powers per delay."""
+
+    @property
+    def changed(self) -> bool:
+        """Whether the frame differs from the empty room at all."""
+        return bool(self.delta.any() if self.delay_change is None else self.delay_change.any())
 
     @property
     def centre_hz(self) -> float:
@@ -88,37 +110,100 @@ def need_still_antennas(sequence: Sequence, radio: str) -> None:
         )
 
 
-def observe(
-    sequence: Sequence, radio: str, frame: int, channel: Observed = "clean"
-) -> Observations:
-    """Reads one frame at its own time and hides what is held out, and links that lost a packet.
+def reported(
+    csi: Complex64[np.ndarray, "*link subcarrier"],
+    tones: Bool[np.ndarray, "subcarrier"],
+    kind: Observe,
+) -> Reported:
+    """What a radio reports of a channel: itself, |csi| per tone, or |h(τ)| per link.
+
+    Hidden tones do not enter the delay profile; NaN of a lost packet stays NaN.
+    """
+    if kind == "complex":
+        return csi
+    return np.abs(csi) if kind == "power" else delay_amplitude(csi, tones)
+
+
+def visible_channel(
+    sequence: Sequence, radio: str, frame: int, channel: Observed
+) -> tuple[Layout, Bool[np.ndarray, "tx rx"], Bool[np.ndarray, "subcarrier"], np.ndarray]:
+    """Elements, visible links and tones, and the channel of a frame with everything in it.
 
     Raises:
-        RfgsError: The channel holds values that are not finite, or its antennas move within a
-            frame.
+        RfgsError: What is visible is not finite, or the antennas move within a frame.
     """
     need_still_antennas(sequence, radio)
     data = sequence.radio(radio)
     # The links that exist are those the channels were stored with.
     elements = replace(sequence.layout(radio), measured=data["measured"].values)
     links, tones = _visible(sequence.splits["rf"][radio], elements, data.sizes["subcarrier"])
-    csi, static = observed_csi(sequence, radio, frame, channel), sequence.csi_static(radio)
+    csi = observed_csi(sequence, radio, frame, channel)
     if channel == "impaired":
         links &= ~np.isnan(csi).all(axis=2)
+    _need_finite(csi, links, tones, f"csi of frame {frame} ({sequence.name}, {radio})")
+    return elements, links, tones, csi
+
+
+def _need_finite(csi: np.ndarray, links: np.ndarray, tones: np.ndarray, what: str) -> None:
+    if not np.isfinite(csi[links[:, :, None] & tones]).all():
+        raise RfgsError(f"{what} holds NaN or infinity; run `rfgs-factory validate` on the dataset")
+
+
+def observe(
+    sequence: Sequence,
+    radio: str,
+    frame: int,
+    channel: Observed = "clean",
+    kind: Observe = "complex",
+    empty: Reported | None = None,
+) -> Observations:
+    """Reads one frame at its own time and hides what is held out, and links that lost a packet.
+
+    Args:
+        sequence: The data.
+        radio: Which radio.
+        frame: Which frame.
+        channel: The traced channel, or what imperfect radios make of it.
+        kind: What the radio reports of it; nothing else reaches the result.
+        empty: What it reports of the empty room, as `reported` gives it; None takes the
+            empty-room capture.
+
+    Raises:
+        RfgsError: The channel holds values that are not finite, or its antennas move within a
+            frame.
+    """
+    elements, links, tones, csi = visible_channel(sequence, radio, frame, channel)
+    if empty is None:
+        static = sequence.csi_static(radio)
+        _need_finite(
+            static, links, tones, f"csi_static of frame {frame} ({sequence.name}, {radio})"
+        )
+        empty = reported(static, tones, kind)
     seen = links[:, :, None] & tones
-    for name, values in (("csi", csi), ("csi_static", static)):
-        if not np.isfinite(values[seen]).all():
-            raise RfgsError(
-                f"{name} of frame {frame} ({sequence.name}, {radio}) holds NaN or infinity; "
-                "run `rfgs-factory validate` on the dataset"
-            )
+    freq_hz = np.asarray(sequence.radio(radio)["freq_hz"].values, dtype=np.float64)
+    now, delay_change = reported(csi, tones, kind), None
+    if kind == "complex":
+        delta, static = now - empty, empty
+    elif kind == "power":
+        wave = direct_wave(elements, freq_hz)
+        # Hidden links must not set the scale of the others.
+        now, empty = np.where(seen, now, 0), np.where(seen, empty, 0)
+        delta, static = hologram(now, empty, tones, wave), empty * wave
+    else:
+        spacing_hz = float(freq_hz[1] - freq_hz[0])
+        delay_change = np.where(links[..., None], np.abs(now - empty), 0).astype(np.float32)
+        direct = direct_amplitude(empty, elements, spacing_hz)
+        static = direct[..., None] * direct_wave(elements, freq_hz)
+        delta = np.zeros_like(static)
     return Observations(
-        delta=np.where(seen, csi - static, 0).astype(np.complex64),
+        delta=np.where(seen, delta, 0).astype(np.complex64),
         static=np.where(seen, static, 0).astype(np.complex64),
         links=links,
         tones=tones,
         layout=elements,
-        freq_hz=np.asarray(data["freq_hz"].values, dtype=np.float64),
+        freq_hz=freq_hz,
         bounds_m=np.asarray(sequence.bounds_m, dtype=np.float64),
         time_s=sequence.time_s(frame),
+        kind=kind,
+        delay_change=delay_change,
     )

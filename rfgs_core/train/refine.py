@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from jaxtyping import Complex, Float
+from jaxtyping import Float
 from torch import Tensor
 
 from rfgs_core.arrays import load_arrays, save_arrays
@@ -18,9 +18,10 @@ from rfgs_core.errors import RfgsError
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.seeds import sub_seed
 from rfgs_core.train.channel import Channel
+from rfgs_core.train.comparison import Comparison, comparison_of
 from rfgs_core.train.config import TrainConfig
 from rfgs_core.train.density import DensityRule, PaperDensity
-from rfgs_core.train.frame import FrameState, noise_per_link, target_of
+from rfgs_core.train.frame import FrameState, noise_per_link
 from rfgs_core.train.losses import SamplePoints, channel_loss, paper_loss
 from rfgs_core.train.observations import Observations
 from rfgs_core.train.parameters import GAUSSIAN_SHAPES, LearningRates, TrainableGaussians
@@ -40,8 +41,10 @@ class Task:
 
     channel: Channel
     """Visible links and tones."""
-    target: Complex[Tensor, "link subcarrier"]
-    """Channel change to explain."""
+    comparison: Comparison
+    """The terms in which the change is reported."""
+    target: Tensor
+    """Channel change to explain, (link, entry), in those terms."""
     noise: Float[Tensor, "link"]
     """Variance per link that need not be explained."""
     points: SamplePoints | None
@@ -56,9 +59,11 @@ class Task:
             points = sample_points(
                 observations, config.grid_side, rng, encoder, config.refine_levels
             )
-        target = target_of(observations)
+        comparison = comparison_of(observations)
+        target = comparison.measured()
         return Task(
             Channel.of(observations, observations.links, observations.tones),
+            comparison,
             target,
             noise_per_link(observations, target, config.unexplained),
             points,
@@ -88,7 +93,7 @@ def _loss(
         loss = loss + paper_loss(gaussians, points)
     if len(links):
         part = task.channel.rows(links)
-        predicted = part.change(state.head, gaussians)
+        predicted = task.comparison.predicted(part.change(state.head, gaussians), links)
         loss = loss + channel_loss(predicted, task.target[links], task.noise[links])
     return loss
 

@@ -3,7 +3,8 @@
 
 The channel is linear in the reflectivities γ. With γ_i ~ CN(0, p_i), where p_i is the
 reflected power of the phase-free fit, and noise of variance σ² per device pair, the posterior
-mean minimises Σ |y − Aγ|²/σ² + Σ |γ_i|²/p_i. Conjugate gradients solve for x = γ/√p.
+mean minimises Σ |y − Aγ|²/σ² + Σ |γ_i|²/p_i. Conjugate gradients solve for x = γ/√p. Of powers
+per tone the hologram is linear in real and imaginary parts, which is all that they ask for.
 """
 
 from __future__ import annotations
@@ -11,11 +12,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import torch
-from jaxtyping import Complex, Complex64, Float
+from jaxtyping import Complex, Float
 from torch import Tensor
 
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.train.channel import Channel
+from rfgs_core.train.comparison import Comparison
 from rfgs_core.train.head import RadioHead
 
 
@@ -23,10 +25,11 @@ def posterior_mean(
     channel: Channel,
     head: RadioHead,
     gaussians: Gaussians,
-    target: Complex64[Tensor, "link subcarrier"],
+    target: Tensor,
     noise: Float[Tensor, "link"],
     power: Float[Tensor, "M"],
     iterations: int,
+    comparison: Comparison | None = None,
 ) -> Complex[Tensor, "M"]:
     """Posterior-mean reflectivities [m].
 
@@ -34,20 +37,27 @@ def posterior_mean(
         channel: Links and tones of `target`.
         head: Decodes ρ; its reflectivities are ignored.
         gaussians: Fixed positions, shapes and normals.
-        target: Channel change to explain.
+        target: Channel change to explain, (link, entry), as `comparison` puts it.
         noise: Variance of what cannot be explained, per link.
         power: Prior variance p of each reflectivity [m²].
         iterations: Conjugate-gradient steps.
+        comparison: What of the change is reported; None: all of it.
     """
     root, weight = torch.sqrt(power), torch.rsqrt(noise)[:, None]
     zero = torch.zeros(len(gaussians), dtype=torch.complex64, requires_grad=True)
 
+    def reported(gamma: Tensor) -> Tensor:
+        change = channel.scattered(head, gaussians, gamma)
+        seen = change if comparison is None else comparison.linear(change)
+        assert seen is not None
+        return seen
+
     def forward(x: Tensor) -> Tensor:
         with torch.no_grad():
-            return channel.scattered(head, gaussians, root * x) * weight
+            return reported(root * x) * weight
 
     # The model is linear in γ, so its gradient at zero is the adjoint everywhere.
-    linear = channel.scattered(head, gaussians, zero)
+    linear = reported(zero)
 
     def adjoint(y: Tensor) -> Tensor:
         (grad,) = torch.autograd.grad(linear, zero, y * weight, retain_graph=True)
@@ -59,7 +69,7 @@ def posterior_mean(
 def _conjugate_gradients(
     forward: Callable[[Tensor], Tensor],
     adjoint: Callable[[Tensor], Tensor],
-    y: Complex[Tensor, "link subcarrier"],
+    y: Tensor,
     iterations: int,
 ) -> Complex[Tensor, "M"]:
     """Solves (I + BᴴB) x = Bᴴ y."""

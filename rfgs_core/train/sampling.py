@@ -10,7 +10,9 @@ import numpy as np
 import torch
 from jaxtyping import Float, Float64
 
-from rfgs_core.encode import Encoder, unit_rms
+from rfgs_core.encode import MATCHED_FILTER, Encoder, unit_rms
+from rfgs_core.errors import RfgsError
+from rfgs_core.train.delay_maps import delay_features
 from rfgs_core.train.losses import SamplePoints
 from rfgs_core.train.observations import Observations
 
@@ -61,11 +63,29 @@ def finer_points(
     return (centres[strongest, None] + corners * cell_m).reshape(-1, 3)
 
 
+def _features(
+    observations: Observations, points: Float64[np.ndarray, "N 3"], encoder: Encoder
+) -> Float[np.ndarray, "N 32"]:
+    """φ before it is scaled; powers per delay have an encoder of their own.
+
+    Raises:
+        RfgsError: The encoder needs phases, and there are none.
+    """
+    if observations.kind != "delay_power":
+        return encoder(observations, points)
+    if encoder is not MATCHED_FILTER:
+        raise RfgsError(
+            "a learned encoder reads the channel over tones, and `--observe delay_power` hides "
+            "it; leave --encoder out, or choose --observe complex or power"
+        )
+    return delay_features(observations, points)
+
+
 def encode(
     observations: Observations, points: Float64[np.ndarray, "N 3"], encoder: Encoder
 ) -> SamplePoints:
     """Features φ at `points`, RMS of ‖φ‖ one."""
-    features = unit_rms(encoder(observations, points))
+    features = unit_rms(_features(observations, points, encoder))
     return SamplePoints(torch.from_numpy(points).float(), torch.from_numpy(features))
 
 
@@ -91,14 +111,14 @@ def sample_points(
     """
     grid = voxel_points(observations.bounds_m, side)
     points = [np.concatenate([grid, line_points(observations, rng)])]
-    features = [encoder(observations, points[0])]
+    features = [_features(observations, points[0], encoder)]
     centres, energy = grid, np.sum(features[0][: len(grid)] ** 2, axis=1)
     cell_m = (observations.bounds_m[1] - observations.bounds_m[0]) / side
     for _ in range(levels):
         centres = finer_points(centres, energy, max(1, len(grid) // 64), cell_m)
         cell_m = 0.5 * cell_m
         points.append(centres)
-        features.append(encoder(observations, centres))
+        features.append(_features(observations, centres, encoder))
         energy = np.sum(features[-1] ** 2, axis=1)
     return SamplePoints(
         torch.from_numpy(np.concatenate(points)).float(),

@@ -23,6 +23,7 @@ from rfgs_core.evaluate.rf import HeldOut
 from rfgs_core.gaussians.model import FEATURE_DIM, Gaussians
 from rfgs_core.radio import Radio, layout, place_devices
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.train.observations import Observations, observe
 
 BOUNDS_M = np.array([[0.0, 0.0, 0.0], [4.0, 3.5, 2.5]])
 
@@ -54,6 +55,9 @@ class SurfaceRun:
     def attributes(self, frame: int) -> dict[str, np.ndarray]:
         count = len(self.gaussians(frame))
         return {"features": np.ones((count, FEATURE_DIM)), "rf_power_db": np.zeros(count)}
+
+    def observations(self, frame: int) -> Observations:
+        return observe(self.sequence, "wifi", frame, kind=self.config.get("observe", "complex"))
 
     def predict(self, frame: int) -> np.ndarray:
         return 0.9 * (self.sequence.csi("wifi", frame) - self.sequence.csi_static("wifi"))

@@ -14,6 +14,7 @@ import torch
 from rfgs_core.dataset import open_dataset
 from rfgs_core.errors import RfgsError
 from rfgs_core.train.channel import Channel
+from rfgs_core.train.comparison import comparison_of
 from rfgs_core.train.config import TrainConfig
 from rfgs_core.train.delay_power import DelayPowerModel
 from rfgs_core.train.frame import (
@@ -21,7 +22,6 @@ from rfgs_core.train.frame import (
     noise_per_link,
     solve_reflectivity,
     start_frame,
-    target_of,
     visibility,
 )
 from rfgs_core.train.observations import Observations, observe
@@ -66,7 +66,7 @@ def test_a_pair_that_nothing_changes_leaves_powers_finite(observations) -> None:
 
 
 def test_noise_is_a_share_of_each_pairs_mean_power(observations) -> None:
-    target = target_of(observations)
+    target = comparison_of(observations).measured()
     assert target.shape == (84, 14)
     noise = noise_per_link(observations, target, 0.5)
     pair, names = observations.pairs
@@ -81,7 +81,7 @@ def test_a_silent_pair_is_not_trusted_without_end(observations) -> None:
     pair, _ = observations.pairs
     delta = np.where((pair == 2)[..., None], 0, observations.delta)
     quiet = observations.with_delta(delta)
-    noise = noise_per_link(quiet, target_of(quiet), 0.5)
+    noise = noise_per_link(quiet, comparison_of(quiet).measured(), 0.5)
     assert (noise > 0).all()
 
 
@@ -89,7 +89,7 @@ def test_target_keeps_the_order_of_links(observations) -> None:
     channel = Channel.of(observations, observations.links, observations.tones)
     tones = np.flatnonzero(observations.tones)
     expected = observations.delta[channel.tx, channel.rx][:, tones]
-    np.testing.assert_array_equal(target_of(observations), expected)
+    np.testing.assert_array_equal(comparison_of(observations).measured(), expected)
 
 
 def test_powers_follow_the_channels_scale(observations, make_gaussians, quick_config) -> None:

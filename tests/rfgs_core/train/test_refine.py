@@ -13,8 +13,9 @@ import torch
 from rfgs_core.errors import RfgsError
 from rfgs_core.train import refine as refine_module
 from rfgs_core.train.channel import Channel
+from rfgs_core.train.comparison import comparison_of
 from rfgs_core.train.config import TrainConfig
-from rfgs_core.train.frame import FrameState, noise_per_link, target_of
+from rfgs_core.train.frame import FrameState, noise_per_link
 from rfgs_core.train.head import RadioHead
 from rfgs_core.train.losses import channel_loss
 from rfgs_core.train.observations import Observations
@@ -50,7 +51,7 @@ def state(make_gaussians, head) -> FrameState:
 def cost(observations: Observations, state: FrameState, config: TrainConfig) -> float:
     """Channel loss over all visible links."""
     channel = Channel.of(observations, observations.links, observations.tones)
-    target = target_of(observations)
+    target = comparison_of(observations).measured()
     noise = noise_per_link(observations, target, config.unexplained)
     return channel_loss(channel.change(state.head, state.gaussians), target, noise).item()
 

@@ -21,7 +21,6 @@ from rfgs_core.gaussians.ply import read_ply
 from rfgs_core.render.shader import ShaderConfig
 from rfgs_core.render.view import fit_run_shader
 from rfgs_core.run import Run, open_run
-from rfgs_core.run import training as training_module
 from rfgs_core.train import refine as refine_module
 from rfgs_core.train.observations import observe
 
@@ -134,14 +133,14 @@ def test_a_stopped_run_ends_where_an_undisturbed_one_does(
     out = tmp_path / "run"
     with monkeypatch.context() as patch:
         if when == "before frame 2":
-            real = training_module.observe
+            real = Run.observations
 
-            def stop(sequence, radio, frame, channel):
+            def stop(run, frame):
                 if frame == 2:
                     raise KeyboardInterrupt
-                return real(sequence, radio, frame, channel)
+                return real(run, frame)
 
-            patch.setattr(training_module, "observe", stop)
+            patch.setattr(Run, "observations", stop)
         else:
             patch.setattr(refine_module, "CHECKPOINT_EVERY", 2)
             real_loss, calls = refine_module.channel_loss, []

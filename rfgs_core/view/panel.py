@@ -104,9 +104,9 @@ class Panel:
         index = int(np.flatnonzero(self._frames == frame)[0])
         return frame, int(self._frames[(index + 1) % len(self._frames)])
 
-    def set_frame(self, frame: int) -> None:
-        """Moves the slider."""
-        self._inputs["frame"].value = frame
+    def set(self, field: str, value: Any) -> None:
+        """Moves the control of a number or a tick of `Choice`."""
+        self._inputs[field].value = value
 
     def tell(self, shown: str, legend: str) -> None:
         """Says what is shown and what its colours mean."""

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rfgs_core.dataset.splits import evenly_spaced
 from rfgs_core.errors import RfgsError
 from rfgs_core.render.cameras import Camera
 from rfgs_core.render.view import fitted_shader
@@ -27,7 +26,7 @@ from rfgs_core.view.stage import Stage
 if TYPE_CHECKING:
     from viser import ClientHandle, ViserServer
 
-#: Frames kept in memory.
+#: Frames kept in memory, and frames that scales are made for.
 _KEPT_FRAMES = 8
 
 
@@ -72,8 +71,9 @@ class Viewer:
             raise RfgsError(
                 f"{run.path}: no frame {begin}; it has {', '.join(map(str, self.frames))}"
             )
-        samples = [self.frames[i] for i in (0, *evenly_spaced(len(self.frames)))[:_KEPT_FRAMES]]
-        self.scales = scales_of([self._frame_of(number) for number in samples])
+        chosen = np.linspace(0, len(self.frames) - 1, min(len(self.frames), _KEPT_FRAMES))
+        samples = [self._frame_of(self.frames[round(index)]) for index in chosen]
+        self.scales = scales_of(samples)
         if mode not in self.scales:
             raise RfgsError(
                 f"{run.path}: nothing to colour by {mode}; expected one of {', '.join(self.scales)}"
@@ -85,7 +85,7 @@ class Viewer:
             title=self._title(),
             frames=self.frames,
             modes=list(self.scales),
-            max_opacity=float(first.opacities.max(initial=0.01)),
+            max_opacity=max(float(each.opacities.max(initial=0.01)) for each in samples),
             cameras=list(self._cameras),
             has_truth=first.truth is not None,
             has_room=room is not None,
@@ -154,7 +154,7 @@ class Viewer:
     def _advance(self) -> float:
         """Moves to the next frame; returns how long it lasts [s]."""
         now, following = self.panel.next_frame()
-        self.panel.set_frame(following)
+        self.panel.set("frame", following)
         sequence = self._run.sequence
         return max(sequence.time_s(following) - sequence.time_s(now), 1.0 / sequence.fps)
 

@@ -11,7 +11,7 @@ from typing import Annotated
 import tyro
 
 from rfgs_core.dataset.observed import Observed
-from rfgs_core.train.config import Objective, Observe, Recipe, TrainConfig
+from rfgs_core.train.config import Background, Objective, Observe, Recipe, TrainConfig
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,9 @@ class TrainArgs:
     observe: Observe = "complex"
     """What the radio reports, and all that any stage sees: complex, the channel itself; power,
     |CSI|^2 per link and tone; delay_power, the power of each link's delay profile."""
+    background: Background = "empty_room"
+    """What the moving part is told from: empty_room, its capture; learned, the median over all
+    frames of the sequence, where nobody recorded the empty room."""
     recipe: Recipe = "rfgs"
     """rfgs: our start, rates and steps; paper: the paper's numbers."""
     seed: int = 0
@@ -67,7 +70,7 @@ def run(args: TrainArgs) -> int:
     from rfgs_core.seeds import sub_seed
 
     config = TrainConfig.of_recipe(args.recipe, args.objective, args.seed)
-    config = replace(config, channel=args.channel, observe=args.observe)
+    config = replace(config, channel=args.channel, observe=args.observe, background=args.background)
     if args.iterations is not None:
         if args.iterations < 0:
             raise RfgsError(f"--iterations {args.iterations}: expected at least 0")

@@ -83,6 +83,7 @@ def conditions(scene: Scene) -> dict[str, Any]:
         "voxel_m": scene.grid.voxel_m,
         "objective": scene.run.config.get("objective"),
         "observe": scene.observe,
+        "background": scene.background,
         "recipe": scene.run.config.get("recipe"),
         "seed": scene.run.config.get("seed"),
         "prior": "the person's position is not given; search is over the whole scene",

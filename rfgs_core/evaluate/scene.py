@@ -24,7 +24,7 @@ from rfgs_core.gaussians.model import Gaussians
 from rfgs_core.radio import Layout, Radio
 from rfgs_core.render.view import moving_gaussians
 from rfgs_core.seeds import sub_seed
-from rfgs_core.train.config import Observe
+from rfgs_core.train.config import Background, Observe
 from rfgs_core.train.delay_maps import delay_power_map
 from rfgs_core.train.observations import Observations
 
@@ -125,6 +125,11 @@ class Scene:
         """What the radio reports."""
         return self.run.config.get("observe", "complex")
 
+    @property
+    def background(self) -> Background:
+        """What the moving part was told from."""
+        return self.run.config.get("background", "empty_room")
+
     def csi(self, frame: int) -> Complex[np.ndarray, "tx rx subcarrier"]:
         """True channel of a frame: predictions are held against it, whatever was observed."""
         return self.run.sequence.csi(self.radio.name, frame)
@@ -133,7 +138,7 @@ class Scene:
         """What controls may see of a frame, and where the method's own `score` is centred."""
         csi = observed_csi(self.run.sequence, self.radio.name, frame, self.run.channel)
         static, power_map = self.csi_static, None
-        if self.observe != "complex":
+        if (self.observe, self.background) != ("complex", "empty_room"):
             seen = self.run.observations(frame)
             hidden = ~(seen.links[..., None] & seen.tones)
             csi, static = np.where(hidden, np.nan, seen.delta + seen.static), seen.static

@@ -22,10 +22,12 @@ from rfgs_core.gaussians import FEATURE_DIM, Gaussians
 from rfgs_core.gaussians.ply import read_ply
 from rfgs_core.train.channel import Channel
 from rfgs_core.train.head import HEAD_SHAPES, RadioHead
-from rfgs_core.train.observations import Observations, observe
+from rfgs_core.train.observations import Observations, Reported, observe
 
 #: Schema of `config.json`.
 SCHEMA = "rfgs-run/1"
+#: What a learned background is kept in.
+BACKGROUND_FILE = "background.npz"
 _NEEDED = ("dataset", "dataset_fingerprint", "sequence", "radio", "frames")
 _REMEDY = "train this run again"
 _ATTRIBUTES: dict[str, Shape] = {"features": ("M", FEATURE_DIM), "rf_power_db": ("M",)}
@@ -66,8 +68,15 @@ class Run:
         """What training sees of a frame: the channel as the run's radios report it."""
         return observe(
             *(self.sequence, self.config["radio"], frame, self.channel),
-            kind=self.config.get("observe", "complex"),
+            *(self.config.get("observe", "complex"), self._background()),
         )
+
+    def _background(self) -> Reported | None:
+        """The learned background that training keeps; None with an empty-room capture."""
+        if self.config.get("background", "empty_room") == "empty_room":
+            return None
+        shapes = {"empty": ("tx", "rx", "entry")}
+        return load_arrays(self.path / BACKGROUND_FILE, _REMEDY, shapes)["empty"]
 
     def ply_path(self, frame: int) -> Path:
         """Moving Gaussians of a frame."""

@@ -24,12 +24,13 @@ from rfgs_core.run.encoders import (
     refuse_other_radios,
     run_encoder,
 )
-from rfgs_core.run.folder import SCHEMA, Run, open_run, relative_dataset
+from rfgs_core.run.folder import BACKGROUND_FILE, SCHEMA, Run, open_run, relative_dataset
 from rfgs_core.seeds import sub_seed
 from rfgs_core.threads import one_torch_thread
 from rfgs_core.train.config import TrainConfig
 from rfgs_core.train.frame import FrameState, solve_reflectivity, start_frame
 from rfgs_core.train.head import HEAD_SHAPES, RadioHead
+from rfgs_core.train.learned_background import learned_background
 from rfgs_core.train.observations import need_still_antennas, observe
 from rfgs_core.train.parameters import GAUSSIAN_SHAPES
 from rfgs_core.train.refine import refine
@@ -87,6 +88,9 @@ def train_sequence(
     run = _open_or_create(out, settings)
     if encoder_file is not None and not (out / ENCODER_FILE).exists():
         keep_encoder(encoder_file, out)
+    if config.background == "learned" and not (out / BACKGROUND_FILE).exists():
+        empty = learned_background(sequence, radio, config.channel, config.observe)
+        save_arrays(out / BACKGROUND_FILE, {"empty": empty})
     spent = float(run.config.get("train_s", 0.0))
     before: FrameState | None = None
     with tqdm(total=len(frames) * (config.iterations + 2), desc=f"train {radio}") as bar:

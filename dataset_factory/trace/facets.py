@@ -22,6 +22,7 @@ import math
 import numba
 import numpy as np
 
+from dataset_factory.trace.sums import summed
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
 _BLOCK = 64
@@ -89,25 +90,18 @@ def _geometry(
     return d_t + d_r, 0.5 * q_n / (4.0 * math.pi * d_t * d_r), q_t2
 
 
-# Sums may be reordered in here alone: numba optimises code that it caches once more than code
-# that it runs at once, and reordered terms end in other last bits.
-@numba.njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
-def _add_tone(
+@numba.njit(cache=True, fastmath={"contract", "nsz"})
+def _next_tone(
     value: tuple[np.ndarray, np.ndarray],
     turn: tuple[np.ndarray, np.ndarray],
     fade: np.ndarray,
     filled: int,
-) -> tuple[float, float]:
-    """Sum of a block's phasors, real and imaginary part; moves them on to the next tone."""
-    sum_re, sum_im = 0.0, 0.0
-    for j in range(filled):
-        sum_re += value[0][j]
-        sum_im += value[1][j]
+) -> None:
+    """Moves a block's phasors, given as real and imaginary parts, on to the next tone."""
     for j in range(filled):
         re, im, turn_re, turn_im = value[0][j], value[1][j], turn[0][j], turn[1][j]
         value[0][j], value[1][j] = re * turn_re - im * turn_im, re * turn_im + im * turn_re
         turn[0][j], turn[1][j] = turn_re * fade[j], turn_im * fade[j]
-    return sum_re, sum_im
 
 
 @numba.njit(cache=True, parallel=True, fastmath={"contract", "nsz", "arcp"})
@@ -153,7 +147,8 @@ def _facet_sum(
                 filled += 1
             for tone in range(tones):
                 value, turn = (value_re, value_im), (turn_re, turn_im)
-                sum_re, sum_im = _add_tone(value, turn, fade, filled)
+                sum_re, sum_im = summed(value_re[:filled]), summed(value_im[:filled])
+                _next_tone(value, turn, fade, filled)
                 # The facet's constant phase: Kirchhoff's j.
                 out[tx, rx, tone] += complex(-sum_im, sum_re)
     return out

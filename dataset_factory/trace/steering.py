@@ -16,6 +16,7 @@ import numpy as np
 
 from dataset_factory.trace.paths import PathSet
 from dataset_factory.trace.scene import ports
+from dataset_factory.trace.sums import summed
 from rfgs_core.radio import Layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.images import images
@@ -111,7 +112,7 @@ def _path_to(
     return at_tx + middle_m + at_rx, scale
 
 
-@numba.njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
+@numba.njit(cache=True, fastmath={"contract", "nsz"})
 def _add_block(
     phasor: np.ndarray, turn: np.ndarray, gain: np.ndarray, tones: tuple, out: np.ndarray
 ) -> None:
@@ -127,21 +128,21 @@ def _add_block(
     left, share = tones
     # Rows of their own: one index that cannot be negative, so the loop becomes vector code.
     phasor_re, phasor_im, turn_re, turn_im = phasor[0], phasor[1], turn[0], turn[1]
+    term_re, term_im = np.zeros(len(phasor_re)), np.zeros(len(phasor_re))
     for f in range(len(left)):
         low, high = gain[left[f]], gain[min(left[f] + 1, len(gain) - 1)]
         low_re, low_im, high_re, high_im = low[0], low[1], high[0], high[1]
         part = share[f]
         rest = 1.0 - part
-        sum_re, sum_im = 0.0, 0.0
         for j in range(len(phasor_re)):
             re, im = phasor_re[j], phasor_im[j]
             a_re = rest * low_re[j] + part * high_re[j]
             a_im = rest * low_im[j] + part * high_im[j]
-            sum_re += a_re * re - a_im * im
-            sum_im += a_re * im + a_im * re
+            term_re[j] = a_re * re - a_im * im
+            term_im[j] = a_re * im + a_im * re
             phasor_re[j] = re * turn_re[j] - im * turn_im[j]
             phasor_im[j] = re * turn_im[j] + im * turn_re[j]
-        out[f] += complex(sum_re, sum_im)
+        out[f] += complex(summed(term_re), summed(term_im))
 
 
 @numba.njit(cache=True, parallel=True)

@@ -15,6 +15,7 @@ import hashlib, os, sys
 os.environ["NUMBA_CACHE_DIR"] = sys.argv[1]
 import numpy as np, torch
 from dataset_factory.trace.facets import facet_sum
+from dataset_factory.trace.steering import _steer
 from rfgs_core.propagation import EnvironmentPaths, Links, Tones, scatter, shadow
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
@@ -32,6 +33,17 @@ rx_xyz = rng.normal(size=(links, 3)) * 0.1 + [4.0, 4.0, 1.0]
 freq_hz = 5.72e9 + 2.5e6 * np.arange(33)
 area, weight = np.full(n, 1e-3), np.ones(n)
 show("facets", [facet_sum(points, normals, area, tx_xyz, rx_xyz, weight, freq_hz)])
+
+count, nodes = 300, 5
+complex_ones = rng.normal(size=(count, nodes)) + 1j * rng.normal(size=(count, nodes))
+steered = _steer(
+    (complex_ones, np.ones((0, 0, 0, 0), dtype=np.complex128)),
+    rng.uniform(size=count) < 0.5,
+    (points[:count], points[-count:], rng.uniform(size=count)),
+    rng.normal(size=(count, links, 3)), np.stack([tx_xyz[0], rx_xyz[0]]), tx_xyz, rx_xyz,
+    (np.arange(33) // 9, np.linspace(0.0, 1.0, 33), 120.0, 0.05),
+)
+show("steering", [steered])
 
 def leaf(values):
     return torch.tensor(values, dtype=torch.float32, requires_grad=True)
@@ -59,5 +71,5 @@ def test_the_run_that_compiles_and_later_ones_give_the_same_bytes(python, tmp_pa
         python("-c", _DIGESTS, tmp_path / "cache", must_work=True).stdout for _ in range(2)
     )
     assert list((tmp_path / "cache").rglob("*.nbi")), "expected the first run to fill the cache"
-    assert compiling.count("\n") == 3
+    assert compiling.count("\n") == 4
     assert loading == compiling

@@ -6,8 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from rfgs_core.view.colors import ColorMode
-
+ColorMode = Literal["display", "power", "phase", "error"]
 Drawing = Literal["splats", "points"]
 
 #: Everything that changes how Gaussians look.

@@ -5,14 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import get_args
 
 import numpy as np
 from jaxtyping import Float, Float32
 
+from rfgs_core.view.choice import ColorMode
 from rfgs_core.view.frame import ShownFrame
-
-ColorMode = Literal["display", "power", "phase", "error"]
 
 #: What each mode shows, as the panel says it.
 TITLES: dict[ColorMode, str] = {
@@ -30,7 +29,7 @@ POWER_PERCENTILES = (2.0, 99.5)
 #: Least span of the power scale [dB]: equal powers are no rainbow.
 LEAST_SPAN_DB = 3.0
 
-_MAPS: dict[ColorMode, str] = {"power": "viridis", "phase": "twilight_shifted", "error": "turbo"}
+_MAPS: dict[ColorMode, str] = {"power": "viridis", "phase": "hsv", "error": "turbo"}
 _LEGEND_STOPS = 17
 
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rfgs_core.view.choice import Choice
-from rfgs_core.view.colors import TITLES, ColorMode
+from rfgs_core.view.choice import Choice, ColorMode
+from rfgs_core.view.colors import TITLES
 from rfgs_core.view.pictures import Beside
 
 if TYPE_CHECKING:

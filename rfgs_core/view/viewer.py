@@ -9,13 +9,14 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
+from tqdm import tqdm
 
 from rfgs_core.errors import RfgsError
 from rfgs_core.render.cameras import Camera
 from rfgs_core.render.view import fitted_shader
 from rfgs_core.run import Run
-from rfgs_core.view.choice import GAUSSIAN_FIELDS, Choice
-from rfgs_core.view.colors import ColorMode, colors_of, legend_html, scales_of
+from rfgs_core.view.choice import GAUSSIAN_FIELDS, Choice, ColorMode
+from rfgs_core.view.colors import colors_of, legend_html, scales_of
 from rfgs_core.view.frame import ShownFrame, load_frame
 from rfgs_core.view.panel import Offer, Panel
 from rfgs_core.view.pictures import beside_true
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 
 #: Frames kept in memory, and frames that scales are made for.
 _KEPT_FRAMES = 8
+#: A progress bar is shown for what takes longer.
+_PATIENCE_S = 2.0
 
 
 def finished_frames(run: Run) -> list[int]:
@@ -72,7 +75,8 @@ class Viewer:
                 f"{run.path}: no frame {begin}; it has {', '.join(map(str, self.frames))}"
             )
         chosen = np.linspace(0, len(self.frames) - 1, min(len(self.frames), _KEPT_FRAMES))
-        samples = [self._frame_of(self.frames[round(index)]) for index in chosen]
+        bar = tqdm(chosen, desc="read", unit="frame", delay=_PATIENCE_S, leave=False)
+        samples = [self._frame_of(self.frames[round(index)]) for index in bar]
         self.scales = scales_of(samples)
         if mode not in self.scales:
             raise RfgsError(

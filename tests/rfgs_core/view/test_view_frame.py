@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from known_run import OUTSIDE_M, STATIC
 
 from rfgs_core.errors import RfgsError
 from rfgs_core.render.view import fitted_shader
@@ -18,10 +19,6 @@ from rfgs_core.view.pictures import WIDTH_PX, beside_true
 from rfgs_core.view.radios import radio_shapes
 from rfgs_core.view.room import cut_open, room_of
 from rfgs_core.view.viewer import finished_frames
-
-#: Static Gaussians of the run, and how far its moving ones stand outside the true sphere [m].
-STATIC = 3
-OUTSIDE_M = np.array([0.0, 0.05, 0.1, 0.5])
 
 
 @pytest.fixture(scope="module")

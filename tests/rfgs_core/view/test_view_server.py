@@ -17,11 +17,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from known_run import write_run
 from viser_client import Client, connected
 
 from rfgs_core.cli import main
 from rfgs_core.errors import MissingToolError, RfgsError
-from rfgs_core.run import Run
+from rfgs_core.run import Run, open_run
 from rfgs_core.view.chromium import find_chromium
 from rfgs_core.view.colors import TITLES
 from rfgs_core.view.server import address, running_server
@@ -167,6 +168,25 @@ def test_the_page_is_one_file_from_this_machine(page: tuple[Viewer, Client]) -> 
     assert not re.findall(r"""(?:src|href)=["']?https?://""", text)
 
 
+def test_what_a_capture_does_not_hold_is_not_offered(tiny_dataset: Path, tmp_path: Path) -> None:
+    data = tmp_path / "capture"
+    shutil.copytree(tiny_dataset, data)
+    for name in ("geometry", "images", "images_empty"):
+        shutil.rmtree(data / "tiny" / name)
+    run = open_run(write_run(tmp_path / "run", tiny_dataset, data))
+    with running_server("127.0.0.1", 0) as server:
+        viewer = Viewer(run, server)
+        assert list(viewer.scales) == ["display", "power", "phase"]
+        with connected(server.get_port()) as client:
+            client.read(lambda: "/splats" in client.nodes and "Cameras" in client.controls)
+            client.read(lambda: "no true picture" in str(client.labelled("GuiMarkdownMessage")))
+        assert not {"/truth", "/room/edges"} & set(client.nodes)
+        assert client.controls["True surface"]["disabled"]
+        assert not viewer.panel.choice().truth
+        with pytest.raises(RfgsError, match="nothing to colour by error; expected one of display"):
+            Viewer(run, server, mode="error")
+
+
 def test_a_taken_port_is_one_line(known_run: Run, capsys: pytest.CaptureFixture[str]) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
@@ -245,4 +265,6 @@ def test_ctrl_c_ends_the_program_with_one_line(known_run: Run) -> None:
         assert answer.status == 200
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)
-    assert (process.returncode, out, err) == (0, "", "\nthe viewer has ended\n")
+    assert (process.returncode, out) == (0, "")
+    # On a busy machine a progress bar may stand before it.
+    assert err.endswith("\nthe viewer has ended\n") and "Traceback" not in err

@@ -29,7 +29,9 @@ POWER_PERCENTILES = (2.0, 99.5)
 #: Least span of the power scale [dB]: equal powers are no rainbow.
 LEAST_SPAN_DB = 3.0
 
-_MAPS: dict[ColorMode, str] = {"power": "viridis", "phase": "hsv", "error": "turbo"}
+_MAPS: dict[ColorMode, str] = {"power": "viridis", "error": "turbo"}
+#: Saturation of the circle of hues that phases are shown on: none of them is dark.
+_SATURATION = 0.8
 _LEGEND_STOPS = 17
 
 
@@ -96,8 +98,14 @@ def legend_html(mode: ColorMode, scale: Scale) -> str:
 
 def _map(mode: ColorMode, shares: Float[np.ndarray, "M"]) -> Float32[np.ndarray, "M 3"]:
     from matplotlib import colormaps
+    from matplotlib.colors import hsv_to_rgb
 
-    return colormaps[_MAPS[mode]](shares)[:, :3].astype(np.float32)
+    if mode == "phase":
+        full = np.ones_like(shares)
+        rgb = hsv_to_rgb(np.stack([shares, _SATURATION * full, full], axis=-1))
+    else:
+        rgb = colormaps[_MAPS[mode]](shares)[:, :3]
+    return rgb.astype(np.float32)
 
 
 def _hex(rgb: np.ndarray) -> str:

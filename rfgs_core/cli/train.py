@@ -35,8 +35,8 @@ class TrainArgs:
     objective: Objective = "csi"
     """csi: the propagation model; paper: eq. 4-7 of the paper; both: their sum."""
     encoder: str = "matched_filter"
-    """What gives the 32 features at a point: matched_filter, or cnn:FILE with a file of
-    `rfgs encode`."""
+    """What gives the 32 features at a point: matched_filter; cnn:FILE with a file of
+    `rfgs encode`; or paths, which reads traced paths (of datasets generated with --paths)."""
     channel: Observed = "clean"
     """clean: the traced channel; impaired: what `rfgs-factory impair` made of it. The empty room
     stays clean, since its capture can be averaged."""

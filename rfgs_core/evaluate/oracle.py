@@ -53,7 +53,7 @@ def start_on_surface(
 
 def _fit_from_surface(run: EvaluatedRun, config: TrainConfig, frame: int) -> FrameState:
     observations = run.observations(frame)
-    encoder = run_encoder(run.path, run.config)
+    encoder = run_encoder(run.path, run.config, run.sequence, frame)
     state = start_on_surface(run, observations, config, frame, encoder)
     if config.objective != "paper":
         state = solve_reflectivity(observations, state, config)

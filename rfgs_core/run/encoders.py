@@ -8,13 +8,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from rfgs_core.dataset import Sequence
 from rfgs_core.encode import MATCHED_FILTER, Encoder
 from rfgs_core.encode.learned import load_encoder
 from rfgs_core.encode.learned.signature import RadioSignature
+from rfgs_core.encode.path_features import PathFeatures
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import sha256, write_bytes
+from rfgs_core.radio.path_table import PathTable
 from rfgs_core.train.config import TrainConfig
-from rfgs_core.train.observations import Observations
 
 #: Name of a learned encoder inside a run.
 ENCODER_FILE = "encoder.npz"
@@ -25,16 +29,16 @@ def with_encoder(config: TrainConfig, text: str) -> tuple[TrainConfig, Path | No
 
     Args:
         config: Settings of the run.
-        text: `matched_filter`, or `cnn:FILE` with a file of `rfgs encode`.
+        text: `matched_filter`, `paths`, or `cnn:FILE` with a file of `rfgs encode`.
 
     Raises:
         RfgsError: Nothing like that exists, or the file is no encoder.
     """
     kind, _, name = text.partition(":")
-    if kind == "matched_filter" and not name:
-        return replace(config, encoder="matched_filter"), None
+    if text == "matched_filter" or text == "paths":
+        return replace(config, encoder=text), None
     if kind != "cnn" or not name:
-        raise RfgsError(f"--encoder {text}: expected matched_filter or cnn:FILE")
+        raise RfgsError(f"--encoder {text}: expected matched_filter, paths or cnn:FILE")
     file = Path(name)
     load_encoder(file)
     return replace(config, encoder="cnn", encoder_sha256=sha256(file)), file
@@ -45,22 +49,32 @@ def keep_encoder(file: Path, out: Path) -> None:
     write_bytes(out / ENCODER_FILE, file.read_bytes())
 
 
-def refuse_other_radios(file: Path, observations: Observations) -> None:
+def refuse_other_radios(file: Path, sequence: Sequence, radio: str) -> None:
     """Refuses an encoder that was made for another radio.
 
     Raises:
         RfgsError: Tones or antennas differ.
     """
     encoder = load_encoder(file)
-    encoder.radio.refuse_others(RadioSignature.of(observations), encoder.name)
+    freq_hz = np.asarray(sequence.radio(radio)["freq_hz"].values, dtype=np.float64)
+    encoder.radio.refuse_others(RadioSignature.of(sequence.layout(radio), freq_hz), encoder.name)
 
 
-def run_encoder(run: Path, config: Mapping[str, Any]) -> Encoder:
+def run_encoder(run: Path, config: Mapping[str, Any], sequence: Sequence, frame: int) -> Encoder:
     """The encoder of a run with the given settings.
 
+    Args:
+        run: Folder of the run.
+        config: Its settings.
+        sequence: What it is trained on.
+        frame: Which frame; only encoders of traced paths differ from frame to frame.
+
     Raises:
-        RfgsError: Its learned encoder is missing, damaged or another one.
+        RfgsError: Its learned encoder is missing, damaged or another one, or the dataset holds no
+            paths.
     """
+    if config["encoder"] == "paths":
+        return PathFeatures(moving_paths(sequence, config["radio"], frame))
     if config["encoder"] != "cnn":
         return MATCHED_FILTER
     file = run / ENCODER_FILE
@@ -71,3 +85,14 @@ def run_encoder(run: Path, config: Mapping[str, Any]) -> Encoder:
             f"{expected[:12]}, found {sha256(file)[:12]}); restore it or train again"
         )
     return load_encoder(file)
+
+
+def moving_paths(sequence: Sequence, radio: str, frame: int) -> PathTable:
+    """The traced paths that meet something that moves.
+
+    Raises:
+        RfgsError: The dataset holds no paths.
+    """
+    table = sequence.paths(radio, frame)
+    moving = [row["id"] for row in sequence.info.objects if row["class"] != "static"]
+    return table.select(np.isin(table.object, moving).any(axis=1))

@@ -31,7 +31,7 @@ from rfgs_core.train.config import TrainConfig
 from rfgs_core.train.frame import FrameState, solve_reflectivity, start_frame
 from rfgs_core.train.head import HEAD_SHAPES, RadioHead
 from rfgs_core.train.learned_background import learned_background
-from rfgs_core.train.observations import need_still_antennas, observe
+from rfgs_core.train.observations import need_still_antennas
 from rfgs_core.train.parameters import GAUSSIAN_SHAPES
 from rfgs_core.train.refine import refine
 from rfgs_core.train.tracks import Tracks
@@ -72,8 +72,10 @@ def train_sequence(
             is for another radio.
     """
     need_still_antennas(sequence, radio)
+    if config.encoder == "paths":
+        dataset.need("paths")
     if encoder_file is not None:
-        refuse_other_radios(encoder_file, observe(sequence, radio, frames[0], config.channel))
+        refuse_other_radios(encoder_file, sequence, radio)
     bodies = sum(1 for row in sequence.instances if row["class"] == "person")
     config = replace(config, bodies=max(bodies, 1))
     settings: dict[str, Any] = {
@@ -116,7 +118,7 @@ def fit_frame(
     """Runs all stages on one frame."""
     observations = run.observations(frame)
     seed = sub_seed(config.seed, run.config["sequence"], run.config["radio"], frame, "fit")
-    encoder = run_encoder(run.path, run.config)
+    encoder = run_encoder(run.path, run.config, run.sequence, frame)
     state = start_frame(observations, config, seed, before, encoder)
     bar.update(1)
     if config.objective != "paper":

@@ -10,7 +10,7 @@ from rfgs_core.dataset.observed import Observed
 
 Objective = Literal["paper", "csi", "both"]
 Recipe = Literal["rfgs", "paper"]
-EncoderKind = Literal["matched_filter", "cnn"]
+EncoderKind = Literal["matched_filter", "cnn", "paths"]
 #: complex: the channel itself; power: |csi|² per link and tone; delay_power: the power of each
 #: link's delay profile.
 Observe = Literal["complex", "power", "delay_power"]

@@ -82,7 +82,7 @@ class LearnedEncoder:
         Raises:
             RfgsError: The network cannot take this radio's arrays.
         """
-        radio = RadioSignature.of(seen)
+        radio = RadioSignature.of(seen.layout, seen.freq_hz)
         if kind == "cube":
             radio.need_linear_arrays()
         return LearnedEncoder(kind, EncoderModel(kind, seed), radio)
@@ -95,31 +95,34 @@ class LearnedEncoder:
         Raises:
             RfgsError: The frame is of another radio.
         """
-        self.radio.refuse_others(RadioSignature.of(seen), self.name)
+        self.radio.refuse_others(RadioSignature.of(seen.layout, seen.freq_hz), self.name)
         blocks = Blocks.of(seen)
         pair, _ = seen.pairs
         with torch.no_grad(), one_torch_thread():
             weighed = _per_link(self.model.network(blocks), blocks, pair)
+            profiles = [
+                oversampled_profiles(weighed[:, first : first + _CHANNELS], seen.freq_hz)
+                for first in range(0, FEATURES, _CHANNELS)
+            ]
             rows = [
-                self._read(weighed, seen, blocks, pair, points[start : start + POINTS])
+                self._read(profiles, seen, blocks, pair, points[start : start + POINTS])
                 for start in range(0, len(points), POINTS)
             ]
         return np.concatenate([np.zeros((0, FEATURES), np.float32), *rows])
 
     def _read(
         self,
-        weighed: Complex[np.ndarray, "link 32 subcarrier"],
+        profiles: list[tuple[np.ndarray, float, float]],
         seen: FrameChannel,
         blocks: Blocks,
         pair: np.ndarray,
         points: Float64[np.ndarray, "N 3"],
     ) -> Float32[np.ndarray, "N 32"]:
-        parts = []
-        for first in range(0, FEATURES, _CHANNELS):
-            chosen = weighed[:, first : first + _CHANNELS]
-            profiles, centre_k, samples_per_m = oversampled_profiles(chosen, seen.freq_hz)
-            geometry = (seen.layout.tx_xyz, seen.layout.rx_xyz, pair, points)
-            parts.append(images(profiles, np.full(_CHANNELS, centre_k), samples_per_m, *geometry))
+        geometry = (seen.layout.tx_xyz, seen.layout.rx_xyz, pair, points)
+        parts = [
+            images(profile, np.full(_CHANNELS, centre_k), samples_per_m, *geometry)
+            for profile, centre_k, samples_per_m in profiles
+        ]
         focused = torch.from_numpy(np.concatenate(parts, axis=1))
         return self.model.join(focused, blocks, torch.from_numpy(points)).numpy()
 

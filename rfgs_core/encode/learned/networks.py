@@ -14,6 +14,7 @@ features stay ordered by frequency and keep range resolution. Untrained, every w
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
 from typing import Literal
 
@@ -156,7 +157,11 @@ def _parts(values: Complex[Tensor, "pair *axes"]) -> Float[Tensor, "pair 3 *axes
     return torch.stack([values.real, values.imag, values.abs()], dim=1)
 
 
-NETWORKS: dict[NetworkKind, type[Gates]] = {"csi": CsiGates, "cube": CubeGates, "range": RangeGates}
+NETWORKS: dict[NetworkKind, Callable[[], Gates]] = {
+    "csi": CsiGates,
+    "cube": CubeGates,
+    "range": RangeGates,
+}
 
 
 def network_for(seen: FrameChannel) -> NetworkKind:

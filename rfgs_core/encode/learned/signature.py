@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64
 
-from rfgs_core.encode.protocol import FrameChannel
 from rfgs_core.errors import RfgsError
-from rfgs_core.radio.layout import rotation
+from rfgs_core.radio.layout import Layout, rotation
 
 
 @dataclass(frozen=True)
@@ -25,11 +24,10 @@ class RadioSignature:
     """Receiving elements of a device from their centre [m]."""
 
     @staticmethod
-    def of(seen: FrameChannel) -> RadioSignature:
-        """The signature of a frame's radio."""
-        layout = seen.layout
+    def of(layout: Layout, freq_hz: Float64[np.ndarray, "subcarrier"]) -> RadioSignature:
+        """The signature of a radio."""
         return RadioSignature(
-            seen.freq_hz,
+            freq_hz,
             _offsets_m(layout.tx_xyz, layout.tx_quat_wxyz, layout.tx_device),
             _offsets_m(layout.rx_xyz, layout.rx_quat_wxyz, layout.rx_device),
         )

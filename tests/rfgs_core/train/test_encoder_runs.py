@@ -13,7 +13,7 @@ from rfgs_core.cli import main
 from rfgs_core.dataset import open_dataset
 from rfgs_core.encode.learned import LearnedEncoder, load_encoder, save_encoder
 from rfgs_core.errors import RfgsError
-from rfgs_core.run.encoders import ENCODER_FILE, refuse_other_radios, run_encoder, with_encoder
+from rfgs_core.run.encoders import ENCODER_FILE, run_encoder, with_encoder
 from rfgs_core.run.training import train_sequence
 from rfgs_core.train.config import TrainConfig
 from rfgs_core.train.observations import observe
@@ -80,7 +80,7 @@ def test_a_run_keeps_its_encoder_and_refuses_another(
     assert run.config["encoder"] == "cnn"
     points = np.array([[1.3, 1.4, 1.0]])
     seen = observe(data.sequence(), "wifi", 1)
-    kept = run_encoder(run.path, run.config)
+    kept = run_encoder(run.path, run.config, run.sequence, 1)
     np.testing.assert_array_equal(kept(seen, points), load_encoder(encoder_file)(seen, points))
     train(config, file)
     other = tmp_path / "other.npz"
@@ -91,10 +91,10 @@ def test_a_run_keeps_its_encoder_and_refuses_another(
         train(*with_encoder(paper_config, "matched_filter"))
     (run.path / ENCODER_FILE).write_bytes(other.read_bytes())
     with pytest.raises(RfgsError, match=r"encoder\.npz is not the encoder that this run began"):
-        run_encoder(run.path, run.config)
+        run_encoder(run.path, run.config, run.sequence, 1)
     (run.path / ENCODER_FILE).unlink()
     with pytest.raises(RfgsError, match="no such file"):
-        run_encoder(run.path, run.config)
+        run_encoder(run.path, run.config, run.sequence, 1)
 
 
 def test_the_encoder_changes_what_the_papers_objective_finds(
@@ -109,18 +109,17 @@ def test_the_encoder_changes_what_the_papers_objective_finds(
 
 
 def test_an_encoder_of_another_radio_is_refused_before_anything_is_written(
-    encoder_file: Path, tiny_dataset: Path, tmp_path: Path, make_observations, capsys
+    tiny_dataset: Path, tmp_path: Path, make_observations, capsys
 ) -> None:
-    with pytest.raises(RfgsError, match="was made for a radio of 16 tones"):
-        refuse_other_radios(encoder_file, make_observations())
     foreign = tmp_path / "foreign.npz"
     save_encoder(foreign, LearnedEncoder.untrained("csi", make_observations(), 0))
     command = ["train", str(tiny_dataset), "--radio", "wifi", "--out", str(tmp_path / "run")]
     for encoder, message in (
         (f"cnn:{foreign}", "was made for a radio of 32 tones"),
-        ("cnn", "expected matched_filter or cnn:FILE"),
-        ("transformer:x", "expected matched_filter or cnn:FILE"),
+        ("cnn", "expected matched_filter, paths or cnn:FILE"),
+        ("transformer:x", "expected matched_filter, paths or cnn:FILE"),
         (f"cnn:{tmp_path / 'absent.npz'}", "no such file"),
+        ("paths", "this dataset holds no paths"),
     ):
         assert main([*command, "--encoder", encoder]) == 2
         error = capsys.readouterr().err

@@ -90,7 +90,7 @@ def _geometry(
     return d_t + d_r, 0.5 * q_n / (4.0 * math.pi * d_t * d_r), q_t2
 
 
-@numba.njit(cache=True, fastmath={"contract", "nsz"})
+@numba.njit(cache=True)
 def _next_tone(
     value: tuple[np.ndarray, np.ndarray],
     turn: tuple[np.ndarray, np.ndarray],
@@ -104,7 +104,7 @@ def _next_tone(
         turn[0][j], turn[1][j] = turn_re * fade[j], turn_im * fade[j]
 
 
-@numba.njit(cache=True, parallel=True, fastmath={"contract", "nsz", "arcp"})
+@numba.njit(cache=True, parallel=True)
 def _facet_sum(
     points: np.ndarray,
     normals: np.ndarray,

@@ -112,7 +112,7 @@ def _path_to(
     return at_tx + middle_m + at_rx, scale
 
 
-@numba.njit(cache=True, fastmath={"contract", "nsz"})
+@numba.njit(cache=True)
 def _add_block(
     phasor: np.ndarray, turn: np.ndarray, gain: np.ndarray, tones: tuple, out: np.ndarray
 ) -> None:

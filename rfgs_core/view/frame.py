@@ -16,6 +16,9 @@ from rfgs_core.render.view import colored_cloud
 from rfgs_core.run import Run
 from rfgs_core.seeds import sub_seed
 
+#: Distances to the true surface are not told apart beyond this [m].
+FARTHEST_M = 1.0
+
 
 @dataclass(frozen=True)
 class Mesh:
@@ -46,7 +49,7 @@ class ShownFrame:
     phase_rad: Float32[np.ndarray, "M"]
     """Phase of the complex reflectivity [rad], in (−π, π]."""
     error_m: Float32[np.ndarray, "M"]
-    """Distance of the centre to the true moving surface [m]."""
+    """Distance of the centre to the true moving surface [m], at most `FARTHEST_M`."""
     truth: Mesh | None
     """True surface of what moves; None where the data does not tell."""
 
@@ -98,14 +101,16 @@ def true_surface(run: Run, frame: int) -> Mesh | None:
 
 
 def distance_m(points: Float[np.ndarray, "M 3"], truth: Mesh | None) -> Float32[np.ndarray, "M"]:
-    """Distance to the true surface [m], to the 20,000 samples that evaluation takes of it.
+    """Distance to the true surface [m], to as many samples as evaluation takes of it.
 
-    NaN where there is no truth.
+    `FARTHEST_M` for whatever is farther; NaN where there is no truth.
     """
     if truth is None:
         return np.full(len(points), np.nan, np.float32)
     samples = reference_points(truth.vertices, truth.faces, seed=sub_seed(0, "view"))
-    return KDTree(samples).query(points)[0].astype(np.float32)
+    # A bound saves most of the search where Gaussians fill a room.
+    found = KDTree(samples).query(points, distance_upper_bound=FARTHEST_M)[0]
+    return np.minimum(found, FARTHEST_M).astype(np.float32)
 
 
 def _phase_rad(run: Run, frame: int) -> Float64[np.ndarray, "M"]:

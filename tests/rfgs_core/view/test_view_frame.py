@@ -55,6 +55,13 @@ def test_error_is_the_distance_to_the_true_surface(shown: ShownFrame) -> None:
     assert too_far.max() < 0.017 and too_far.mean() < 0.004
 
 
+def test_whatever_is_farther_than_a_metre_is_a_metre_away(shown: ShownFrame) -> None:
+    assert shown.truth is not None
+    top = shown.truth.vertices[shown.truth.vertices[:, 2].argmax()]
+    above = top + np.array([[0.0, 0.0, 0.9], [0.0, 0.0, 1.1], [0.0, 0.0, 50.0]])
+    np.testing.assert_allclose(distance_m(above, shown.truth), [0.9, 1.0, 1.0], atol=0.003)
+
+
 def test_the_truth_moves_with_the_frame(known_run: Run, shown: ShownFrame) -> None:
     other = load_frame(known_run, 2, None)
     assert shown.truth is not None and other.truth is not None

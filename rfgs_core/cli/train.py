@@ -11,7 +11,14 @@ from typing import Annotated
 import tyro
 
 from rfgs_core.dataset.observed import Observed
-from rfgs_core.train.config import Background, Objective, Observe, Recipe, TrainConfig
+from rfgs_core.train.config import (
+    Background,
+    Calibrate,
+    Objective,
+    Observe,
+    Recipe,
+    TrainConfig,
+)
 
 
 @dataclass(frozen=True)
@@ -48,6 +55,9 @@ class TrainArgs:
     frames of the sequence, where nobody recorded the empty room."""
     recipe: Recipe = "rfgs"
     """rfgs: our start, rates and steps; paper: the paper's numbers."""
+    calibrate: Calibrate = "none"
+    """Estimate each device's phase and timing offset and take them out: of oscillators (phase), of
+    clocks (timing) or both. From the empty room first, then together with the Gaussians."""
     seed: int = 0
     """Root seed; 0 is a seed like any other."""
     iterations: int | None = None
@@ -65,12 +75,19 @@ def run(args: TrainArgs) -> int:
     from rfgs_core.frames import chosen_frames
     from rfgs_core.render.shader import ShaderConfig
     from rfgs_core.render.view import fit_run_shader
+    from rfgs_core.run.calibration import calibration_text
     from rfgs_core.run.encoders import with_encoder
     from rfgs_core.run.training import train_sequence
     from rfgs_core.seeds import sub_seed
 
     config = TrainConfig.of_recipe(args.recipe, args.objective, args.seed)
-    config = replace(config, channel=args.channel, observe=args.observe, background=args.background)
+    config = replace(
+        config,
+        channel=args.channel,
+        observe=args.observe,
+        background=args.background,
+        calibrate=args.calibrate,
+    )
     if args.iterations is not None:
         if args.iterations < 0:
             raise RfgsError(f"--iterations {args.iterations}: expected at least 0")
@@ -89,6 +106,8 @@ def run(args: TrainArgs) -> int:
         )
     frames = chosen_frames(args.frames, sequence.frames)
     trained = train_sequence(dataset, sequence, args.radio, frames, config, args.out, encoder_file)
+    if args.calibrate != "none":
+        sys.stdout.write(f"offsets: {calibration_text(args.out, frames)}\n")
     pictures = {"images", "mask"} <= set(dataset.has)
     if args.shader and pictures and not (args.out / "shader.npz").exists():
         seed = sub_seed(args.seed, "shader")

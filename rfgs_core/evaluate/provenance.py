@@ -13,6 +13,7 @@ from typing import Any
 
 from rfgs_core.evaluate.scene import Scene
 from rfgs_core.radio.impairments import Impairments
+from rfgs_core.run.calibration import calibration_text
 
 PACKAGES = ("rfgs", "torch", "numpy", "numba", "scipy", "sionna-rt", "mitsuba", "bpy")
 
@@ -74,6 +75,7 @@ def conditions(scene: Scene) -> dict[str, Any]:
     return {
         "label": label,
         "impairments": _impairments(scene),
+        "calibration": _calibration(scene),
         "shadow": info.shadow,
         "scene": info.scene,
         "sequence": scene.run.sequence.name,
@@ -97,6 +99,13 @@ def _impairments(scene: Scene) -> str:
     chosen = asdict(scene.run.sequence.impairments(scene.radio.name).settings)
     plain = asdict(Impairments())
     return ", ".join(f"{name} {chosen[name]}" for name in chosen if chosen[name] != plain[name])
+
+
+def _calibration(scene: Scene) -> str:
+    """Offsets of devices that were estimated and taken out."""
+    if scene.run.config.get("calibrate", "none") == "none":
+        return "none"
+    return calibration_text(scene.run.path, scene.run.frames)
 
 
 def limits(scene: Scene) -> dict[str, float | None]:

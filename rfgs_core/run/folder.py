@@ -20,6 +20,7 @@ from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.files import read_json
 from rfgs_core.gaussians import FEATURE_DIM, Gaussians
 from rfgs_core.gaussians.ply import read_ply
+from rfgs_core.run.calibration import read_calibration
 from rfgs_core.train.channel import Channel
 from rfgs_core.train.head import HEAD_SHAPES, RadioHead
 from rfgs_core.train.observations import Observations, Reported, observe
@@ -64,8 +65,20 @@ class Run:
             self.path, place, self.config["sequence"], self.config["dataset_fingerprint"]
         )
 
+    @property
+    def calibrated(self) -> bool:
+        """Whether offsets of devices are taken out before the fit."""
+        return self.config.get("calibrate", "none") != "none"
+
     def observations(self, frame: int) -> Observations:
-        """What training sees of a frame: the channel as the run's radios report it."""
+        """What the fit sees of a frame: as reported, without the offsets of a calibrated run."""
+        reported = self.as_reported(frame)
+        if not self.calibrated:
+            return reported
+        return read_calibration(self.path, frame).undone(reported)
+
+    def as_reported(self, frame: int) -> Observations:
+        """The channel of a frame as the run's radios report it."""
         return observe(
             *(self.sequence, self.config["radio"], frame, self.channel),
             *(self.config.get("observe", "complex"), self._background()),
@@ -127,7 +140,10 @@ class Run:
         return RadioHead.of_arrays(stored)
 
     def predict(self, frame: int) -> Complex64[np.ndarray, "tx rx subcarrier"]:
-        """Predicted csi − csi_static on every measured link, held-out ones included."""
+        """Predicted csi − csi_static on every measured link, held-out ones included.
+
+        Of a calibrated run: as devices with the offsets of the empty room's capture see it.
+        """
         observations = self.observations(frame)
         everything = np.ones(len(observations.freq_hz), dtype=bool)
         channel = Channel.of(observations, observations.layout.measured, everything)
@@ -135,6 +151,10 @@ class Run:
             change = channel.change(self.head, self.moving(frame)).numpy()
         csi = np.zeros_like(observations.delta)
         csi[channel.tx, channel.rx] = change
+        if self.calibrated:
+            offsets = read_calibration(self.path, frame).capture
+            turn = offsets.turn(observations.layout, observations.freq_hz)
+            csi = (csi * turn).astype(np.complex64)
         return csi
 
 

@@ -18,6 +18,12 @@ from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json, write_json
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.gaussians.ply import cloud_of, read_ply, write_ply
+from rfgs_core.run.calibration import (
+    calibration_path,
+    need_shared_links,
+    read_calibration,
+    write_calibration,
+)
 from rfgs_core.run.encoders import (
     ENCODER_FILE,
     keep_encoder,
@@ -27,11 +33,13 @@ from rfgs_core.run.encoders import (
 from rfgs_core.run.folder import BACKGROUND_FILE, SCHEMA, Run, open_run, relative_dataset
 from rfgs_core.seeds import sub_seed
 from rfgs_core.threads import one_torch_thread
+from rfgs_core.train.calibrate import calibrate
 from rfgs_core.train.config import TrainConfig
 from rfgs_core.train.frame import FrameState, solve_reflectivity, start_frame
 from rfgs_core.train.head import HEAD_SHAPES, RadioHead
 from rfgs_core.train.learned_background import learned_background
 from rfgs_core.train.observations import need_still_antennas
+from rfgs_core.train.offsets import Offsets
 from rfgs_core.train.parameters import GAUSSIAN_SHAPES
 from rfgs_core.train.refine import refine
 from rfgs_core.train.tracks import Tracks
@@ -68,10 +76,11 @@ def train_sequence(
         encoder_file: Learned encoder of the settings, copied into the run.
 
     Raises:
-        RfgsError: `out` holds a run with other settings, the radio's antennas move, or the encoder
-            is for another radio.
+        RfgsError: `out` holds a run with other settings, the radio's antennas move or it cannot be
+            calibrated, or the encoder is for another radio.
     """
     need_still_antennas(sequence, radio)
+    need_shared_links(sequence, radio, config)
     if config.encoder == "paths":
         dataset.need("paths")
     if encoder_file is not None:
@@ -116,8 +125,10 @@ def fit_frame(
     run: Run, frame: int, config: TrainConfig, before: FrameState | None, bar: Any
 ) -> FrameState:
     """Runs all stages on one frame."""
-    observations = run.observations(frame)
     seed = sub_seed(config.seed, run.config["sequence"], run.config["radio"], frame, "fit")
+    if config.calibrate != "none":
+        _calibrate(run, frame, config, seed)
+    observations = run.observations(frame)
     encoder = run_encoder(run.path, run.config, run.sequence, frame)
     state = start_frame(observations, config, seed, before, encoder)
     bar.update(1)
@@ -134,6 +145,19 @@ def fit_frame(
     if config.objective == "paper":
         state = solve_reflectivity(observations, state, config)
     return state
+
+
+def _calibrate(run: Run, frame: int, config: TrainConfig, seed: int) -> None:
+    """Finds a frame's offsets, unless that is done."""
+    if calibration_path(run.path, frame).exists():
+        return
+    reported, known = run.as_reported(frame), None
+    if config.channel == "impaired" and config.background == "empty_room":
+        # The empty room of impaired channels is the clean one.
+        known = Offsets.none(reported.layout)
+    elif frame != run.frames[0]:
+        known = read_calibration(run.path, run.frames[0]).capture
+    write_calibration(run.path, frame, calibrate(reported, config, seed, known))
 
 
 def _open_or_create(out: Path, settings: dict[str, Any]) -> Run:

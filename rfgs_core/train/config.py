@@ -16,6 +16,8 @@ EncoderKind = Literal["matched_filter", "cnn", "paths"]
 Observe = Literal["complex", "power", "delay_power"]
 #: empty_room: the capture without anything that moves; learned: the median over the frames.
 Background = Literal["empty_room", "learned"]
+#: Offsets of devices that are estimated: none, of oscillators, of clocks, or of both.
+Calibrate = Literal["none", "phase", "timing", "both"]
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,8 @@ class TrainConfig:
     """Digest of the learned encoder's file; empty for the others."""
     unexplained: float = 0.5
     """Share of each device pair's power that the model is not asked to explain."""
+    calibrate: Calibrate = "none"
+    """Offsets of devices that are estimated and taken out before the fit."""
     seed: int = 0
     """Root seed."""
 

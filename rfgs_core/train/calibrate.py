@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Self-calibration: offsets of devices from the empty room first, then from the Gaussians.
+
+Three comparisons of channels with what they should be, all by `offsets.estimate_offsets`:
+
+1. drift: a frame beside the empty room. What stands still rules both, so no model is needed;
+2. capture: the empty room beside Friis' direct paths between the devices. Reflections bias it
+   by what they bend the sum and is not the same in both directions;
+3. the change of the channel beside what Gaussians fitted to it predict, in turn with that fit,
+   together with 2: the Gaussians alone would follow wrong offsets, the direct paths alone their
+   reflections.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from jaxtyping import Complex64
+
+from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.train.channel import Channel
+from rfgs_core.train.config import TrainConfig
+from rfgs_core.train.frame import solve_reflectivity, start_frame
+from rfgs_core.train.observations import Observations
+from rfgs_core.train.offsets import CrossSpectra, Offsets, estimate_offsets
+
+#: Times that Gaussians and offsets are fitted in turn.
+TURNS = 2
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Offsets of a frame's devices."""
+
+    capture: Offsets
+    """Those the empty room was captured with, against the geometry."""
+    drift: Offsets
+    """By how much the frame's differ from these."""
+
+    def undone(self, observations: Observations) -> Observations:
+        """Observations of the frame as devices without offsets would have made them."""
+        frame = observations.delta + observations.static
+        back = np.conj(self.drift.turn(observations.layout, observations.freq_hz))
+        aligned = observations.with_delta(frame * back - observations.static)
+        return self.capture.undone(aligned)
+
+
+def calibrate(
+    observations: Observations, config: TrainConfig, seed: int, known: Offsets | None = None
+) -> Calibration:
+    """Offsets of a frame.
+
+    Args:
+        observations: The frame as observed.
+        config: Which offsets may exist (`calibrate`), and how Gaussians are fitted.
+        seed: Seed of that fit.
+        known: Offsets of the empty room's capture, found on an earlier frame; None finds them.
+
+    Raises:
+        RfgsError: The links do not connect the devices, as in a radio that hears only itself.
+    """
+    frame = observations.delta + observations.static
+    drift = _likeliest(CrossSpectra.of(observations, frame, observations.static), config, 1e-3)
+    if known is not None:
+        return Calibration(known, drift)
+    aligned = Calibration(Offsets.none(observations.layout), drift).undone(observations)
+    straight = CrossSpectra.of(observations, observations.static, direct_channel(observations))
+    capture = _likeliest(straight, config, config.unexplained)
+    for _ in range(TURNS):
+        change = _fitted_change(capture.undone(aligned), config, seed)
+        scattered = CrossSpectra.of(observations, aligned.delta, change)
+        both = CrossSpectra.join(straight, scattered)
+        capture = _likeliest(both, config, config.unexplained)
+    return Calibration(capture, drift)
+
+
+def _likeliest(spectra: CrossSpectra, config: TrainConfig, least_noise: float) -> Offsets:
+    return estimate_offsets(
+        spectra,
+        phase=config.calibrate != "timing",
+        timing=config.calibrate != "phase",
+        least_noise=least_noise,
+    )
+
+
+def direct_channel(observations: Observations) -> Complex64[np.ndarray, "tx rx subcarrier"]:
+    """Friis' direct path of every link, λ/(4πd) e^{−j2πfd/c}."""
+    offset = observations.layout.tx_xyz[:, None] - observations.layout.rx_xyz
+    length_m = np.maximum(np.linalg.norm(offset, axis=2), 1e-3)[..., None]
+    wavelength_m = SPEED_OF_LIGHT / observations.freq_hz
+    turn = np.exp(-2j * np.pi * length_m / wavelength_m)
+    return (wavelength_m / (4 * np.pi * length_m) * turn).astype(np.complex64)
+
+
+def _fitted_change(
+    observations: Observations, config: TrainConfig, seed: int
+) -> Complex64[np.ndarray, "tx rx subcarrier"]:
+    """What Gaussians fitted to the observations predict at the visible entries."""
+    state = start_frame(observations, replace(config, power_steps=0), seed, None)
+    state = solve_reflectivity(observations, state, config)
+    channel = Channel.of(observations, observations.links, observations.tones)
+    change = np.zeros_like(observations.delta)
+    with torch.no_grad():
+        predicted = channel.change(state.head, state.gaussians).numpy()
+    tone = np.flatnonzero(observations.tones)
+    change[channel.tx[:, None], channel.rx[:, None], tone] = predicted
+    return change

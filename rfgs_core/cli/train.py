@@ -14,6 +14,7 @@ from rfgs_core.dataset.observed import Observed
 from rfgs_core.train.config import (
     Background,
     Calibrate,
+    Density,
     Objective,
     Observe,
     Recipe,
@@ -53,6 +54,10 @@ class TrainArgs:
     background: Background = "empty_room"
     """What the moving part is told from: empty_room, its capture; learned, the median over all
     frames of the sequence, where nobody recorded the empty room."""
+    density: Density | None = None
+    """How Gaussians come and go: none; paper, section 3.5 of the paper (needs its losses); 3dgs,
+    clone, split, prune and reset; residual, new ones where the back-projected residual peaks.
+    Left out: paper with the paper's losses, else none."""
     recipe: Recipe = "rfgs"
     """rfgs: our start, rates and steps; paper: the paper's numbers."""
     calibrate: Calibrate = "none"
@@ -87,6 +92,7 @@ def run(args: TrainArgs) -> int:
         observe=args.observe,
         background=args.background,
         calibrate=args.calibrate,
+        density=args.density,
     )
     if args.iterations is not None:
         if args.iterations < 0:

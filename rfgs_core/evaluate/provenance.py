@@ -86,6 +86,7 @@ def conditions(scene: Scene) -> dict[str, Any]:
         "objective": scene.run.config.get("objective"),
         "observe": scene.observe,
         "background": scene.background,
+        "density": scene.run.config.get("density"),
         "recipe": scene.run.config.get("recipe"),
         "seed": scene.run.config.get("seed"),
         "prior": "the person's position is not given; search is over the whole scene",

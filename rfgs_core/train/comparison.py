@@ -7,7 +7,7 @@ change Δ. Each comparison turns Δ into what that radio would have reported.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -36,6 +36,12 @@ class Comparison(Protocol):
         """The part of `predicted` that is linear in the change, all links; None without one."""
         ...
 
+    def left(
+        self, observations: Observations, change: Complex[Tensor, "link subcarrier"]
+    ) -> Observations:
+        """The observations less what the change of all links explains of them."""
+        ...
+
 
 @dataclass(frozen=True)
 class ComplexComparison:
@@ -59,6 +65,23 @@ class ComplexComparison:
     ) -> Complex[Tensor, "link subcarrier"]:
         """The change."""
         return change
+
+    def left(
+        self, observations: Observations, change: Complex[Tensor, "link subcarrier"]
+    ) -> Observations:
+        """The residual channel."""
+        return _with_entries(observations, (self.target - change).numpy())
+
+
+def _with_entries(
+    observations: Observations, entries: Complex[np.ndarray, "link tone"]
+) -> Observations:
+    """The observations with other visible entries of the change."""
+    delta = np.zeros_like(observations.delta)
+    tx, rx = np.nonzero(observations.links)
+    tones = np.flatnonzero(observations.tones)
+    delta[tx[:, None], rx[:, None], tones] = entries
+    return observations.with_delta(delta)
 
 
 @dataclass(frozen=True)
@@ -102,6 +125,15 @@ class PowerComparison:
         """2 Re(H₀* Δ) / level."""
         return 2.0 * (self.empty.conj() * change).real / self.level
 
+    def left(
+        self, observations: Observations, change: Complex[Tensor, "link subcarrier"]
+    ) -> Observations:
+        """The hologram of what is left."""
+        left = self.target - self.predicted(change, np.arange(len(self.target)))
+        wave = direct_wave(observations.layout, observations.freq_hz)
+        wave = wave[observations.links][:, observations.tones]
+        return _with_entries(observations, left.numpy() * wave)
+
 
 @dataclass(frozen=True)
 class DelayComparison:
@@ -140,6 +172,15 @@ class DelayComparison:
     def linear(self, change: Complex[Tensor, "link subcarrier"]) -> None:
         """An amplitude has no linear part."""
         return None
+
+    def left(
+        self, observations: Observations, change: Complex[Tensor, "link subcarrier"]
+    ) -> Observations:
+        """Amplitudes above the predicted ones."""
+        left = self.target - self.predicted(change, np.arange(len(self.target)))
+        delay_change = np.zeros((*observations.links.shape, left.shape[1]), dtype=np.float32)
+        delay_change[observations.links] = left.clamp(min=0.0).numpy()
+        return replace(observations, delay_change=delay_change)
 
 
 def comparison_of(observations: Observations) -> Comparison:

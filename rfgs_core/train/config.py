@@ -18,6 +18,9 @@ Observe = Literal["complex", "power", "delay_power"]
 Background = Literal["empty_room", "learned"]
 #: Offsets of devices that are estimated: none, of oscillators, of clocks, or of both.
 Calibrate = Literal["none", "phase", "timing", "both"]
+#: none; paper: section 3.5; 3dgs: clone, split, prune, reset; residual: at peaks of the
+#: back-projected residual.
+Density = Literal["none", "paper", "3dgs", "residual"]
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,9 @@ class TrainConfig:
     """Conjugate-gradient steps for the reflectivities."""
     iterations: int = 80
     """Adam steps per frame (the paper: 10,000)."""
+    density: Density | None = None
+    """How Gaussians come and go while they are refined; None: as the objective does, the
+    paper's rule with the paper's losses and none without."""
     batch_entries: int = 8192
     """Channel entries (links times tones) per Adam step of the channel loss."""
     batch_points: int = 1024

@@ -49,13 +49,14 @@ def learned_background(
             f"{sequence.path}: holds {len(sequence.frames)} frames; expected at least "
             f"{LEAST_FRAMES} to learn the background from; use --background empty_room"
         )
-    rows, ever, shape = [], None, ()
+    measured = sequence.radio(radio)["measured"].values
+    ever, rows, shape = np.zeros_like(measured), [], ()
     for frame in sequence.frames:
-        layout, links, tones, csi = visible_channel(sequence, radio, frame, channel)
+        _, links, tones, csi = visible_channel(sequence, radio, frame, channel)
         values = reported(np.where(tones, csi, 0), tones, kind)
-        rows.append(np.where(links[..., None], values, np.nan)[layout.measured])
-        ever = links if ever is None else ever | links
-        measured, shape = layout.measured, values.shape
+        rows.append(np.where(links[..., None], values, np.nan)[measured])
+        ever |= links
+        shape = values.shape
     stack = np.stack(rows)[:, ever[measured]]
     median = np.nanmedian(stack.real, axis=0)
     if kind == "complex":

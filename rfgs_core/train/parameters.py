@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import torch
-from jaxtyping import Bool
+from jaxtyping import Bool, Int64
 from torch import Tensor
 
 from rfgs_core.arrays import Shape
@@ -43,6 +44,8 @@ class TrainableGaussians:
 
     def __init__(self, gaussians: Gaussians, rates: LearningRates) -> None:
         self.rates = rates
+        #: Row at the start that each Gaussian is or stems from; −1: none.
+        self.origin = torch.arange(len(gaussians))
         #: Whether rows have come or gone since the start.
         self.edited = False
         # Row-major whatever came: kernels round differently on another layout, and a checkpoint
@@ -66,33 +69,48 @@ class TrainableGaussians:
         """The Gaussians; gradients flow into the leaves."""
         return Gaussians(**self.leaves)
 
-    def edit_rows(self, keep: Bool[Tensor, "M"], new: Gaussians | None = None) -> None:
-        """Drops rows and appends new ones, in the parameters and in Adam's moments alike.
+    def edit_rows(
+        self,
+        keep: Bool[Tensor, "M"],
+        new: Gaussians | None = None,
+        *,
+        parents: Int64[Tensor, "N"] | None = None,
+        replaced: Mapping[str, Tensor] | None = None,
+    ) -> None:
+        """Drops rows, appends and overwrites, in the parameters and in Adam's moments alike.
 
-        New rows start with zero moments.
+        Args:
+            keep: Rows that stay.
+            new: Rows that come; their moments are zero.
+            parents: Present row that each new one stems from; None: they stem from none.
+            replaced: New values of whole parameters, a row for each of the present ones; the
+                moments of these parameters start over.
         """
-        self.edited = True
+        if new is not None or not bool(keep.all()):
+            self.edited = True
         old = {name: self.optimiser.state.get(leaf, {}) for name, leaf in self.leaves.items()}
         added = dict((new or Gaussians.none()).items())
+        count = len(added["means"])
+        stems = torch.full((count,), -1) if parents is None else self.origin[parents]
+        self.origin = torch.cat([self.origin[keep], stems])
+        values = {name: leaf.detach() for name, leaf in self.leaves.items()} | dict(replaced or {})
         self._adopt(
-            {
-                name: torch.cat([leaf.detach()[keep], added[name].detach()])
-                for name, leaf in self.leaves.items()
-            }
+            {name: torch.cat([value[keep], added[name].detach()]) for name, value in values.items()}
         )
         for name, leaf in self.leaves.items():
             if old[name]:
+                kept = 0.0 if name in (replaced or {}) else 1.0
                 self.optimiser.state[leaf] = {
                     "step": old[name]["step"],
                     **{
-                        key: torch.cat([old[name][key][keep], torch.zeros_like(added[name])])
+                        key: torch.cat([old[name][key][keep] * kept, torch.zeros_like(added[name])])
                         for key in _STATE
                     },
                 }
 
     def state(self) -> dict[str, np.ndarray]:
         """Parameters and moments as arrays, for a checkpoint without pickle."""
-        arrays = {"edited": np.array(self.edited)}
+        arrays = {"edited": np.array(self.edited), "origin": self.origin.numpy()}
         for name, leaf in self.leaves.items():
             arrays[name] = leaf.detach().numpy()
             state = self.optimiser.state.get(leaf, {})
@@ -111,6 +129,7 @@ class TrainableGaussians:
             fields = {name: torch.from_numpy(arrays[name].copy()) for name in GAUSSIAN_SHAPES}
             result = TrainableGaussians(Gaussians(**fields), rates)
             result.edited = bool(arrays["edited"])
+            result.origin = torch.from_numpy(arrays["origin"].copy())
             for name, leaf in result.leaves.items():
                 if f"{name}.step" in arrays:
                     result.optimiser.state[leaf] = {

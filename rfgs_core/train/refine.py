@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int64
 from torch import Tensor
 
 from rfgs_core.arrays import load_arrays, save_arrays
@@ -20,7 +20,16 @@ from rfgs_core.seeds import sub_seed
 from rfgs_core.train.channel import Channel
 from rfgs_core.train.comparison import Comparison, comparison_of
 from rfgs_core.train.config import TrainConfig
-from rfgs_core.train.density import DensityRule, PaperDensity
+from rfgs_core.train.density import (
+    DensityControl,
+    DensityRule,
+    NoDensity,
+    PaperDensity,
+    ResidualDensity,
+    ResidualRule,
+    StandardDensity,
+    StandardRule,
+)
 from rfgs_core.train.frame import FrameState, noise_per_link
 from rfgs_core.train.losses import SamplePoints, channel_loss, paper_loss
 from rfgs_core.train.observations import Observations
@@ -123,8 +132,9 @@ def refine(
     """
     task = Task.of(observations, config, seed, encoder)
     rates = LearningRates() if config.recipe == "paper" else CHANNEL_RATES
-    trained, first = _resume(checkpoint, state.gaussians, rates)
-    density = PaperDensity(DensityRule())
+    trained, first, memory = _resume(checkpoint, state.gaussians, rates)
+    density = density_control(observations, state, config, seed, task)
+    density.resume(memory)
     for step in range(first + 1, config.iterations + 1):
         links, chosen = _batch(task, config, seed, step)
         links = links if config.objective != "paper" else links[:0]
@@ -138,37 +148,96 @@ def refine(
         trained.optimiser.zero_grad()
         loss.backward()
         trained.optimiser.step()
-        if points is not None:
-            density.after_step(step, trained, points)
+        density.after_step(step, trained, points)
         if checkpoint is not None and step % CHECKPOINT_EVERY == 0:
-            save_arrays(checkpoint, {**trained.state(), "finished_steps": np.array(step)})
+            _save(checkpoint, step, trained, density)
         if on_step is not None:
             on_step(float(loss.detach()), len(trained.gaussians))
-    return _with_gaussians(state, trained)
+    return _with_gaussians(state, trained, config)
+
+
+def density_control(
+    observations: Observations, state: FrameState, config: TrainConfig, seed: int, task: Task
+) -> DensityControl:
+    """The density control of the settings.
+
+    Raises:
+        RfgsError: The paper's rule is asked for without the paper's losses.
+    """
+    kind = config.density or ("none" if task.points is None else "paper")
+    if kind == "paper":
+        if task.points is None:
+            raise RfgsError(
+                "--density paper reads the sample points of the paper's losses; expected "
+                "--objective paper or both, or another --density"
+            )
+        return PaperDensity(DensityRule())
+    if kind == "3dgs":
+        layout = observations.layout
+        antennas = np.concatenate([layout.tx_xyz, layout.rx_xyz])
+        radius_m = np.linalg.norm(antennas - antennas.mean(axis=0), axis=1).max()
+        return StandardDensity(StandardRule.for_steps(config.iterations), 1.1 * radius_m, seed)
+    if kind == "residual":
+        return ResidualDensity(
+            *(ResidualRule(), observations, task.channel, task.comparison, task.noise),
+            *(state.head, state.tracks.axes_xy, config.iterations),
+        )
+    return NoDensity()
+
+
+def _save(
+    checkpoint: Path, step: int, trained: TrainableGaussians, density: DensityControl
+) -> None:
+    memory = {f"density.{name}": value for name, value in density.state().items()}
+    save_arrays(checkpoint, {**trained.state(), **memory, "finished_steps": np.array(step)})
 
 
 def _resume(
     checkpoint: Path | None, start: Gaussians, rates: LearningRates
-) -> tuple[TrainableGaussians, int]:
+) -> tuple[TrainableGaussians, int, dict[str, np.ndarray]]:
     if checkpoint is None or not checkpoint.exists():
-        return TrainableGaussians(start, rates), 0
+        return TrainableGaussians(start, rates), 0, {}
     arrays = load_arrays(
         checkpoint,
         "delete it to start this frame over",
-        {**GAUSSIAN_SHAPES, "edited": (), "finished_steps": ()},
+        {**GAUSSIAN_SHAPES, "edited": (), "origin": ("M",), "finished_steps": ()},
     )
-    return TrainableGaussians.restore(arrays, rates), int(arrays["finished_steps"])
+    mark = "density."
+    memory = {k.removeprefix(mark): v for k, v in arrays.items() if k.startswith(mark)}
+    return TrainableGaussians.restore(arrays, rates), int(arrays["finished_steps"]), memory
 
 
-def _with_gaussians(state: FrameState, trained: TrainableGaussians) -> FrameState:
-    """The state with the trained Gaussians; where rows came or went, powers and tracks are new."""
+def _with_gaussians(
+    state: FrameState, trained: TrainableGaussians, config: TrainConfig
+) -> FrameState:
+    """The state with the trained Gaussians; what came anew has its own power and track.
+
+    With the paper's objective features are no reflectivities, and all powers are new.
+    """
     gaussians = trained.gaussians.detach()
     if not trained.edited:
         return replace(state, gaussians=gaussians)
-    strength = torch.linalg.norm(gaussians.features, dim=1) ** 2 * gaussians.opacities
+    if config.objective == "paper":
+        strength = torch.linalg.norm(gaussians.features, dim=1) ** 2 * gaussians.opacities
+        power = strength * state.head.gamma_scale_m**2
+        return replace(state, gaussians=gaussians, power=power, track_id=np.arange(len(gaussians)))
+    origin = trained.origin
+    known = origin >= 0
+    shares = torch.bincount(origin[known], minlength=len(state.power)).clamp(min=1)
+    inherited = (state.power / shares)[origin.clamp(min=0)]
+    power = torch.where(known, inherited, state.head.gamma(gaussians.features).abs() ** 2)
     return replace(
-        state,
-        gaussians=gaussians,
-        power=strength * state.head.gamma_scale_m**2,
-        track_id=np.arange(len(gaussians), dtype=np.int64),
+        state, gaussians=gaussians, power=power, track_id=_tracks(state.track_id, origin.numpy())
     )
+
+
+def _tracks(
+    before: Int64[np.ndarray, "start"], origin: Int64[np.ndarray, "M"]
+) -> Int64[np.ndarray, "M"]:
+    """Track numbers of rows: the first that stems from an earlier one goes on, others are new."""
+    track_id = np.full(len(origin), -1, dtype=np.int64)
+    earlier, first = np.unique(origin, return_index=True)
+    track_id[first[earlier >= 0]] = before[earlier[earlier >= 0]]
+    fresh = track_id < 0
+    track_id[fresh] = before.max(initial=-1) + 1 + np.arange(int(fresh.sum()))
+    return track_id

@@ -106,7 +106,7 @@ def test_a_restored_state_is_the_same_to_the_bit(trained: TrainableGaussians) ->
     other = TrainableGaussians.restore(copied(trained), LearningRates())
     first, second = copied(trained), copied(other)
     assert sorted(first) == sorted(second)
-    assert len(first) == 5 * 4 + 1
+    assert len(first) == 5 * 4 + 2
     for name, value in first.items():
         np.testing.assert_array_equal(value, second[name])
         assert value.dtype == second[name].dtype
@@ -115,7 +115,10 @@ def test_a_restored_state_is_the_same_to_the_bit(trained: TrainableGaussians) ->
     for name, value in trained.state().items():
         np.testing.assert_array_equal(value, other.state()[name])
     # And without the moments the next step would be another one.
-    bare = {name: first[name] for name in ("edited", *(n for n, _ in Gaussians.none().items()))}
+    bare = {
+        name: first[name]
+        for name in ("edited", "origin", *(n for n, _ in Gaussians.none().items()))
+    }
     forgetful = TrainableGaussians.restore(bare, LearningRates())
     step(forgetful, 2)
     assert not torch.equal(forgetful.leaves["means"], trained.leaves["means"])

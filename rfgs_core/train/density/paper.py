@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -73,14 +74,11 @@ class PaperDensity:
     error_count: Tensor = field(default_factory=lambda: torch.zeros(0))
     """How many sample points that sum holds."""
 
-    def after_step(self, step: int, trained: TrainableGaussians, points: SamplePoints) -> None:
-        """Watches feature errors, densifies and prunes when their turn comes.
-
-        Args:
-            step: Number of finished steps, from 1.
-            trained: What to edit.
-            points: The batch of this step.
-        """
+    def after_step(
+        self, step: int, trained: TrainableGaussians, points: SamplePoints | None
+    ) -> None:
+        """Watches feature errors, densifies and prunes, see `DensityControl`."""
+        assert points is not None
         self._watch(step, trained, points)
         if step % self.rule.prune_every == 0:
             self._prune(trained)
@@ -131,3 +129,13 @@ class PaperDensity:
         )
         trained.edit_rows(torch.ones(len(trained.gaussians), dtype=torch.bool), new)
         self.error_sum = torch.zeros(0)
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Feature errors of the current window."""
+        return {"error_sum": self.error_sum.numpy(), "error_count": self.error_count.numpy()}
+
+    def resume(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """See `DensityControl`."""
+        if "error_sum" in arrays:
+            self.error_sum = torch.from_numpy(arrays["error_sum"].copy())
+            self.error_count = torch.from_numpy(arrays["error_count"].copy())

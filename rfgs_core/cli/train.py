@@ -69,6 +69,8 @@ class TrainArgs:
     """Adam steps per frame; the recipe's own number when left out."""
     gaussians: int | None = None
     """Moving Gaussians at the start; the recipe's own number when left out."""
+    log: bool = False
+    """Write curves of loss and number of Gaussians into OUT/log, for `tensorboard --logdir`."""
     shader: Annotated[bool, tyro.conf.arg(name="shader")] = True
     """Colour the frozen Gaussians from training pictures afterwards, for display only."""
 
@@ -111,7 +113,9 @@ def run(args: TrainArgs) -> int:
             f"it has {', '.join(sequence.radios)}"
         )
     frames = chosen_frames(args.frames, sequence.frames)
-    trained = train_sequence(dataset, sequence, args.radio, frames, config, args.out, encoder_file)
+    trained = train_sequence(
+        dataset, sequence, args.radio, frames, config, args.out, encoder_file, log=args.log
+    )
     if args.calibrate != "none":
         sys.stdout.write(f"offsets: {calibration_text(args.out, frames)}\n")
     pictures = {"images", "mask"} <= set(dataset.has)

@@ -31,6 +31,7 @@ from rfgs_core.run.encoders import (
     run_encoder,
 )
 from rfgs_core.run.folder import BACKGROUND_FILE, SCHEMA, Run, open_run, relative_dataset
+from rfgs_core.run.log import Scalars, TrainingLog
 from rfgs_core.seeds import sub_seed
 from rfgs_core.threads import one_torch_thread
 from rfgs_core.train.calibrate import calibrate
@@ -63,6 +64,8 @@ def train_sequence(
     config: TrainConfig,
     out: Path,
     encoder_file: Path | None = None,
+    *,
+    log: bool = False,
 ) -> Run:
     """Fits every frame, each starting from the one before; finished frames are kept.
 
@@ -74,6 +77,7 @@ def train_sequence(
         config: Settings.
         out: Folder of the run.
         encoder_file: Learned encoder of the settings, copied into the run.
+        log: Write curves for TensorBoard into `out`/log.
 
     Raises:
         RfgsError: `out` holds a run with other settings, the radio's antennas move or it cannot be
@@ -104,13 +108,17 @@ def train_sequence(
         save_arrays(out / BACKGROUND_FILE, {"empty": empty})
     spent = float(run.config.get("train_s", 0.0))
     before: FrameState | None = None
-    with tqdm(total=len(frames) * (config.iterations + 2), desc=f"train {radio}") as bar:
+    total = len(frames) * (config.iterations + 2)
+    with (
+        tqdm(total=total, desc=f"train {radio}") as bar,
+        TrainingLog(out / "log" if log else None) as curves,
+    ):
         for frame in frames:
             begin = time.perf_counter()
             state = _finished(run, frame)
             if state is None:
                 with one_torch_thread():
-                    state = fit_frame(run, frame, config, before, bar)
+                    state = fit_frame(run, frame, config, before, bar, curves.of_frame(frame))
                 _store(run, frame, state)
                 spent += time.perf_counter() - begin
                 write_json(out / "config.json", {**settings, "train_s": round(spent, 2)})
@@ -122,7 +130,12 @@ def train_sequence(
 
 
 def fit_frame(
-    run: Run, frame: int, config: TrainConfig, before: FrameState | None, bar: Any
+    run: Run,
+    frame: int,
+    config: TrainConfig,
+    before: FrameState | None,
+    bar: Any,
+    scalars: Scalars | None = None,
 ) -> FrameState:
     """Runs all stages on one frame."""
     seed = sub_seed(config.seed, run.config["sequence"], run.config["radio"], frame, "fit")
@@ -141,7 +154,7 @@ def fit_frame(
         bar.set_postfix_str(f"frame {frame}, loss {loss:.3g}, {count} Gaussians")
 
     checkpoint = run.path / "checkpoints" / f"{frame:06d}.partial.npz"
-    state = refine(observations, state, config, seed, checkpoint, on_step, encoder)
+    state = refine(observations, state, config, seed, checkpoint, on_step, encoder, scalars)
     if config.objective == "paper":
         state = solve_reflectivity(observations, state, config)
     return state

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -31,6 +31,7 @@ from rfgs_core.train.density import (
     StandardRule,
 )
 from rfgs_core.train.frame import FrameState, noise_per_link
+from rfgs_core.train.last_good import LastGood
 from rfgs_core.train.losses import SamplePoints, channel_loss, paper_loss
 from rfgs_core.train.observations import Observations
 from rfgs_core.train.parameters import GAUSSIAN_SHAPES, LearningRates, TrainableGaussians
@@ -115,6 +116,7 @@ def refine(
     checkpoint: Path | None = None,
     on_step: Callable[[float, int], None] | None = None,
     encoder: Encoder = MATCHED_FILTER,
+    scalars: Callable[[int, Mapping[str, float]], None] | None = None,
 ) -> FrameState:
     """Descends the objective of `config` for `config.iterations` steps.
 
@@ -126,31 +128,33 @@ def refine(
         checkpoint: File to resume from and to save to; None keeps nothing.
         on_step: Called with loss and number of Gaussians after each step.
         encoder: φ of the sample points.
+        scalars: Takes the finished steps and values to log.
 
     Raises:
-        RfgsError: The loss is not a number.
+        RfgsError: The loss is not a number; the last good state is then in `checkpoint`.
     """
     task = Task.of(observations, config, seed, encoder)
     rates = LearningRates() if config.recipe == "paper" else CHANNEL_RATES
     trained, first, memory = _resume(checkpoint, state.gaussians, rates)
     density = density_control(observations, state, config, seed, task)
     density.resume(memory)
+    last_good = LastGood(checkpoint)
     for step in range(first + 1, config.iterations + 1):
         links, chosen = _batch(task, config, seed, step)
         links = links if config.objective != "paper" else links[:0]
         points = None if task.points is None else task.points.rows(chosen)
         loss = _loss(task, state, trained.gaussians, links, points)
         if not torch.isfinite(loss):
-            raise RfgsError(
-                f"the loss became {float(loss.detach())} at step {step}; the channel of this "
-                "frame may be damaged (`rfgs-factory validate`), or lower the learning rates"
-            )
+            last_good.stop(step, loss, task.target, trained)
+        last_good.remember(_arrays(step - 1, trained, density))
         trained.optimiser.zero_grad()
         loss.backward()
         trained.optimiser.step()
         density.after_step(step, trained, points)
         if checkpoint is not None and step % CHECKPOINT_EVERY == 0:
-            _save(checkpoint, step, trained, density)
+            save_arrays(checkpoint, _arrays(step, trained, density))
+        if scalars is not None:
+            scalars(step, {"loss": float(loss.detach()), "Gaussians": len(trained.gaussians)})
         if on_step is not None:
             on_step(float(loss.detach()), len(trained.gaussians))
     return _with_gaussians(state, trained, config)
@@ -185,11 +189,12 @@ def density_control(
     return NoDensity()
 
 
-def _save(
-    checkpoint: Path, step: int, trained: TrainableGaussians, density: DensityControl
-) -> None:
+def _arrays(
+    step: int, trained: TrainableGaussians, density: DensityControl
+) -> dict[str, np.ndarray]:
+    """All that resuming after `step` steps needs."""
     memory = {f"density.{name}": value for name, value in density.state().items()}
-    save_arrays(checkpoint, {**trained.state(), **memory, "finished_steps": np.array(step)})
+    return {**trained.state(), **memory, "finished_steps": np.array(step)}
 
 
 def _resume(

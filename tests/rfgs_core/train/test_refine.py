@@ -189,8 +189,38 @@ def test_a_channel_that_is_not_a_number_is_refused(observations, state, quick_co
     delta = observations.delta.copy()
     delta[:, :, 4] = np.nan
     broken = observations.with_delta(delta)
-    with pytest.raises(RfgsError, match=r"loss became nan at step 1; .*rfgs-factory validate"):
+    with pytest.raises(RfgsError, match=r"became nan at step 1; .*validate.*no step .* was good"):
         refine(broken, state, quick_config, 0)
+
+
+def test_the_last_good_state_is_kept_when_the_loss_breaks(
+    tmp_path: Path, monkeypatch, observations, state, quick_config
+) -> None:
+    """The features break after 14 steps; copies are made of the states after 0, 10, …"""
+    checkpoint, finite = tmp_path / "frame.npz", refine_module._loss
+    calls = []
+
+    def breaks(task, state, gaussians, links, points):
+        calls.append(1)
+        if len(calls) == 15:
+            with torch.no_grad():
+                gaussians.features[3] = torch.inf
+        return finite(task, state, gaussians, links, points)
+
+    config = replace(quick_config, iterations=20)
+    good = refine(observations, state, replace(config, iterations=10), 0)
+    monkeypatch.setattr(refine_module, "_loss", breaks)
+    expected = r"at step 15; features of 1 Gaussians .*after 10 steps is kept in .*frame\.npz"
+    with pytest.raises(RfgsError, match=expected):
+        refine(observations, state, config, 0, checkpoint)
+    with np.load(checkpoint, allow_pickle=False) as kept:
+        assert int(kept["finished_steps"]) == 10
+        np.testing.assert_array_equal(kept["means"], good.gaussians.means.numpy())
+    # It can be gone on from.
+    monkeypatch.setattr(refine_module, "_loss", finite)
+    again = refine(observations, state, config, 0, checkpoint)
+    monkeypatch.undo()
+    assert same(again, refine(observations, state, config, 0))
 
 
 def test_a_damaged_checkpoint_says_what_to_do(

@@ -21,6 +21,7 @@ from rfgs_core.gaussians.ply import read_ply
 from rfgs_core.render.shader import ShaderConfig
 from rfgs_core.render.view import fit_run_shader
 from rfgs_core.run import Run, open_run
+from rfgs_core.run.training import train_sequence
 from rfgs_core.train import refine as refine_module
 from rfgs_core.train.observations import observe
 
@@ -269,3 +270,20 @@ def test_one_frame_alone_is_a_run(tiny_dataset: Path, train, quick_config, tmp_p
     run = train(tiny_dataset, tmp_path / "run", quick_config, [2])
     assert run.frames == [2]
     assert len(run.moving(2)) == len(read_ply(run.path / "point_cloud.ply")) == 40
+
+
+def test_curves_are_logged_on_request(
+    trained_run: Run, tiny_dataset: Path, quick_config, tmp_path: Path
+) -> None:
+    from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+    data = open_dataset(tiny_dataset)
+    out = tmp_path / "run"
+    train_sequence(data, data.sequence(), "wifi", [1], quick_config, out, log=True)
+    events = EventAccumulator(str(out / "log")).Reload()
+    losses = events.Scalars("frame 000001/loss")
+    assert [entry.step for entry in losses] == [1, 2, 3, 4]
+    assert all(np.isfinite(entry.value) for entry in losses)
+    assert [entry.value for entry in events.Scalars("frame 000001/Gaussians")] == [40.0] * 4
+    name = "gaussians/000001.ply"
+    assert (out / name).read_bytes() == (trained_run.path / name).read_bytes()

@@ -69,6 +69,9 @@ class TrainArgs:
     """Adam steps per frame; the recipe's own number when left out."""
     gaussians: int | None = None
     """Moving Gaussians at the start; the recipe's own number when left out."""
+    coarse: float = 0.0
+    """Share of the steps, 0 to 1, in which the channel loss widens from a quarter of the band to
+    all of it; not with --observe delay_power, which has no tones."""
     log: bool = False
     """Write curves of loss and number of Gaussians into OUT/log, for `tensorboard --logdir`."""
     shader: Annotated[bool, tyro.conf.arg(name="shader")] = True
@@ -95,7 +98,15 @@ def run(args: TrainArgs) -> int:
         background=args.background,
         calibrate=args.calibrate,
         density=args.density,
+        coarse_share=args.coarse,
     )
+    if not 0.0 <= args.coarse <= 1.0:
+        raise RfgsError(f"--coarse {args.coarse}: expected a share from 0 to 1")
+    if args.coarse and args.observe == "delay_power":
+        raise RfgsError(
+            "--coarse narrows the band of tones, and --observe delay_power reports delays; leave "
+            "one of them out"
+        )
     if args.iterations is not None:
         if args.iterations < 0:
             raise RfgsError(f"--iterations {args.iterations}: expected at least 0")

@@ -50,6 +50,8 @@ class TrainConfig:
     """Conjugate-gradient steps for the reflectivities."""
     iterations: int = 80
     """Adam steps per frame (the paper: 10,000)."""
+    coarse_share: float = 0.0
+    """Share of the steps in which the channel loss widens from a quarter of the band to all."""
     density: Density | None = None
     """How Gaussians come and go while they are refined; None: as the objective does, the
     paper's rule with the paper's losses and none without."""

@@ -91,12 +91,25 @@ def _batch(task: Task, config: TrainConfig, seed: int, step: int) -> tuple[np.nd
     return links, torch.as_tensor(np.asarray(points, dtype=np.int64))
 
 
+def band_of_step(step: int, config: TrainConfig, entries: int) -> slice:
+    """Entries of the channel loss at a step: the middle of the band, growing to all of it.
+
+    Coarse to fine: a narrow band blurs ranges, so that a Gaussian too far off is still drawn.
+    """
+    coarse = config.coarse_share * config.iterations
+    share = 1.0 if step > coarse else 0.25 + 0.75 * (step - 1) / coarse
+    count = max(1, round(share * entries))
+    start = (entries - count) // 2
+    return slice(start, start + count)
+
+
 def _loss(
     task: Task,
     state: FrameState,
     gaussians: Gaussians,
     links: np.ndarray,
     points: SamplePoints | None,
+    band: slice,
 ) -> Float[Tensor, ""]:
     loss = torch.zeros(())
     if points is not None:
@@ -104,7 +117,8 @@ def _loss(
     if len(links):
         part = task.channel.rows(links)
         predicted = task.comparison.predicted(part.change(state.head, gaussians), links)
-        loss = loss + channel_loss(predicted, task.target[links], task.noise[links])
+        target = task.target[links][:, band]
+        loss = loss + channel_loss(predicted[:, band], target, task.noise[links])
     return loss
 
 
@@ -143,7 +157,8 @@ def refine(
         links, chosen = _batch(task, config, seed, step)
         links = links if config.objective != "paper" else links[:0]
         points = None if task.points is None else task.points.rows(chosen)
-        loss = _loss(task, state, trained.gaussians, links, points)
+        band = band_of_step(step, config, task.target.shape[1])
+        loss = _loss(task, state, trained.gaussians, links, points, band)
         if not torch.isfinite(loss):
             last_good.stop(step, loss, task.target, trained)
         last_good.remember(_arrays(step - 1, trained, density))

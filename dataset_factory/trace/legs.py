@@ -35,21 +35,21 @@ TESTS_AT_ONCE = 1 << 22
 class _Hits:
     """Where the rays of all sources have hit; every field has one entry per ray."""
 
-    kind: mi.UInt
+    kind: Any
     """Sionna's code of the interaction."""
-    shape: mi.UInt
+    shape: Any
     """Pointer to the shape, as Sionna stores it."""
-    primitive: mi.UInt
+    primitive: Any
     """Triangle of the shape."""
-    place: mi.Point3f
+    place: Any
     """Where [m]."""
-    normal: mi.Normal3f
+    normal: Any
     """Normal of the wall."""
-    probability: mi.Float
+    probability: Any
     """Of the interaction, among those the material has."""
-    direction: mi.Vector3f
+    direction: Any
     """Where the ray was sent."""
-    source: mi.UInt
+    source: Any
     """Which source has sent it."""
 
 
@@ -69,7 +69,7 @@ class _Chosen:
         """Sources of the rays."""
         return dr.gather(mi.UInt, self.hits.source, self.rays)
 
-    def get(self, depth: mi.UInt, active: mi.Mask) -> tuple[Any, ...]:
+    def get(self, depth: mi.UInt, active: Any) -> tuple[Any, ...]:
         """Kind, shape, primitive, vertex and probability of the rays' one interaction."""
         hits, rays = self.hits, self.rays
         return (
@@ -151,7 +151,7 @@ class LegCandidates(SBDeterministicCandidateGenerator):
         kind = dr.select(active, sample.sampled_component, InteractionType.NONE)
         hashes = []
         for plane in self.plane_hash_functions:
-            wall = dr.select(kind == InteractionType.SPECULAR, plane(hit.n, hit.p), kind)
+            wall: Any = dr.select(kind == InteractionType.SPECULAR, plane(hit.n, hit.p), kind)
             hashes.append(hash_fnv1a(wall, h=dr.zeros(mi.UInt64, dr.width(source))))
         shape = dr.reinterpret_array(mi.UInt, hit.shape)
         hits = _Hits(kind, shape, hit.prim_index, hit.p, hit.n, sample.pdf, ray.d, source)
@@ -171,7 +171,7 @@ class LegCandidates(SBDeterministicCandidateGenerator):
         ray = _towards(chosen.hits, chosen.rays, dr.gather(mi.Point3f, tgt_positions, target))
         sent = dr.gather(mi.Vector3f, chosen.hits.direction, chosen.rays)
         where = dr.arange(mi.UInt, count) + dr.opaque(mi.UInt, begin)
-        every = dr.full(mi.Mask, True, count)
+        every: Any = dr.full(mi.Bool, True, count)
         with dr.scoped_set_flag(dr.JitFlag.OptimizeLoops, False):
             data: Any = chosen
             paths.add_paths(mi.UInt(1), where, data, mi.Bool(False), target, sent, -ray.d, every)
@@ -184,7 +184,7 @@ class _Sight:
 
     mi_scene: Any
     hits: _Hits
-    targets: mi.Point3f
+    targets: Any
 
     def __call__(self, rays: np.ndarray, target: np.ndarray) -> np.ndarray:
         """Whether nothing stands between the hit of each ray and its target, bool."""

@@ -25,6 +25,7 @@ class PoseArgs:
 
 def run(args: PoseArgs) -> int:
     """Prints the errors; exit code 0."""
+    import numpy as np
     from tqdm import tqdm
 
     from rfgs_core.arrays import save_arrays
@@ -38,7 +39,7 @@ def run(args: PoseArgs) -> int:
         estimate = estimate_poses(trained, bar.update)
     scores = score_poses(estimate, trained.sequence)
     arrays = {name: getattr(estimate, name) for name in ("time_s", "centroid", "joints")}
-    save_arrays(args.run / "pose.npz", {"frames": estimate.frames, **arrays})
+    save_arrays(args.run / "pose.npz", {"frames": np.array(estimate.frames), **arrays})
     write_json(args.run / "pose.json", scores)
     truth = [trained.sequence.joints(frame) for frame in estimate.frames]
     write_pose_chart(args.run / "pose.png", estimate, truth)

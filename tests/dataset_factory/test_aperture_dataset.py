@@ -32,6 +32,9 @@ from rfgs_core.radio import preset
 from rfgs_core.run.training import train_sequence
 from rfgs_core.train.config import TrainConfig
 
+#: They share a dataset that takes half a minute to trace.
+pytestmark = pytest.mark.slow
+
 MakeAperture = Callable[..., Job]
 COUNT = 8
 RADIO = f"""\

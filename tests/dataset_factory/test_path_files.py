@@ -82,6 +82,7 @@ def test_doppler_follows_the_animation(with_paths: Path) -> None:
     assert np.ptp(body.doppler_hz[clear] / per_m_s[clear]) < 0.1 * speed
 
 
+@pytest.mark.slow
 def test_two_workers_write_the_same_bytes(
     with_paths: Path, make_job: MakeJob, data_of: Bytes, tmp_path: Path
 ) -> None:
@@ -90,6 +91,7 @@ def test_two_workers_write_the_same_bytes(
     assert data_of(out) == data_of(with_paths)
 
 
+@pytest.mark.slow
 def test_a_lost_table_is_made_again(
     with_paths: Path,
     make_job: MakeJob,

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float, Float32
 
-from rfgs_core.encode.matched_filter import images
+from rfgs_core.encode.back_projection import images
 from rfgs_core.encode.protocol import FEATURES
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.train.observations import Observations

@@ -10,12 +10,12 @@ import torch
 from jaxtyping import Complex, Float, Float32, Float64
 from torch import Tensor, nn
 
+from rfgs_core.encode.back_projection import POINTS, images, oversampled_profiles
 from rfgs_core.encode.learned.attention import PairAttention
 from rfgs_core.encode.learned.blocks import Blocks
 from rfgs_core.encode.learned.networks import NETWORKS, NetworkKind
 from rfgs_core.encode.learned.signature import RadioSignature
 from rfgs_core.encode.learned.steering import focus, steering
-from rfgs_core.encode.matched_filter import POINTS, images, oversampled_profiles
 from rfgs_core.encode.protocol import FEATURES, FrameChannel
 from rfgs_core.threads import one_torch_thread
 

@@ -14,6 +14,7 @@ features stay ordered by frequency and keep range resolution. Untrained, every w
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from itertools import pairwise
 from typing import Literal
@@ -48,7 +49,7 @@ def feature_windows(freq_hz: Float[Tensor, "subcarrier"]) -> Float[Tensor, "32 s
     return torch.stack(rows).float()
 
 
-class Gates(nn.Module):
+class Gates(nn.Module, ABC):
     """Base of the networks: `weigh` is theirs, windows and hidden entries are common."""
 
     def __init__(self, convolution: type[nn.Module], kernel: int | tuple[int, ...]) -> None:
@@ -66,9 +67,9 @@ class Gates(nn.Module):
         """Weights between 0 and 2."""
         return 2.0 * torch.sigmoid(self.layers(picture))
 
+    @abstractmethod
     def weigh(self, blocks: Blocks) -> Complex[Tensor, "pair 32 tx rx subcarrier"]:
         """The channel times the weights."""
-        raise NotImplementedError
 
     def forward(self, blocks: Blocks) -> Complex[Tensor, "pair 32 tx rx subcarrier"]:
         """The channel as each of the 32 features reads it; hidden entries stay silent."""

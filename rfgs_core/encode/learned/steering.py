@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Propagation between antennas and points with exact path lengths, differentiable in the channel.
 
-The plain twin of `matched_filter.images`, for few points and with gradients.
+The plain twin of `back_projection.images`, for few points and with gradients.
 """
 
 from __future__ import annotations

@@ -20,6 +20,7 @@ from rfgs_core.train.head import RadioHead
 from rfgs_core.train.losses import channel_loss
 from rfgs_core.train.observations import Observations
 from rfgs_core.train.refine import refine
+from rfgs_core.train.tracks import Tracks
 
 
 @pytest.fixture
@@ -43,9 +44,8 @@ def state(make_gaussians, head) -> FrameState:
     gaussians = make_gaussians(12)
     gaussians.means += 0.01 * torch.randn(12, 3, generator=torch.Generator().manual_seed(7))
     gaussians.features *= 0.5
-    return FrameState(
-        gaussians, torch.full((12,), 1e-3), head, np.array([[2.0, 1.7]]), np.arange(12)
-    )
+    tracks = Tracks.begun(np.array([[2.0, 1.7]]), time_s=0.0)
+    return FrameState(gaussians, torch.full((12,), 1e-3), head, tracks, np.arange(12))
 
 
 def cost(observations: Observations, state: FrameState, config: TrainConfig) -> float:

@@ -207,8 +207,8 @@ def test_a_taken_port_is_one_line(known_run: Run, capsys: pytest.CaptureFixture[
     ],
 )
 def test_addresses_that_cannot_be(host: str, port: int, message: str) -> None:
-    with pytest.raises(RfgsError, match=message), running_server(host, port):
-        pass
+    with pytest.raises(RfgsError, match=message):
+        running_server(host, port).__enter__()
 
 
 def test_the_port_is_free_again_afterwards(capsys: pytest.CaptureFixture[str]) -> None:

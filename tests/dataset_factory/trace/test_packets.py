@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from level_errors import error_db
 
 from dataset_factory.bundle import Bundle, read_bundle
 from rfgs_core.errors import RfgsError
@@ -17,11 +18,6 @@ from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
 MakeBundle = Callable[..., Bundle]
 FRAME_S = 0.1
-
-
-def error_db(found: np.ndarray, exact: np.ndarray) -> float:
-    error = np.sum(np.abs(found - exact) ** 2) / np.sum(np.abs(exact) ** 2)
-    return float(10 * np.log10(max(error, 1e-30)))
 
 
 def in_motion(bundle: Bundle, velocity: tuple[float, float, float], span_s: float = 0.0) -> Bundle:

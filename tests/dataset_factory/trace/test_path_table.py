@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from level_errors import error_db
 
 from dataset_factory.bundle import Bundle
 from rfgs_core.radio import DevicePose, Radio, layout
@@ -16,10 +17,6 @@ from rfgs_core.radio.images import SCATTERING, SPECULAR
 from rfgs_core.radio.path_table import PathTable
 
 MakeBundle = Callable[..., Bundle]
-
-
-def error_db(found: np.ndarray, exact: np.ndarray) -> float:
-    return float(10 * np.log10((abs(found - exact) ** 2).sum() / (abs(exact) ** 2).sum()))
 
 
 def one_way(radio: Radio, **options) -> Radio:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numba
 import numpy as np
 import pytest
+from level_errors import error_db
 
 from dataset_factory.bundle import Bundle
 from rfgs_core.radio import DevicePose, Radio, layout
@@ -14,11 +15,6 @@ from rfgs_core.radio import DevicePose, Radio, layout
 MakeBundle = Callable[..., Bundle]
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 TILTED = (0.8660254, 0.35, -0.25, 0.2549510)
-
-
-def error_db(found: np.ndarray, exact: np.ndarray) -> float:
-    error = np.sum(np.abs(found - exact) ** 2) / np.sum(np.abs(exact) ** 2)
-    return float(10 * np.log10(max(error, 1e-30)))
 
 
 def posed_body(bundle: Bundle, radio: Radio, devices: list[DevicePose]) -> tuple:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from level_errors import error_db
 
 from dataset_factory.blender import Blender
 from dataset_factory.bundle import Bundle, read_bundle
@@ -23,11 +24,6 @@ TORSO = [JOINTS.index(name) for name in ("pelvis", "spine", "thorax")]
 LIMBS = [
     JOINTS.index(f"{side}_{name}") for side in ("left", "right") for name in ("ankle", "wrist")
 ]
-
-
-def error_db(found: np.ndarray, exact: np.ndarray) -> float:
-    error = np.sum(np.abs(found - exact) ** 2) / np.sum(np.abs(exact) ** 2)
-    return float(10 * np.log10(max(error, 1e-30)))
 
 
 @pytest.fixture(scope="module")

@@ -8,9 +8,9 @@ import atexit
 
 import bpy
 
-from . import command, operators, panels, properties
+from . import command, properties, registration
 
-_MODULES = (properties, operators, panels, command)
+_MODULES = (properties, registration, command)
 
 
 def register() -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from . import register
 from .cli import USER_ERROR, run
-from .scripts import close_scripted_file
+from .scene.scripts import close_scripted_file
 
 
 def main(arguments: list[str]) -> int:

@@ -7,17 +7,17 @@ import argparse
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import NoReturn, TextIO
 
 import bpy
 
-from . import bundle, groundtruth, imports, scene_check
 from .errors import AddonError
-from .files import write_json
-from .override_file import read_overrides
+from .export.commands import add_export
+from .gaussians.commands import add_import
+from .scene.commands import add_check
 
 #: Exit code of every mistake a user can repair.
 USER_ERROR = 2
@@ -34,38 +34,8 @@ def parser(program: str) -> argparse.ArgumentParser:
     """The parser of all commands."""
     main = _Parser(prog=program, description="RF-GS inside Blender")
     commands = main.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    export = commands.add_parser("export", help="write the scene as a bundle")
-    export.add_argument("--out", type=Path, required=True, help="folder of the bundle")
-    export.add_argument(
-        "--span",
-        type=float,
-        action="append",
-        metavar="SECONDS",
-        help="also write poses over so long after each frame (0: until the next); repeatable",
-    )
-    export.add_argument("--velocities", action="store_true", help="also that of every vertex")
-    truth = commands.add_parser("groundtruth", help="render pictures and passes with Cycles")
-    truth.add_argument("--out", type=Path, required=True, help="folder of the pictures")
-    check = commands.add_parser("check", help="say what the scene holds and what is guessed")
-    check.add_argument("--out", type=Path, required=True, help="JSON file of the report")
-    for command in (export, truth, check):
-        command.add_argument("--frames", metavar="A:B[:STEP]", help="default: the scene's range")
-        command.add_argument("--overrides", type=Path, metavar="FILE", help="JSON, see the docs")
-    for command in (export, truth):
-        command.add_argument("--cameras", type=int, metavar="N", help="the first N by name")
-        command.add_argument("--resolution", type=int, metavar="PX", help="longer side")
-    truth.add_argument("--samples", type=int, default=16, help="samples per pixel (16)")
-    truth.add_argument("--empty", action="store_true", help="hide all that moves; once per camera")
-    truth.add_argument("--passes", action="store_true", help="depth, normals and ids as EXR")
-    load = commands.add_parser("import", help="bring Gaussians back beside the scene")
-    load.add_argument("path", type=Path, help="a run, its gaussians folder or one PLY")
-    load.add_argument("--out", type=Path, help=".blend to save")
-    load.add_argument("--picture", type=Path, help="PNG to render")
-    load.add_argument("--camera", help="camera object for the picture (default: a chosen view)")
-    load.add_argument("--resolution", type=int, default=480, help="longer side of each half (480)")
-    load.add_argument("--samples", type=int, default=16, help="samples per pixel (16)")
-    load.add_argument("--mode", choices=("points", "ellipsoids"), default="points")
-    load.add_argument("--opacity-threshold", type=float, default=0.005)
+    for add in (add_check, add_export, add_import):
+        add(commands)
     return main
 
 
@@ -82,7 +52,7 @@ def run(arguments: Sequence[str], program: str = "rfgs", blend: Path | None = No
             options = parser(program).parse_args(arguments)
             if blend is not None:
                 open_blend(blend)
-            out.write(_COMMANDS[options.command](options, out) + "\n")
+            out.write(options.run(options, out) + "\n")
             code = 0
         except AddonError as error:
             message, code = f"error: {error}\n", USER_ERROR
@@ -106,78 +76,6 @@ def open_blend(path: Path) -> None:
         bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), use_scripts=False, load_ui=False)
     except RuntimeError as error:
         raise AddonError(f"{path}: not a .blend file that Blender can read") from error
-
-
-def _export(options: argparse.Namespace, out: TextIO) -> str:
-    info = bundle.export_bundle(
-        bpy.context.scene,
-        options.out,
-        options.frames,
-        options.cameras,
-        options.resolution,
-        _progress(out),
-        options.span,
-        read_overrides(options.overrides),
-        options.velocities,
-    )
-    return (
-        f"wrote {options.out}: {len(info['frames'])} frames, {len(info['objects'])} objects, "
-        f"{len(info['instances'])} instances, {len(info['devices'])} devices, "
-        f"{len(info['cameras'])} cameras"
-    )
-
-
-def _groundtruth(options: argparse.Namespace, out: TextIO) -> str:
-    count = groundtruth.render_groundtruth(
-        bpy.context.scene,
-        options.out,
-        options.frames,
-        options.cameras,
-        options.resolution,
-        options.samples,
-        options.passes,
-        options.empty,
-        _progress(out),
-        read_overrides(options.overrides),
-    )
-    return f"wrote {options.out}: {count} pictures"
-
-
-def _check(options: argparse.Namespace, out: TextIO) -> str:
-    overrides = read_overrides(options.overrides)
-    report = scene_check.check_scene(bpy.context.scene, options.frames, overrides)
-    write_json(options.out, report)
-    return f"wrote {options.out}: {len(report['findings'])} findings"
-
-
-def _import(options: argparse.Namespace, out: TextIO) -> str:
-    return imports.import_command(
-        bpy.context.scene,
-        options.path,
-        imports.Display(options.mode, options.opacity_threshold),
-        blend=options.out,
-        picture=imports.Picture(
-            options.picture, options.camera, options.resolution, options.samples
-        )
-        if options.picture
-        else None,
-    )
-
-
-_COMMANDS: dict[str, Callable[[argparse.Namespace, TextIO], str]] = {
-    "check": _check,
-    "export": _export,
-    "groundtruth": _groundtruth,
-    "import": _import,
-}
-
-
-def _progress(out: TextIO) -> Callable[[int, int], None]:
-    def report(done: int, total: int) -> None:
-        out.write(f"progress {done} {total}\n")
-        out.flush()
-
-    return report
 
 
 @contextmanager

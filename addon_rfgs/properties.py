@@ -5,7 +5,9 @@ import zlib
 
 import bpy
 
-from .radio_properties import RFGS_PG_radio
+from .devices.properties import RFGS_PG_radio
+from .export.settings import RFGS_PG_export
+from .gaussians.settings import RFGS_PG_gaussians
 from .tables import MATERIALS, RADIOS
 
 ROLES = [
@@ -21,11 +23,6 @@ CLASSES = [
     ("PERSON", "Person", "A moving human body", 2),
     ("VEHICLE", "Vehicle", "A rigid moving metal object", 3),
     ("IGNORE", "Ignore", "Invisible to radio and left out of the bundle", 4),
-]
-
-DISPLAY_MODES = [
-    ("points", "Points", "One sphere of equal size per Gaussian; fast", 0),
-    ("ellipsoids", "Ellipsoids", "One ellipsoid per Gaussian at one standard deviation", 1),
 ]
 
 
@@ -111,63 +108,20 @@ class RFGS_PG_material(bpy.types.PropertyGroup):
 
 
 class RFGS_PG_scene(bpy.types.PropertyGroup):
-    """Settings of the panel."""
+    """Settings of the panels, a group for each."""
 
-    frames: bpy.props.StringProperty(  # type: ignore[valid-type]
-        name="Frames",
-        description="First:last or first:last:step, both ends included; empty: the whole range",
-        default="",
-    )
-    cameras: bpy.props.IntProperty(  # type: ignore[valid-type]
-        name="Cameras", description="First N cameras by name; 0: all", default=0, min=0
-    )
-    resolution: bpy.props.IntProperty(  # type: ignore[valid-type]
-        name="Resolution",
-        description="Longer side of the pictures [px]; 0: the scene's own",
-        default=0,
-        min=0,
-        subtype="PIXEL",
-    )
-    bundle_folder: bpy.props.StringProperty(  # type: ignore[valid-type]
-        name="Bundle",
-        description="Folder the scene bundle is written to",
-        default="//rfgs_bundle",
-        subtype="DIR_PATH",
-    )
-    pictures_folder: bpy.props.StringProperty(  # type: ignore[valid-type]
-        name="Pictures",
-        description="Folder the ground truth is written to",
-        default="//rfgs_pictures",
-        subtype="DIR_PATH",
-    )
-    samples: bpy.props.IntProperty(  # type: ignore[valid-type]
-        name="Samples", description="Cycles samples per pixel", default=16, min=1
-    )
-    passes: bpy.props.BoolProperty(  # type: ignore[valid-type]
-        name="Depth, normals, masks",
-        description="Also write a multilayer EXR per picture",
-        default=True,
-    )
-    gaussians_path: bpy.props.StringProperty(  # type: ignore[valid-type]
-        name="Gaussians",
-        description="A run folder, its gaussians folder or one 3DGS PLY",
-        default="",
-        subtype="FILE_PATH",
-    )
-    display_mode: bpy.props.EnumProperty(  # type: ignore[valid-type]
-        name="Show as", items=DISPLAY_MODES, default="points"
-    )
-    opacity_threshold: bpy.props.FloatProperty(  # type: ignore[valid-type]
-        name="Opacity threshold",
-        description="Gaussians below this opacity are hidden",
-        default=0.005,
-        min=0.0,
-        max=1.0,
-        subtype="FACTOR",
-    )
+    export: bpy.props.PointerProperty(type=RFGS_PG_export)  # type: ignore[valid-type]
+    gaussians: bpy.props.PointerProperty(type=RFGS_PG_gaussians)  # type: ignore[valid-type]
 
 
-CLASSES_TO_REGISTER = (RFGS_PG_radio, RFGS_PG_object, RFGS_PG_material, RFGS_PG_scene)
+CLASSES_TO_REGISTER = (
+    RFGS_PG_radio,
+    RFGS_PG_object,
+    RFGS_PG_material,
+    RFGS_PG_export,
+    RFGS_PG_gaussians,
+    RFGS_PG_scene,
+)
 
 
 def register() -> None:

@@ -17,12 +17,12 @@ import bpy
 from build_scenes import box, person
 
 import addon_rfgs
-from addon_rfgs.bundle import export_bundle
 from addon_rfgs.cli import open_blend
 from addon_rfgs.errors import AddonError
-from addon_rfgs.override_file import read_overrides
-from addon_rfgs.overrides import Overrides
-from addon_rfgs.scene_check import check_scene
+from addon_rfgs.export.bundle import export_bundle
+from addon_rfgs.scene.check import check_scene
+from addon_rfgs.scene.override_file import read_overrides
+from addon_rfgs.scene.overrides import Overrides
 
 FOLDER = Path(sys.argv[1])
 

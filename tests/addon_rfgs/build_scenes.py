@@ -20,9 +20,9 @@ import numpy as np
 from mathutils import Vector
 
 import addon_rfgs
-from addon_rfgs.bundle import export_bundle
 from addon_rfgs.cli import open_blend
 from addon_rfgs.errors import AddonError
+from addon_rfgs.export.bundle import export_bundle
 
 #: Every property of an Empty's radio, none at its default.
 OWN_RADIO = {

@@ -14,11 +14,14 @@ import pytest
 from plyfile import PlyData, PlyElement
 
 import addon_rfgs
-from addon_rfgs import exr, naming, ply, rig, tables
+from addon_rfgs import naming, tables
 from addon_rfgs.errors import AddonError
-from addon_rfgs.frames import chosen_frames
-from addon_rfgs.override_file import read_overrides
-from addon_rfgs.overrides import RadioMaterial, first_match
+from addon_rfgs.export import exr, mesh_ply
+from addon_rfgs.gaussians import ply
+from addon_rfgs.scene import rig
+from addon_rfgs.scene.frames import chosen_frames
+from addon_rfgs.scene.override_file import read_overrides
+from addon_rfgs.scene.overrides import RadioMaterial, first_match
 
 COLUMNS = [
     *("x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2", "opacity"),
@@ -58,7 +61,7 @@ def test_gaussians_written_by_plyfile_are_read_with_activations(tmp_path: Path) 
 def test_mesh_is_read_back_by_plyfile(tmp_path: Path) -> None:
     vertices = np.arange(12, dtype=np.float32).reshape(4, 3)
     faces = np.array([[0, 1, 2], [2, 1, 3]], np.int32)
-    ply.write_mesh(tmp_path / "m.ply", vertices, faces)
+    mesh_ply.write_mesh(tmp_path / "m.ply", vertices, faces)
     data = PlyData.read(str(tmp_path / "m.ply"))
     np.testing.assert_array_equal(np.stack([data["vertex"][axis] for axis in "xyz"], 1), vertices)
     np.testing.assert_array_equal(np.vstack(data["face"]["vertex_indices"]), faces)
@@ -172,7 +175,7 @@ def test_register_and_unregister_leave_nothing() -> None:
     for _ in range(2):
         addon_rfgs.register()
         assert bpy.types.RFGS_PT_object.bl_category == "RF-GS"
-        assert bpy.context.scene.rfgs.opacity_threshold > 0
+        assert bpy.context.scene.rfgs.gaussians.opacity_threshold > 0
         addon_rfgs.unregister()
     assert (set(dir(bpy.types)), set(dir(bpy.types.Object)), set(dir(bpy.ops.rfgs))) == before
     assert not hasattr(bpy.types.Scene, "rfgs") and not hasattr(bpy.types.Material, "rfgs")

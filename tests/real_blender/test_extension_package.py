@@ -26,14 +26,15 @@ def test_manifest_is_valid(extension_tool: list[str]) -> None:
 def test_package_holds_the_sources_and_nothing_else(extension_zip: Path) -> None:
     with zipfile.ZipFile(extension_zip) as package:
         names = set(package.namelist())
-    sources = {path.name for path in (ROOT / "addon_rfgs").glob("*.py")}
+    folder = ROOT / "addon_rfgs"
+    sources = {path.relative_to(folder).as_posix() for path in folder.rglob("*.py")}
     assert names == sources | {"blender_manifest.toml", "tables.json"}
 
 
 def test_add_on_imports_only_itself_numpy_and_the_standard_library() -> None:
     blenders_own = {"bpy", "bmesh", "mathutils", "_cycles"}
     allowed = {*blenders_own, "numpy", *sys.stdlib_module_names}
-    for path in (ROOT / "addon_rfgs").glob("*.py"):
+    for path in (ROOT / "addon_rfgs").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
             if isinstance(node, ast.Import):
                 assert {alias.name.split(".")[0] for alias in node.names} <= allowed, path

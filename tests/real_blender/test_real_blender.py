@@ -133,7 +133,7 @@ def test_without_the_extension_the_command_is_unknown(blender, blend: Path, tmp_
 def test_the_gui_s_panels_and_operators_exist(blender) -> None:
     code = (
         "import bpy; print('have', hasattr(bpy.types, 'RFGS_PT_dataset'), "
-        "bpy.ops.rfgs.export_bundle.idname(), bpy.context.scene.rfgs.samples)"
+        "bpy.ops.rfgs.export_bundle.idname(), bpy.context.scene.rfgs.export.samples)"
     )
     done = blender.run("-b", "--python-expr", code)
     assert "have True RFGS_OT_export_bundle 16" in done.stdout, done.stdout + done.stderr

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from .errors import AddonError
-from .naming import closest
+from ..errors import AddonError
+from ..naming import closest
+from ..tables import MATERIALS
 from .overrides import Overrides, RadioMaterial, Ring, Room
-from .tables import MATERIALS
 
 #: What Blender holds without a word about it: it cuts other numbers off.
 _FPS = (0.001, 32767)

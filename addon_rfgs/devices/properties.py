@@ -8,7 +8,7 @@ from typing import Any
 
 import bpy
 
-from .tables import RADIO_CHOICES, RADIO_DEFAULTS
+from ..tables import RADIO_CHOICES, RADIO_DEFAULTS
 
 _GHZ = 1e9
 

@@ -10,9 +10,9 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from .errors import AddonError
-from .frames import unit_scale
-from .gaussian_nodes import add_modifier
+from ..errors import AddonError
+from ..scene.frames import unit_scale
+from .nodes import add_modifier
 from .ply import Cloud, read_gaussians
 
 #: Collection that holds everything imported.

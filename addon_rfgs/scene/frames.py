@@ -9,7 +9,7 @@ from pathlib import Path
 
 import bpy
 
-from .errors import AddonError
+from ..errors import AddonError
 
 _PATTERN = re.compile(r"\s*(-?\d+)\s*:\s*(-?\d+)\s*(?::\s*(\d+)\s*)?")
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import bpy
 
-from .errors import AddonError
-from .frames import seconds_per_frame
+from ..errors import AddonError
+from ..scene.frames import seconds_per_frame
 
 #: Longest time between poses [s]; within it a spline follows a limb to a tenth of a millimetre.
 POSE_STEP_S = 0.02

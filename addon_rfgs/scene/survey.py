@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
-from .errors import AddonError
+from ..errors import AddonError
 from .findings import Finding
 from .frames import file_label, unit_scale
 from .rig import armature_of

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from .tables import JOINTS
+from ..tables import JOINTS
 
 #: Bone names without side, prefixes and separators, best first, for each limb joint.
 _LIMBS = {

@@ -10,8 +10,8 @@ from typing import Any
 
 import bpy
 
-from .errors import AddonError
-from .naming import closest
+from ..errors import AddonError
+from ..naming import closest
 from .state import Keeper
 
 

@@ -8,9 +8,9 @@ from collections.abc import Callable
 import bpy
 import numpy as np
 
-from .frames import seconds_per_frame
-from .people import Instance, joints
-from .tables import JOINTS
+from ..scene.frames import seconds_per_frame
+from ..scene.people import Instance, joints
+from ..tables import JOINTS
 
 
 def vertex_velocity(

@@ -15,17 +15,17 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from .cameras import View, find_views, place_camera
-from .content import Content, content_ready
-from .errors import AddonError
+from ..errors import AddonError
+from ..files import replacing
+from ..scene.cameras import View, find_views, place_camera
+from ..scene.content import Content, content_ready
+from ..scene.findings import refuse
+from ..scene.frames import file_label, unit_scale
+from ..scene.lights import lights_ready
+from ..scene.overrides import Overrides
+from ..scene.state import Keeper
 from .exr import read_exr, write_exr
-from .files import replacing
-from .findings import refuse
-from .frames import file_label, unit_scale
-from .lights import lights_ready
-from .overrides import Overrides
 from .png import strip_metadata
-from .state import Keeper
 
 #: Depths above this are misses; Cycles writes 1e10 [Blender units].
 _MISS = 1e9

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""PLY files: triangle meshes out, 3D Gaussians in (binary little-endian)."""
+"""PLY files: 3D Gaussians in (binary little-endian)."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .errors import AddonError
-from .files import replacing
+from ..errors import AddonError
 
 #: First spherical-harmonics basis function, 1/(2·sqrt(π)): colour = 0.5 + C0·f_dc.
 SH_C0 = 0.28209479177387814
@@ -30,8 +29,6 @@ _NEEDED = (
     *(f"rot_{i}" for i in range(4)),
 )
 
-_FACE = np.dtype([("count", "u1"), ("corners", "<i4", 3)])
-
 
 @dataclass(frozen=True)
 class Cloud:
@@ -50,23 +47,6 @@ class Cloud:
 
     def __len__(self) -> int:
         return len(self.means)
-
-
-def write_mesh(path: Path, vertices: np.ndarray, faces: np.ndarray) -> None:
-    """Writes vertices [V, 3] in metres and triangles [T, 3]."""
-    header = (
-        "ply\nformat binary_little_endian 1.0\n"
-        f"element vertex {len(vertices)}\n"
-        "property float x\nproperty float y\nproperty float z\n"
-        f"element face {len(faces)}\n"
-        "property list uchar int vertex_indices\nend_header\n"
-    )
-    rows = np.zeros(len(faces), _FACE)
-    rows["count"], rows["corners"] = 3, faces
-    with replacing(path) as temporary, temporary.open("wb") as stream:
-        stream.write(header.encode("ascii"))
-        stream.write(np.ascontiguousarray(vertices, "<f4").tobytes())
-        stream.write(rows.tobytes())
 
 
 def read_gaussians(path: Path) -> Cloud:

@@ -10,10 +10,10 @@ from typing import Any
 import bpy
 import numpy as np
 
-from .naming import Names
+from ..naming import Names
+from ..tables import MATERIALS
 from .overrides import Overrides, RadioMaterial, first_match
 from .survey import Surface
-from .tables import MATERIALS
 
 #: Words in names, lower case, and what they mean; earlier rows win.
 KEYWORDS: tuple[tuple[str, tuple[str, ...]], ...] = (

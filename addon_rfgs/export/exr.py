@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from .errors import AddonError
-from .files import replacing
+from ..errors import AddonError
+from ..files import replacing
 
 _MAGIC = 20000630
 _LINES = {0: 1, 2: 1, 3: 16}

@@ -6,7 +6,7 @@ from __future__ import annotations
 import struct
 from pathlib import Path
 
-from .errors import AddonError
+from ..errors import AddonError
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 

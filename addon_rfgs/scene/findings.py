@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from .errors import AddonError
+from ..errors import AddonError
 
 #: From what stops the work to what is merely good to know.
 SEVERITIES = ("error", "warning", "info")

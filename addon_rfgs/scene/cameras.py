@@ -12,8 +12,8 @@ import bpy
 import mathutils
 import numpy as np
 
+from ..errors import AddonError
 from .bounds import Space
-from .errors import AddonError
 from .frames import file_label, unit_scale
 from .overrides import Ring
 

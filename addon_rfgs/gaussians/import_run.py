@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The `import` command: Gaussians into the open file, a .blend and a picture out."""
+"""Gaussians into the open file, a .blend and a picture out."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ import bpy
 import mathutils
 import numpy as np
 
-from .cameras import look_at, picture_size
-from .errors import AddonError
-from .files import replacing
-from .frames import file_label
-from .gaussians import Display, Imported, import_gaussians
-from .groundtruth import can_denoise, keep_format, render_to
-from .lights import lights_ready
-from .state import Keeper, kept, show_what_renders
-from .survey import survey
+from ..errors import AddonError
+from ..export.groundtruth import can_denoise, keep_format, render_to
+from ..files import replacing
+from ..scene.cameras import look_at, picture_size
+from ..scene.frames import file_label
+from ..scene.lights import lights_ready
+from ..scene.state import Keeper, kept, show_what_renders
+from ..scene.survey import survey
+from .clouds import Display, Imported, import_gaussians
 
 #: Gaussians that vote for the picture's camera.
 _VOTERS = 200
@@ -44,7 +44,7 @@ class Picture:
     """Samples per pixel."""
 
 
-def import_command(
+def import_run(
     scene: bpy.types.Scene,
     path: Path,
     display: Display,

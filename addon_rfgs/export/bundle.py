@@ -10,20 +10,20 @@ from typing import Any
 import bpy
 import numpy as np
 
-from .cameras import find_devices, find_views
-from .content import Content, content_ready
-from .files import replacing, replacing_folder, write_json
-from .findings import refuse
-from .frames import file_label, file_sha256, unit_scale
-from .materials import MaterialTable
-from .naming import Names
-from .overrides import Overrides
-from .people import action_label, joints, segments
-from .ply import write_mesh
+from ..files import replacing, replacing_folder, write_json
+from ..naming import Names
+from ..scene.cameras import find_devices, find_views
+from ..scene.check import report
+from ..scene.content import Content, content_ready
+from ..scene.findings import refuse
+from ..scene.frames import file_label, file_sha256, unit_scale
+from ..scene.materials import MaterialTable
+from ..scene.overrides import Overrides
+from ..scene.people import action_label, joints, segments
+from ..scene.state import kept
+from ..scene.survey import Surface, positions
+from .mesh_ply import write_mesh
 from .poses import at_offsets, pose_offsets, pose_table
-from .scene_check import report
-from .state import kept
-from .survey import Surface, positions
 from .velocities import SegmentVelocities, vertex_velocity
 
 SCHEMA = "rfgs-bundle/1"

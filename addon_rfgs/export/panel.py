@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel that writes bundles and ground truth."""
+
+import bpy
+
+from ..tab import Tab
+
+
+class RFGS_PT_dataset(Tab, bpy.types.Panel):
+    """Bundle and ground truth."""
+
+    bl_idname = "RFGS_PT_dataset"
+    bl_label = "Dataset"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Shows settings and the two buttons."""
+        layout, settings = self.layout, context.scene.rfgs.export
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.prop(settings, "frames")
+        layout.prop(settings, "cameras")
+        layout.prop(settings, "resolution")
+        layout.prop(settings, "bundle_folder")
+        layout.operator("rfgs.export_bundle", icon="EXPORT")
+        layout.prop(settings, "pictures_folder")
+        layout.prop(settings, "samples")
+        layout.prop(settings, "passes")
+        layout.operator("rfgs.render_groundtruth", icon="RENDER_STILL")

@@ -63,7 +63,7 @@ install_suite() {
   cp /etc/resolv.conf "$staging/etc/resolv.conf" 2>/dev/null || true
   DEBIAN_FRONTEND=noninteractive chroot "$staging" \
     apt-get install -y --no-install-recommends blender python3-numpy \
-    python3-cattr python3-requests >>"$log" 2>&1 || return 1
+    python3-cattr python3-requests libgl1 libglx-mesa0 libegl1 libgl1-mesa-dri >>"$log" 2>&1 || return 1
   chroot "$staging" apt-get clean
   rm -rf "$dir/root"
   mv "$staging" "$dir/root"

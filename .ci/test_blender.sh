@@ -12,4 +12,10 @@ if [ -z "${BLENDER:-}" ]; then
   fi
   export BLENDER="$PWD/.blender/blender"
 fi
+# The tests of the interface draw on a screen that nobody sees.
+if ! command -v Xvfb >/dev/null && [ "$(id -u)" -eq 0 ] && command -v apt-get >/dev/null; then
+  echo "Installing xvfb"
+  apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq xvfb >/dev/null ||
+    echo "xvfb cannot be installed; tests that need a window are skipped"
+fi
 .venv/bin/pytest -m blender tests

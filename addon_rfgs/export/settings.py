@@ -3,6 +3,8 @@
 
 import bpy
 
+from ..path_options import RELATIVE_PATH
+
 
 class RFGS_PG_export(bpy.types.PropertyGroup):
     """What is exported and rendered, and where to."""
@@ -27,12 +29,14 @@ class RFGS_PG_export(bpy.types.PropertyGroup):
         description="Folder the scene bundle is written to",
         default="//rfgs_bundle",
         subtype="DIR_PATH",
+        options=RELATIVE_PATH,
     )
     pictures_folder: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Pictures",
         description="Folder the ground truth is written to",
         default="//rfgs_pictures",
         subtype="DIR_PATH",
+        options=RELATIVE_PATH,
     )
     samples: bpy.props.IntProperty(  # type: ignore[valid-type]
         name="Samples", description="Cycles samples per pixel", default=16, min=1

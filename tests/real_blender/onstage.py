@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs inside a Blender with a window: plays a script step by step and photographs what is drawn.
+
+Started by `window.py`: `blender FILE --python onstage.py -- SCRIPT.py FRAMEBUFFER OUT [ARGUMENT…]`.
+The script holds `play(stage)`, a generator: each `yield SECONDS` gives Blender's own loop time to
+handle events and to draw.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import runpy
+import shutil
+import sys
+import traceback
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+EXTENSION = "bl_ext.user_default.addon_rfgs"
+#: Pixels between the places where a button is looked for; buttons are 20 high.
+_SEARCH_PX = 9
+
+
+class Stage:
+    """The window that a script acts in."""
+
+    def __init__(self, framebuffer: Path, out: Path, arguments: list[str]) -> None:
+        self._framebuffer, self.out = framebuffer, out
+        self.arguments = arguments
+
+    @property
+    def window(self) -> bpy.types.Window:
+        return bpy.context.window_manager.windows[0]
+
+    @property
+    def view(self) -> bpy.types.Area:
+        return next(area for area in self.window.screen.areas if area.type == "VIEW_3D")
+
+    @property
+    def sidebar(self) -> bpy.types.Region:
+        return next(region for region in self.view.regions if region.type == "UI")
+
+    def override(self, region: str = "WINDOW") -> Any:
+        """Context of the 3D view, for operators that need one."""
+        area = self.view
+        found = next(item for item in area.regions if item.type == region)
+        return bpy.context.temp_override(window=self.window, area=area, region=found)
+
+    def open_tab(self, *, alone: bool = True) -> Iterator[float]:
+        """Shows our tab with every panel unfolded; `alone` gives the 3D view the whole window."""
+        unfold_panels()
+        if alone:
+            with self.override():
+                bpy.ops.screen.screen_full_area(use_hide_panels=True)
+            yield 0.5
+        space = self.view.spaces.active
+        space.show_region_ui = True
+        yield 0.5
+        self.sidebar.active_panel_category = "RF-GS"
+        yield from self.redraw()
+
+    def redraw(self) -> Iterator[float]:
+        """Draws everything once more."""
+        for area in self.window.screen.areas:
+            area.tag_redraw()
+        yield 0.3
+        bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
+
+    def shoot(self, name: str, part: str = "WINDOW") -> Iterator[float]:
+        """Photographs the `WINDOW`, the `VIEW` or only its `SIDEBAR`, as OUT/NAME.png."""
+        yield from self.redraw()
+        shutil.copy(self._framebuffer, self.out / f"{name}.xwd")
+        place = {"WINDOW": None, "VIEW": self.view, "SIDEBAR": self.sidebar}[part]
+        crop = None
+        if place is not None:
+            crop = [place.x, self.window.height - place.y - place.height, place.width, place.height]
+        (self.out / f"{name}.json").write_text(json.dumps({"crop": crop}))
+
+    def click(self, operator: str) -> Iterator[float]:
+        """Finds the sidebar's button of an operator, say `rfgs.import_gaussians`, and clicks it."""
+        found = yield from self._find(operator)
+        if found is None:
+            raise LookupError(f"no button of {operator} in the sidebar")
+        for value in ("PRESS", "RELEASE"):
+            self.window.event_simulate(type="LEFTMOUSE", value=value, x=found[0], y=found[1])
+            yield 0.2
+
+    def _find(self, operator: str) -> Iterator[float]:
+        # Blender does not tell where buttons are, but which one is below the pointer.
+        region = self.sidebar
+        for x in (region.x + region.width // 2, region.x + region.width // 6):
+            for y in range(region.y + region.height - 10, region.y, -_SEARCH_PX):
+                self.window.event_simulate(type="MOUSEMOVE", value="NOTHING", x=x, y=y)
+                yield 0.02
+                if self._below_pointer() == operator:
+                    return x, y
+        return None
+
+    def _below_pointer(self) -> str:
+        manager = bpy.context.window_manager
+        manager.clipboard = ""
+        with self.override("UI"):
+            if bpy.ops.ui.copy_python_command_button.poll():
+                bpy.ops.ui.copy_python_command_button()
+        return manager.clipboard.removeprefix("bpy.ops.").partition("(")[0]
+
+
+def unfold_panels() -> None:
+    """Registers the extension again with no panel closed; Blender cannot be asked to open one."""
+    extension = sys.modules[EXTENSION]
+    extension.unregister()
+    for panel in our_panels():
+        options = getattr(panel, "bl_options", set())
+        panel.bl_options = set(options) - {"DEFAULT_CLOSED"}
+    extension.register()
+
+
+def our_panels() -> list[type]:
+    """Every panel class of the extension, registered or not."""
+    return [
+        kind for kind in bpy.types.Panel.__subclasses__() if kind.__module__.startswith(EXTENSION)
+    ]
+
+
+def _start() -> None:
+    script, framebuffer, out, *arguments = sys.argv[sys.argv.index("--") + 1 :]
+    stage = Stage(Path(framebuffer), Path(out), arguments)
+    steps = runpy.run_path(script)["play"](stage)
+
+    def tick() -> float | None:
+        try:
+            return next(steps)
+        except StopIteration:
+            bpy.ops.wm.quit_blender()
+            return None
+        except BaseException:
+            traceback.print_exc()
+            sys.stderr.flush()
+            os._exit(3)
+
+    bpy.app.timers.register(tick, first_interval=1.0)
+
+
+if __name__ == "__main__":
+    _start()

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import shutil
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,6 +18,7 @@ from dataset_factory.blender import Blender
 from dataset_factory.convert.nerf2 import write as write_nerf2
 from dataset_factory.devices import choose_devices
 from dataset_factory.generate import generate
+from dataset_factory.impair import impair_dataset
 from dataset_factory.job import Job
 from dataset_factory.plan import make_plan
 from dataset_factory.preview import preview
@@ -29,6 +31,7 @@ from rfgs_core.dataset.torch_dataset import FrameDataset
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import write_json
 from rfgs_core.radio import preset
+from rfgs_core.radio.impairments import IMPAIRMENT_PRESETS
 from rfgs_core.run.training import train_sequence
 from rfgs_core.train.config import TrainConfig
 
@@ -36,6 +39,7 @@ from rfgs_core.train.config import TrainConfig
 pytestmark = pytest.mark.slow
 
 MakeAperture = Callable[..., Job]
+Factory = Callable[..., subprocess.CompletedProcess[str]]
 COUNT = 8
 RADIO = f"""\
 like: sar
@@ -165,6 +169,21 @@ def test_two_workers_write_the_same_bytes(
 ) -> None:
     assert generate(make_aperture(tmp_path / "dataset", workers=2))
     assert data_of(tmp_path / "dataset") == data_of(ring)
+
+
+def test_imperfect_radios_stand_beside_the_clean_one(ring: Path, tmp_path: Path) -> None:
+    copy = Path(shutil.copytree(ring, tmp_path / "dataset"))
+    impair_dataset(copy, next(iter(IMPAIRMENT_PRESETS.values())))
+    assert validate(copy) == []
+    data = open_dataset(copy).sequence().radio("ring")
+    assert data["csi_impaired"].shape == data["csi"].shape
+
+
+def test_paths_between_antennas_that_move_are_refused(box_room: Path, factory: Factory) -> None:
+    command = ("plan", str(box_room), "--radio", "sar", "--frames", "1:2", "--paths", "--out", "x")
+    done = factory(*command)
+    assert done.returncode == 2 and done.stderr.count("\n") == 1
+    assert "--paths: radio 'sar' has antennas that move" in done.stderr
 
 
 def test_packets_leave_the_places_as_they_are(make_aperture: MakeAperture, tmp_path: Path) -> None:

@@ -14,7 +14,9 @@ _DIGESTS = """
 import hashlib, os, sys
 os.environ["NUMBA_CACHE_DIR"] = sys.argv[1]
 import numpy as np, torch
+from dataset_factory.trace import silhouette
 from dataset_factory.trace.facets import facet_sum
+from dataset_factory.trace.shadow import _shade
 from dataset_factory.trace.steering import _steer
 from rfgs_core.propagation import EnvironmentPaths, Links, Tones, scatter, shadow
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
@@ -45,6 +47,20 @@ steered = _steer(
 )
 show("steering", [steered])
 
+# A cloud of triangles around the middle of twenty straight paths of 32 links each.
+corners = np.stack([rng.normal(size=(20, 3)) * 0.4, rng.normal(size=(20, 3)) * 0.4 + [4, 4, 2]], 1)
+body = np.concatenate([points[:200] + 0.1 * rng.normal(size=(200, 3)) for _ in range(3)])
+still, turn = np.zeros((20, 1)), np.broadcast_to(np.eye(3), (20, 1, 3, 3)).copy()
+past = np.ones((20, 4, 8, 5), dtype=np.complex128)
+_shade(
+    corners, (still, still, turn, turn, np.full(20, silhouette.FAR)),
+    rng.normal(size=(20, 4, 3)) * 0.1, rng.normal(size=(20, 8, 3)) * 0.1,
+    body, np.arange(600).reshape(3, 200).T.copy(), 3e8 / np.linspace(5.7e9, 5.9e9, 5),
+    silhouette.FRESNEL, False, past,
+)
+assert np.abs(past - 1).max() > 0.1, "expected a shadow"
+show("silhouettes", [past])
+
 def leaf(values):
     return torch.tensor(values, dtype=torch.float32, requires_grad=True)
 
@@ -71,5 +87,5 @@ def test_the_run_that_compiles_and_later_ones_give_the_same_bytes(python, tmp_pa
         python("-c", _DIGESTS, tmp_path / "cache", must_work=True).stdout for _ in range(2)
     )
     assert list((tmp_path / "cache").rglob("*.nbi")), "expected the first run to fill the cache"
-    assert compiling.count("\n") == 4
+    assert compiling.count("\n") == 5
     assert loading == compiling

@@ -11,7 +11,7 @@ import pytest
 from level_errors import error_db
 
 from dataset_factory.bundle import Bundle
-from rfgs_core.radio import DevicePose, Radio, layout
+from rfgs_core.radio import DevicePose, Radio, layout, preset
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.images import SCATTERING, SPECULAR
 from rfgs_core.radio.path_table import PathTable
@@ -135,6 +135,25 @@ def test_rows_add_up_to_the_channel(
     assert error_db(found - tracer.static(), moving) < limits[1]
     link = table.link(spread, 1, 0, radio.freq_hz)
     assert np.abs(link - found[1, 0]).max() < 1e-12
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "limit_db"), [("mmwave", -30.0), ("uwb", -30.0)])
+def test_rows_of_radar_presets_add_up(
+    person_bundle: Bundle, two_devices: list[DevicePose], name: str, limit_db: float
+) -> None:
+    from dataset_factory.trace import Tracer
+
+    # One antenna each, so that the rows' plane waves are no limit.
+    single = {"tx_rows": 1, "tx_cols": 1, "rx_rows": 1, "rx_cols": 1}
+    radio = replace(preset(name), **single)
+    tracer = Tracer(person_bundle, radio, two_devices, depth=radio.deepest)
+    frame = person_bundle.frame(1)
+    trace = tracer.trace(frame)
+    channel = tracer.samples(frame, trace)[0].astype(np.complex128)
+    table, spread = tracer.paths(frame, trace), layout(radio, two_devices)
+    found = table.channel(spread, radio.freq_hz)
+    assert error_db(found, channel) < limit_db
 
 
 def test_ports_have_amplitudes_of_their_own(

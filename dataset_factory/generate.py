@@ -68,6 +68,7 @@ def generate(job: Job) -> bool:
         logger.info("%s", table(read_json(bundle.path / "check.json")))
         if SCENE_RADIO in job.plan.radios:
             job = replace(job, plan=job.plan.with_radio(scene_radio(bundle)))
+        _tell_depth(job)
         devices, guesses = _choose(job, bundle)
         # Only a usable scene claims the folder: who mends theirs may use the same --out again.
         if not (job.out / "dataset.json").exists():
@@ -97,6 +98,14 @@ def generate(job: Job) -> bool:
     # Later estimates ask before they know the scene's radio.
     remember(replace(job, plan=asked), len(sequence.frames), len(sequence.cameras), needed)
     return True
+
+
+def _tell_depth(job: Job) -> None:
+    for name in job.plan.radios:
+        radio = job.plan.radio(name)
+        if radio.deepest < job.plan.depth:
+            why = "its antennas move" if radio.antennas_move else "its band is ultra-wide"
+            logger.info("%s: traced at depth %d, as %s", name, radio.deepest, why)
 
 
 def _contents(job: Job) -> list[str]:

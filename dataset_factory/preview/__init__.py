@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 from tqdm import tqdm
 
 from dataset_factory.preview.aperture import aperture_strip, image_figure, range_figure
-from dataset_factory.preview.channels import delay_angle_figure, profile_figure
+from dataset_factory.preview.arrays import has_beam
+from dataset_factory.preview.channels import delay_image_figure, profile_figure
 from dataset_factory.preview.panels import doppler_shown, watch
 from dataset_factory.preview.pictures import layer_sheet
 from dataset_factory.preview.player import plan, player
@@ -128,6 +129,12 @@ def _radio(
 ) -> list[dict[str, Any]]:
     frame = sequence.frames[len(sequence.frames) // 2]
     seen = watch(sequence, radio)
+    beam = has_beam(sequence, radio)
+    rows = (
+        "delay and angle of the change under each picture (20 dB), the cross marks the pelvis."
+        if beam
+        else "delay of the change at each antenna under each picture (20 dB), dashed: the pelvis."
+    )
     doppler = (
         "Doppler: half the rate at which the path shortens."
         if doppler_shown(sequence, radio)
@@ -141,8 +148,7 @@ def _radio(
             f"Channels of {radio} over time",
             f"Device {seen.pair[0]} to {seen.pair[1]}, the pair that shows movement best. The "
             "change is the channel less that of the empty scene; dashed: where the pelvis of "
-            f"each person is. {doppler} Bottom: delay and angle of the change under each picture "
-            "(20 dB), the cross marks the pelvis.",
+            f"each person is. {doppler} Bottom: {rows}",
             strip=True,
         ),
         _figure(
@@ -155,12 +161,18 @@ def _radio(
             folded=True,
         ),
         _figure(
-            delay_angle_figure(sequence, radio, frame),
-            folder / f"{radio}_delay_angle.png",
-            f"Delay and angle at each device of {radio}, one frame",
-            f"Frame {frame}. Bartlett beam over the columns of each receiving array, power "
-            "averaged over its rows and transmitters; 0° is the boresight. Each image has its own "
-            "scale of 40 dB; the cross marks the person's pelvis.",
+            delay_image_figure(sequence, radio, frame),
+            folder / f"{radio}_delay_{'angle' if beam else 'antenna'}.png",
+            f"Delay {'and angle ' if beam else ''}at each device of {radio}, one frame",
+            f"Frame {frame}. "
+            + (
+                "Bartlett beam over the columns of each receiving array, power averaged over its "
+                "rows and transmitters; 0° is the boresight; the cross marks the person's pelvis."
+                if beam
+                else "Antenna by antenna, as they are too far apart for a beam; a scatterer draws "
+                "a curve, dashed: that of the person's pelvis."
+            )
+            + " Each image has its own scale of 40 dB.",
             folded=True,
         ),
     ]

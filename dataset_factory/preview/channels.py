@@ -1,19 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plots of a sequence's channels: amplitude, delay, and delay over angle."""
+"""Plots of a sequence's channels: amplitude, delay, and delay over each array."""
 
 from __future__ import annotations
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from dataset_factory.preview.arrays import (
+    across_label,
+    delay_image,
+    delay_profile,
+    draw_scatterer,
+)
 from rfgs_core.dataset import Sequence
 from rfgs_core.radio import Layout
-from rfgs_core.radio.constants import SPEED_OF_LIGHT
-from rfgs_core.radio.layout import rotation
 from rfgs_core.radio.levels import decibels
 
-#: Interpolation of delays between the band's own bins.
-OVERSAMPLING = 8
 #: Dynamic range of images [dB].
 RANGE_DB = 40.0
 #: Dynamic range of delay profiles [dB].
@@ -52,8 +54,8 @@ def profile_figure(sequence: Sequence, radio: str, frame: int) -> Figure:
     return figure
 
 
-def delay_angle_figure(sequence: Sequence, radio: str, frame: int) -> Figure:
-    """Delay–angle images of each receiving device (rows) with people, static, difference."""
+def delay_image_figure(sequence: Sequence, radio: str, frame: int) -> Figure:
+    """Delay images of each receiving device (rows) with people, static, difference."""
     csi, static = sequence.csi(radio, frame), sequence.csi_static(radio)
     layout = sequence.layout(radio)
     pairs = _listening_pairs(layout)[:4]
@@ -61,7 +63,7 @@ def delay_angle_figure(sequence: Sequence, radio: str, frame: int) -> Figure:
     axes = figure.subplots(len(pairs), 3, squeeze=False, sharex=True, sharey=True)
     for row, (a, b) in zip(axes, pairs, strict=True):
         for axis, value, title in zip(row, (csi, static, csi - static), _KINDS, strict=True):
-            power, angle_deg, length_m = delay_angle(sequence, radio, value, (a, b))
+            power, across, length_m = delay_image(sequence, radio, value, (a, b))
             level = decibels(power)
             # A device's own transmitter is so near that it would hide the room.
             top = level[:, length_m > (1.0 if a == b else 0.0)].max()
@@ -69,7 +71,7 @@ def delay_angle_figure(sequence: Sequence, radio: str, frame: int) -> Figure:
                 level.T,
                 origin="lower",
                 aspect="auto",
-                extent=(angle_deg[0], angle_deg[-1], 0.0, length_m[-1]),
+                extent=(across[0], across[-1], 0.0, length_m[-1]),
                 vmin=top - RANGE_DB,
                 vmax=top,
                 cmap="inferno",
@@ -78,61 +80,11 @@ def delay_angle_figure(sequence: Sequence, radio: str, frame: int) -> Figure:
             axis.set_title(f"device {a} to {b}, {title}", fontsize=9)
             pelvis = sequence.joints(frame)[:, 0]
             for point in pelvis[np.isfinite(pelvis).all(axis=1)]:
-                angle, length = seen_from(sequence, radio, (a, b), point)
-                axis.plot(angle, length, "x", color="#4dd2ff", ms=8, mew=2)
+                draw_scatterer(axis, sequence, radio, (a, b), point)
         row[0].set_ylabel("path length [m]")
     for axis in axes[-1]:
-        axis.set_xlabel("angle from boresight [°]")
+        axis.set_xlabel(across_label(sequence, radio))
     return figure
-
-
-def delay_angle(
-    sequence: Sequence, radio: str, value: np.ndarray, pair: tuple[int, int]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Power over angle and path length at one receiving device, from one transmitting device.
-
-    Bartlett: P(θ, τ) = Σ_rows,tx |Σ_columns h_c(τ) e^{−jk y_c sin θ}|² with y_c the column's
-    position along the device's y axis; angles count from the boresight towards +y.
-
-    Returns:
-        Power (angle, delay), angles [°] and path lengths [m].
-    """
-    layout, spec = sequence.layout(radio), sequence.radio_spec(radio)
-    tx, rx = layout.tx_device == pair[0], layout.rx_device == pair[1]
-    profile, length_m = delay_profile(sequence, radio, value[np.ix_(tx, rx)])
-    device = sequence.devices(radio)[pair[1]]
-    local = (layout.rx_xyz[rx] - np.asarray(device.position_m)) @ rotation(device.quat_wxyz)
-    angle_deg = np.linspace(-90.0, 90.0, 181)
-    turn = np.sin(np.deg2rad(angle_deg))[:, None] * local[:, 1]
-    steering = np.exp(-2j * np.pi * spec.centre_hz / SPEED_OF_LIGHT * turn)
-    power = np.zeros((len(angle_deg), len(length_m)))
-    heights = np.round(local[:, 2], 6)
-    for height in np.unique(heights):
-        row = heights == height
-        beams = np.einsum("ar,trd->tad", steering[:, row], profile[:, row])
-        power += (np.abs(beams) ** 2).sum(axis=0)
-    return power, angle_deg, length_m
-
-
-def delay_profile(
-    sequence: Sequence, radio: str, links: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Hann-windowed impulse responses up to twice the scene's diagonal.
-
-    Returns:
-        Responses (..., delay) and path lengths [m].
-    """
-    spec = sequence.radio_spec(radio)
-    window = np.hanning(spec.num_subcarriers)
-    count = OVERSAMPLING * spec.num_subcarriers
-    # The first tone's own phase is kept, so responses stay comparable between elements.
-    response = np.fft.ifft(links * window, n=count, axis=-1) * count / window.sum()
-    length_m = np.arange(count) * spec.unambiguous_path_m / count
-    carrier = 2 * np.pi * spec.freq_hz[0] / SPEED_OF_LIGHT
-    response = response * np.exp(1j * carrier * length_m)
-    diagonal = float(np.linalg.norm(sequence.bounds_m[1] - sequence.bounds_m[0]))
-    keep = length_m <= 2 * diagonal
-    return response[..., keep], length_m[keep]
 
 
 def _profiles(
@@ -150,17 +102,6 @@ def _profiles(
     axis.set_xlabel("path length [m]", fontsize=8)
     axis.tick_params(labelsize=7)
     axis.grid(alpha=0.25)
-
-
-def seen_from(
-    sequence: Sequence, radio: str, pair: tuple[int, int], point: np.ndarray
-) -> tuple[float, float]:
-    """Angle [°] and path length [m] of a single scatterer."""
-    layout, device = sequence.layout(radio), sequence.devices(radio)[pair[1]]
-    local = (point - np.asarray(device.position_m)) @ rotation(device.quat_wxyz)
-    away = np.linalg.norm(local)
-    out = np.linalg.norm(point - layout.tx_xyz[layout.tx_device == pair[0]].mean(axis=0))
-    return float(np.rad2deg(np.arcsin(local[1] / away))), float(away + out)
 
 
 def _listening_pairs(layout: Layout) -> list[tuple[int, int]]:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from dataset_factory.preview.channels import delay_angle, delay_profile, seen_from
+from dataset_factory.preview.arrays import delay_angle, delay_profile, seen_from
 from rfgs_core.dataset import Sequence
 from rfgs_core.encode.micro_doppler import micro_doppler
 from rfgs_core.radio.levels import decibels

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from dataset_factory.preview.channels import delay_angle, seen_from
+from dataset_factory.preview.arrays import delay_image, draw_scatterer, has_beam
 from dataset_factory.preview.panels import (
     Watch,
     amplitude_panel,
@@ -25,7 +25,7 @@ from rfgs_core.radio.levels import decibels
 #: Left and right end of the time axis in every strip, as shares of its width.
 MARGINS = (0.085, 0.93)
 WIDTH_IN = 12.0
-#: Pictures, and delay–angle images under them, across a strip.
+#: Pictures, and delay images under them, across a strip.
 MOST_ACROSS = 8
 MOST_CAMERAS = 2
 #: Height of a panel and of the gap below it [in].
@@ -119,8 +119,9 @@ def _action_band(axis: Any, sequence: Sequence, timeline: Timeline) -> None:
 
 
 def channel_strip(sequence: Sequence, radio: str, timeline: Timeline, seen: Watch) -> Figure:
-    """Amplitude, delay, angle and Doppler over time, and delay–angle images under the pictures."""
-    panels = [amplitude_panel, delay_panel, angle_panel]
+    """Amplitude, delay, angle and Doppler over time, and delay images under the pictures."""
+    beam = has_beam(sequence, radio)
+    panels = [amplitude_panel, delay_panel, *([angle_panel] if beam else [])]
     panels += [doppler_panel] if doppler_shown(sequence, radio) else []
     left, right = MARGINS
     square = min(WIDTH_IN * (right - left) / len(timeline.shown), 1.6)
@@ -136,11 +137,11 @@ def channel_strip(sequence: Sequence, radio: str, timeline: Timeline, seen: Watc
         axis.set_xlim(timeline.start_s, timeline.end_s)
         axis.tick_params(labelsize=7, length=2, labelbottom=panel is panels[-1])
         top -= GAP_IN
-    _angle_row(figure, sequence, radio, timeline, seen, (0.42 / total, square / total))
+    _image_row(figure, sequence, radio, timeline, seen, (0.42 / total, square / total))
     return figure
 
 
-def _angle_row(
+def _image_row(
     figure: Figure,
     sequence: Sequence,
     radio: str,
@@ -148,16 +149,17 @@ def _angle_row(
     seen: Watch,
     place: tuple[float, float],
 ) -> None:
-    """One delay–angle image of the change under each picture of the strip."""
+    """One delay image of the change under each picture of the strip."""
     (left, right), (bottom, tall) = MARGINS, place
     slot, static = (right - left) / len(timeline.shown), sequence.csi_static(radio)
+    beam = has_beam(sequence, radio)
     for column, frame in enumerate(timeline.shown):
         change = sequence.csi(radio, frame) - static
-        power, angle_deg, length_m = delay_angle(sequence, radio, change, seen.pair)
+        power, across, length_m = delay_image(sequence, radio, change, seen.pair)
         level = decibels(power)
         axis = figure.add_axes((left + (column + 0.04) * slot, bottom, 0.92 * slot, tall))
         axis.pcolormesh(
-            angle_deg,
+            across,
             length_m,
             level.T,
             shading="nearest",
@@ -167,10 +169,10 @@ def _angle_row(
             rasterized=True,
         )
         for joints in sequence.joints(frame):
-            where = seen_from(sequence, radio, seen.pair, joints[0])
-            axis.plot(*where, "x", color="#4dd2ff", ms=6, mew=1.5)
-        axis.set_xticks([-60, 0, 60])
-        axis.set_xlabel(f"frame {frame}, angle [°]", fontsize=7)
+            draw_scatterer(axis, sequence, radio, seen.pair, joints[0])
+        if beam:
+            axis.set_xticks([-60, 0, 60])
+        axis.set_xlabel(f"frame {frame}, {'angle [°]' if beam else 'antenna [m]'}", fontsize=7)
         axis.tick_params(labelsize=6, length=2, labelleft=column == 0)
         if column == 0:
             axis.set_ylabel("path length\n[m]", fontsize=8)

@@ -27,6 +27,8 @@ def test_a_whole_dataset_is_made_and_valid(
         *("--unit-scale", "1.4", "--workers", "1", "--out", str(out)),
     )
     assert done.returncode == 0, done.stderr[-2000:]
+    told = f"{name}: traced at depth 1, as its band is ultra-wide" in done.stderr + done.stdout
+    assert told == PRESETS[name].ultra_wide
     assert validate(out) == []
     sequence = open_dataset(out).sequence()
     assert sequence.trace_depth(name) == min(2, PRESETS[name].deepest)

@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Float, Float64
 from scipy.ndimage import gaussian_filter, map_coordinates
 from scipy.optimize import linear_sum_assignment
+from scipy.spatial import cKDTree
 
 from rfgs_core.encode.matched_filter import matched_filter_map
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
@@ -32,6 +33,8 @@ GROUND_STEP_M = 0.04
 FIRST_REACH_M = 0.8
 #: Two bodies stand at least this far apart [m].
 SEPARATION_M = 0.4
+#: A body's score is the highest this far around it [m].
+PEAK_RADIUS_M = 0.2
 
 
 @dataclass(frozen=True)
@@ -138,6 +141,27 @@ def _sharpened(
     return around[int(_visible_side_score(maps, around, float(bounds_m[0, 2])).argmax())]
 
 
+def _separate_peaks(
+    ground: Float64[np.ndarray, "P 2"], score: Float64[np.ndarray, "P"], count: int
+) -> Float64[np.ndarray, "count 2"]:
+    """The best places that are apart from each other, peaks of the score before its slopes.
+
+    The slope of a strong body's peak may be higher than the peak of a weak body.
+    """
+    tree = cKDTree(ground)
+    neighbours = tree.query_ball_point(ground, PEAK_RADIUS_M)
+    is_peak = np.array([score[i] >= score[near].max() for i, near in enumerate(neighbours)])
+    taken: list[int] = []
+    free = np.ones(len(ground), dtype=bool)
+    for _ in range(count):
+        # A reach too small for as many peaks still gives as many places.
+        among = free & is_peak if (free & is_peak).any() else free
+        taken.append(int(np.where(among, score, -np.inf).argmax()))
+        apart = np.linalg.norm(ground - ground[taken[-1]], axis=1)
+        free &= apart >= SEPARATION_M + 2 * GROUND_STEP_M
+    return ground[taken]
+
+
 def locate_bodies(
     maps: PairMaps,
     bounds_m: Float64[np.ndarray, "2 3"],
@@ -173,11 +197,7 @@ def locate_bodies(
         within = np.maximum(np.asarray(reach_m) - GROUND_STEP_M, apart.min(axis=0))
         ground = ground[(apart <= within).any(axis=1)]
     score = _visible_side_score(maps, ground, float(bounds_m[0, 2]))
-    taken = []
-    for _ in range(count):
-        taken.append(ground[int(score.argmax())])
-        near_it = np.linalg.norm(ground - taken[-1], axis=1) < SEPARATION_M + 2 * GROUND_STEP_M
-        score[near_it] = -np.inf
+    taken = _separate_peaks(ground, score, count)
     found = np.array([_sharpened(maps, place, bounds_m) for place in taken])
     if near is None:
         return found

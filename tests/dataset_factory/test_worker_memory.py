@@ -29,6 +29,7 @@ def test_memory_is_flat_over_300_frames(make_job: MakeJob, tmp_path: Path) -> No
         "devices": {"wifi": [asdict(device) for device in devices]},
         "depth": 1,
         "shadow": "kirchhoff",
+        "paths": False,
         "seed": 0,
     }
     lane = Lane(job, tmp_path / "log", Limits(16 * 10**9, frames=1000))

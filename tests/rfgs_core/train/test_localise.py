@@ -11,7 +11,7 @@ import pytest
 
 from rfgs_core.radio import preset
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
-from rfgs_core.train.localise import PairMaps, locate_bodies, pair_maps
+from rfgs_core.train.localise import PairMaps, _separate_peaks, locate_bodies, pair_maps
 from rfgs_core.train.observations import Observations
 
 ROOM_M = np.array([[0.0, 0.0, 0.0], [3.6, 3.2, 2.2]])
@@ -130,3 +130,16 @@ def test_the_grid_follows_the_finer_of_range_and_room(make_observations) -> None
     assert coarse.spacing_m == pytest.approx(0.12)
     assert coarse.power.shape == (16, 10, 10, 10)
     np.testing.assert_allclose(coarse.origin_m, 0.06)
+
+
+def test_a_weak_body_is_not_lost_to_the_slope_of_a_strong_one() -> None:
+    axis = np.arange(0.0, 3.0, 0.04)
+    ground = np.stack(np.meshgrid(axis, axis, indexing="ij"), axis=-1).reshape(-1, 2)
+    strong, weak = np.array([0.8, 0.8]), np.array([2.2, 2.0])
+    apart = [np.linalg.norm(ground - body, axis=1) for body in (strong, weak)]
+    score = 4.0 * np.exp(-((apart[0] / 0.9) ** 2)) + np.exp(-((apart[1] / 0.3) ** 2))
+    # Half a metre away the strong one still scores three times as much as the weak one.
+    assert 4.0 * np.exp(-((0.5 / 0.9) ** 2)) > 2.5
+    found = _separate_peaks(ground, score, 2)
+    assert np.linalg.norm(found - [strong, weak], axis=1).max() < 0.05
+    assert len(np.unique(_separate_peaks(ground, score, 4), axis=0)) == 4

@@ -17,7 +17,7 @@ def register() -> None:
     """Registers everything; called by Blender when the extension is enabled."""
     for module in _MODULES:
         module.register()
-    if bpy.app.module:
+    if getattr(bpy.app, "module", not bpy.app.binary_path):  # Blender 4.2 has no `module` yet.
         # Blender as a Python module crashes or hangs at exit on classes still registered.
         atexit.register(unregister)
 

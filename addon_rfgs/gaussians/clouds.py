@@ -3,39 +3,38 @@
 
 from __future__ import annotations
 
-import zipfile
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import bpy
-import numpy as np
 
 from ..errors import AddonError
 from ..scene.frames import unit_scale
-from .nodes import add_modifier
-from .ply import Cloud, read_gaussians
+from .cloud_mesh import FRAME, make_mesh
+from .coloring import Coloring, color_clouds
+from .display import Display, add_modifier
+from .features import read_features
+from .nodes import GROUP
+from .splats import read_gaussians
+from .timing import key_visibility
 
 #: Collection that holds everything imported.
 COLLECTION = "RF-GS Gaussians"
-
-#: Anchors of a perceptually ordered ramp, dark violet to yellow, linear RGB.
-_RAMP = np.array(
-    [
-        [0.06, 0.0, 0.09],
-        [0.05, 0.08, 0.26],
-        [0.02, 0.28, 0.27],
-        [0.11, 0.58, 0.12],
-        [0.98, 0.8, 0.02],
-    ]
-)
+#: Blender's timeline ends here.
+_LAST_FRAME = 1_048_574
 
 
 @dataclass(frozen=True)
-class Display:
-    """How imported Gaussians are shown."""
+class Inspection:
+    """How clouds are brought in."""
 
-    mode: str = "points"
-    opacity_threshold: float = 0.005
+    display: Display = field(default_factory=Display)
+    coloring: Coloring = field(default_factory=Coloring)
+    frame_offset: int = 0
+    """The cloud of frame f is shown at frame f + offset."""
+    interpolation: str = "HOLD"
+    """What is seen between recorded frames, see `key_visibility`."""
 
 
 @dataclass(frozen=True)
@@ -44,35 +43,59 @@ class Imported:
 
     objects: list[bpy.types.Object]
     frames: list[int]
+    """Frames of the timeline at which clouds appear."""
     count: int
+    """Gaussians in all clouds."""
 
 
-def import_gaussians(scene: bpy.types.Scene, path: Path, display: Display) -> Imported:
+def import_gaussians(scene: bpy.types.Scene, path: Path, wanted: Inspection) -> Imported:
     """Brings the Gaussians of a run or a PLY into the scene, in place of earlier ones.
 
     Args:
         scene: Where to.
         path: A run folder, a folder of `000001.ply` and so on, or one PLY.
-        display: How they are shown.
+        wanted: How they are shown, coloured and timed.
 
     Raises:
-        AddonError: There is nothing to import, or a file is damaged.
+        AddonError: There is nothing to import, or a file is damaged; nothing has changed then.
     """
-    if not 0 <= display.opacity_threshold <= 1:
-        raise AddonError(f"opacity threshold: expected 0 to 1, got {display.opacity_threshold}")
-    files = _find_files(path)
-    clouds = [(frame, read_gaussians(file), _attributes(file)) for frame, file in files]
+    threshold = wanted.display.opacity_threshold
+    if not 0 <= threshold <= 1:
+        raise AddonError(f"opacity threshold: expected 0 to 1, got {threshold}")
+    meshes: list[bpy.types.Mesh] = []
+    try:
+        for frame, file in _find_files(path):
+            meshes.append(_read_mesh(frame, file))
+        count = sum(len(mesh.vertices) for mesh in meshes)
+        if not count:
+            raise AddonError(f"{path}: holds no Gaussians (0 points)")
+        color_clouds(meshes, wanted.coloring)
+    except AddonError:
+        for mesh in meshes:
+            bpy.data.meshes.remove(mesh)
+        raise
     collection = _fresh_collection(scene)
-    frames = sorted(frame for frame, _, _ in clouds if frame is not None)
-    objects = []
-    for frame, cloud, extra in clouds:
-        item = _make_object(scene, frame, cloud, extra)
+    objects = [_make_object(scene, mesh) for mesh in meshes]
+    for item in objects:
         collection.objects.link(item)
-        add_modifier(item, display.mode, display.opacity_threshold)
-        if frame is not None:
-            _show_only_at(item, frame, frames)
-        objects.append(item)
-    return Imported(objects, frames, sum(len(cloud) for _, cloud, _ in clouds))
+        add_modifier(item, wanted.display)
+    key_visibility(objects, wanted.frame_offset, wanted.interpolation)
+    frames = [mesh[FRAME] + wanted.frame_offset for mesh in meshes if FRAME in mesh]
+    return Imported(objects, sorted(frames), count)
+
+
+def clouds_in_file() -> list[bpy.types.Object]:
+    """Clouds imported earlier.
+
+    Raises:
+        AddonError: There are none.
+    """
+    collection = bpy.data.collections.get(COLLECTION)
+    items = collection.objects if collection else []
+    found = [item for item in items if item.type == "MESH" and GROUP in item.modifiers]
+    if not found:
+        raise AddonError("no imported Gaussians in this file")
+    return found
 
 
 def _find_files(path: Path) -> list[tuple[int | None, Path]]:
@@ -82,8 +105,11 @@ def _find_files(path: Path) -> list[tuple[int | None, Path]]:
     if not path.is_dir():
         raise AddonError(f"{path}: no such run folder or PLY file")
     folder = path / "gaussians" if (path / "gaussians").is_dir() else path
-    numbered = sorted(file for file in folder.glob("*.ply") if file.stem.isdigit())
-    found: list[tuple[int | None, Path]] = [(int(file.stem), file) for file in numbered]
+    numbered = [file for file in folder.glob("*.ply") if re.fullmatch(r"[0-9]{1,9}", file.stem)]
+    found: list[tuple[int | None, Path]] = [(int(file.stem), file) for file in sorted(numbered)]
+    frames = [int(file.stem) for file in numbered]
+    if max(frames, default=0) > _LAST_FRAME or len(set(frames)) < len(frames):
+        raise AddonError(f"{folder}: two files of one frame, or a frame beyond {_LAST_FRAME}")
     if (folder / "static.ply").is_file():
         found.insert(0, (None, folder / "static.ply"))
     if not found and (path / "point_cloud.ply").is_file():
@@ -93,70 +119,26 @@ def _find_files(path: Path) -> list[tuple[int | None, Path]]:
     return found
 
 
-def _attributes(file: Path) -> dict[str, np.ndarray]:
-    """Radio attributes that lie beside a PLY, if any."""
-    beside = file.with_name(file.stem + ".features.npz")
-    if not beside.is_file():
-        return {}
-    try:
-        with np.load(beside, allow_pickle=False) as stored:
-            names = [name for name in ("rf_power_db", "track_id") if name in stored.files]
-            return {name: stored[name] for name in names}
-    except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
-        raise AddonError(f"{beside}: damaged array file ({error})") from error
+def _read_mesh(frame: int | None, file: Path) -> bpy.types.Mesh:
+    cloud = read_gaussians(file)
+    return make_mesh(frame, cloud, read_features(file, len(cloud)))
 
 
-def _make_object(
-    scene: bpy.types.Scene, frame: int | None, cloud: Cloud, extra: dict[str, np.ndarray]
-) -> bpy.types.Object:
-    name = "Gaussians static" if frame is None else f"Gaussians {frame:06d}"
-    mesh, count = bpy.data.meshes.new(name), len(cloud)
-    mesh.vertices.add(count)
-    mesh.vertices.foreach_set("co", cloud.means.astype(np.float32).ravel())
-    power = extra.get("rf_power_db", np.full(count, -200.0))
-    tracks = extra.get("track_id", np.arange(count))
-    for key, values in (("rf_power_db", power), ("track_id", tracks)):
-        if values.shape != (count,):
-            raise AddonError(f"{name}: {key} has shape {values.shape}, the PLY {count} Gaussians")
-    power = np.nan_to_num(power.astype(np.float32), nan=-200.0, neginf=-200.0, posinf=200.0)
-    colour = _colours(cloud, power if "rf_power_db" in extra else None)
-    for key, kind, field, values in (
-        ("rfgs_color", "FLOAT_COLOR", "color", colour),
-        ("opacity", "FLOAT", "value", cloud.opacities),
-        ("scale", "FLOAT_VECTOR", "vector", cloud.scales),
-        ("rotation", "QUATERNION", "value", cloud.quats),
-        ("radius", "FLOAT", "value", cloud.scales.mean(axis=1)),
-        ("rf_power_db", "FLOAT", "value", power),
-        ("gid", "INT", "value", tracks.astype(np.int32)),
-    ):
-        attribute = mesh.attributes.new(key, kind, "POINT")
-        attribute.data.foreach_set(field, np.ascontiguousarray(values).ravel())
-    mesh.update()
-    item = bpy.data.objects.new(name, mesh)
+def _make_object(scene: bpy.types.Scene, mesh: bpy.types.Mesh) -> bpy.types.Object:
+    mesh.name = f"Gaussians {mesh[FRAME]:06d}" if FRAME in mesh else "Gaussians static"
+    item = bpy.data.objects.new(mesh.name, mesh)
     # Positions are metres; the object's scale carries them into the scene's units.
     item.scale = (1 / unit_scale(scene),) * 3
     item.rfgs.object_class = "IGNORE"
     return item
 
 
-def _colours(cloud: Cloud, power_db: np.ndarray | None) -> np.ndarray:
-    """Linear RGBA [M, 4]; where no colour was fitted (all grey), radio power if it is known."""
-    encoded = cloud.colors
-    linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
-    if power_db is not None and len(cloud) and float(np.ptp(encoded)) < 1e-4:
-        low, high = np.percentile(power_db, [5, 99])
-        share = np.clip((power_db - low) / max(high - low, 1e-6), 0, 1) * (len(_RAMP) - 1)
-        steps = np.arange(len(_RAMP))
-        linear = np.stack([np.interp(share, steps, _RAMP[:, i]) for i in range(3)], axis=1)
-    return np.concatenate([linear, np.ones((len(cloud), 1))], axis=1).astype(np.float32)
-
-
 def _fresh_collection(scene: bpy.types.Scene) -> bpy.types.Collection:
-    """The collection of imports, emptied of an earlier one."""
+    """The collection of imports, emptied of an earlier one; what a user put there stays."""
     collection = bpy.data.collections.get(COLLECTION)
     if collection is None:
         collection = bpy.data.collections.new(COLLECTION)
-    for item in list(collection.objects):
+    for item in [item for item in collection.objects if GROUP in item.modifiers]:
         mesh = item.data
         bpy.data.objects.remove(item)
         if isinstance(mesh, bpy.types.Mesh) and not mesh.users:
@@ -164,13 +146,3 @@ def _fresh_collection(scene: bpy.types.Scene) -> bpy.types.Collection:
     if collection.name not in scene.collection.children:
         scene.collection.children.link(collection)
     return collection
-
-
-def _show_only_at(item: bpy.types.Object, frame: int, frames: list[int]) -> None:
-    """Keys visibility from `frame` until the next cloud's; needs no handler and no add-on."""
-    later = [other for other in frames if other > frame]
-    keys = [(frame - 1, True), (frame, False)] + ([(later[0], True)] if later else [])
-    for name in ("hide_viewport", "hide_render"):
-        for at, hidden in keys:
-            setattr(item, name, hidden)
-            item.keyframe_insert(name, frame=at)

@@ -20,7 +20,9 @@ from ..scene.frames import file_label
 from ..scene.lights import lights_ready
 from ..scene.state import Keeper, kept, show_what_renders
 from ..scene.survey import survey
-from .clouds import Display, Imported, import_gaussians
+from .attributes import positions
+from .clouds import Imported, Inspection, import_gaussians
+from .display import Display, shown
 
 #: Gaussians that vote for the picture's camera.
 _VOTERS = 200
@@ -47,7 +49,7 @@ class Picture:
 def import_run(
     scene: bpy.types.Scene,
     path: Path,
-    display: Display,
+    wanted: Inspection,
     blend: Path | None = None,
     picture: Picture | None = None,
 ) -> str:
@@ -63,7 +65,7 @@ def import_run(
             f"{file_label()}: no camera {picture.camera!r}; it has "
             f"{', '.join(sorted(_cameras(scene))) or 'none'}"
         )
-    imported = import_gaussians(scene, path, display)
+    imported = import_gaussians(scene, path, wanted)
     if imported.frames:
         scene.frame_set(imported.frames[len(imported.frames) // 2])
     done = [f"imported {imported.count} Gaussians in {len(imported.objects)} clouds"]
@@ -72,7 +74,7 @@ def import_run(
             bpy.ops.wm.save_as_mainfile(filepath=str(temporary.resolve()), compress=True, copy=True)
         done.append(f"wrote {blend}")
     if picture is not None:
-        camera = render_picture(scene, imported, display, picture)
+        camera = render_picture(scene, imported, wanted.display, picture)
         done.append(f"wrote {picture.path} (camera {camera}, frame {scene.frame_current})")
     return "; ".join(done)
 
@@ -151,17 +153,14 @@ def _shown_points(imported: Imported, display: Display) -> np.ndarray:
     for items in ([item for item in moving if not item.hide_viewport], imported.objects):
         found = [np.zeros((0, 3))]
         for item in items:
-            attributes, count = item.data.attributes, len(item.data.vertices)
-            opacity, place = np.zeros(count, np.float32), np.zeros(3 * count, np.float32)
-            attributes["opacity"].data.foreach_get("value", opacity)
-            item.data.vertices.foreach_get("co", place)
-            shown = place.reshape(-1, 3)[opacity >= display.opacity_threshold]
-            found.append(shown * np.array(item.scale))
+            visible = positions(item.data)[shown(item, display)]
+            found.append(visible * np.array(item.scale))
         points = np.concatenate(found)
         if len(points):
             return points[:: max(1, len(points) // _VOTERS)]
     raise AddonError(
-        f"no Gaussian reaches the opacity threshold {display.opacity_threshold}; lower it"
+        "no Gaussian is left by opacity threshold "
+        f"{display.opacity_threshold}, power threshold and crop box; lower them"
     )
 
 

@@ -1,7 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Operators and panels of this folder, in the order they are registered."""
 
-from .operators import RFGS_OT_import_gaussians, RFGS_OT_update_display
-from .panel import RFGS_PT_gaussians
+from . import panel
+from .operators import RFGS_OT_import_gaussians
+from .view_operators import (
+    RFGS_OT_add_crop_box,
+    RFGS_OT_color_solid_view,
+    RFGS_OT_update_display,
+)
 
-CLASSES = (RFGS_OT_import_gaussians, RFGS_OT_update_display, RFGS_PT_gaussians)
+CLASSES = (
+    RFGS_OT_import_gaussians,
+    RFGS_OT_update_display,
+    RFGS_OT_color_solid_view,
+    RFGS_OT_add_crop_box,
+    *panel.CLASSES,
+)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How Gaussians look: a geometry-nodes modifier and its materials, built in code."""
+"""The geometry nodes that show Gaussians, built in code; files need no add-on to play them."""
 
 from __future__ import annotations
 
@@ -7,46 +7,33 @@ from typing import Any
 
 import bpy
 
-#: Name of the node group.
+from .coloring import COLOR_ATTRIBUTE
+from .look import material
+
+#: Name of the node group, and of the modifiers that use it.
 GROUP = "RFGS Gaussians"
 #: Radius of a point at size 1 [m].
 POINT_RADIUS_M = 0.012
+#: A threshold of power that every Gaussian reaches [dB].
+NO_POWER_DB = -300.0
 
 #: Input sockets: name, type, default, minimum, maximum, what it does.
 _INPUTS = (
     ("Ellipsoids", "NodeSocketBool", False, None, None, "Ellipsoids instead of equal points"),
     ("Opacity Threshold", "NodeSocketFloat", 0.005, 0.0, 1.0, "Hide Gaussians below this opacity"),
-    ("Size", "NodeSocketFloat", 1.0, 0.0, 10.0, "Size of points, or standard deviations shown"),
-)
+    ("Power Threshold", "NodeSocketFloat", NO_POWER_DB, NO_POWER_DB, 300.0,
+     "Hide Gaussians known to reflect less power [dB]"),
+    ("Size", "NodeSocketFloat", 1.0, 0.0, 100.0, "Size of points, or standard deviations shown"),
+    ("Solid View", "NodeSocketBool", False, None, None,
+     "Real meshes, which the Solid view can colour; slower"),
+    ("Crop", "NodeSocketBool", False, None, None, "Hide Gaussians outside the crop box"),
+    ("Crop Box", "NodeSocketObject", None, None, None,
+     "Gaussians within one unit of its axes are shown: an Empty drawn as a cube"),
+)  # fmt: skip
 
 
-def add_modifier(item: bpy.types.Object, mode: str, opacity_threshold: float) -> None:
-    """Shows the Gaussians of `item` as `points` or `ellipsoids`."""
-    group = bpy.data.node_groups.get(GROUP) or _build_group()
-    modifier = item.modifiers.new(GROUP, "NODES")
-    modifier.node_group = group
-    set_display(item, mode, opacity_threshold)
-
-
-def set_display(item: bpy.types.Object, mode: str, opacity_threshold: float) -> None:
-    """Changes what the modifier shows."""
-    modifier = item.modifiers[GROUP]
-    sockets = _socket_ids(modifier.node_group)
-    _set_input(modifier, sockets["Ellipsoids"], mode == "ellipsoids")
-    _set_input(modifier, sockets["Opacity Threshold"], opacity_threshold)
-    item.update_tag()
-
-
-def _set_input(modifier: Any, socket: str, value: Any) -> None:
-    if hasattr(modifier, "properties"):  # Blender 5.2 moved the inputs out of the modifier.
-        holder = getattr(modifier.properties.inputs, socket, None)
-        if holder is not None:
-            holder.value = value
-            return
-    modifier[socket] = value
-
-
-def _socket_ids(group: Any) -> dict[str, str]:
+def socket_ids(group: Any) -> dict[str, str]:
+    """Name of each input of a group → its identifier."""
     return {
         item.name: item.identifier
         for item in group.interface.items_tree
@@ -54,102 +41,195 @@ def _socket_ids(group: Any) -> dict[str, str]:
     }
 
 
+def node_group() -> Any:
+    """The group of this version; a file of an older one keeps its own beside it."""
+    wanted = {"Geometry", *(row[0] for row in _INPUTS)}
+    for group in bpy.data.node_groups:
+        if group.name.split(".")[0] == GROUP and set(socket_ids(group)) == wanted:
+            return group
+    return _build_group()
+
+
 def _build_group() -> Any:
-    group = bpy.data.node_groups.new(GROUP, "GeometryNodeTree")
+    group: Any = bpy.data.node_groups.new(GROUP, "GeometryNodeTree")
     group.is_modifier = True
     interface = group.interface
     interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
     for name, kind, default, low, high, text in _INPUTS:
         socket = interface.new_socket(name, in_out="INPUT", socket_type=kind, description=text)
-        socket.default_value = default
+        if default is not None:
+            socket.default_value = default
         if low is not None:
             socket.min_value, socket.max_value = low, high
     interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    nodes, link = group.nodes, group.links.new
-    inputs, output = nodes.new("NodeGroupInput"), nodes.new("NodeGroupOutput")
-
-    keep = nodes.new("FunctionNodeCompare")
-    keep.operation = "GREATER_EQUAL"
-    link(_attribute(group, "opacity", "FLOAT"), keep.inputs["A"])
-    link(inputs.outputs["Opacity Threshold"], keep.inputs["B"])
-    cloud = nodes.new("GeometryNodeMeshToPoints")
-    link(inputs.outputs["Geometry"], cloud.inputs["Mesh"])
-    link(keep.outputs["Result"], cloud.inputs["Selection"])
-
-    switch = nodes.new("GeometryNodeSwitch")
-    switch.input_type = "GEOMETRY"
-    link(inputs.outputs["Ellipsoids"], switch.inputs["Switch"])
-    link(_points(group, inputs, cloud), switch.inputs["False"])
-    link(_ellipsoids(group, inputs, cloud), switch.inputs["True"])
-    link(switch.outputs["Output"], output.inputs["Geometry"])
-    for index, node in enumerate(nodes):
-        node.location = (220 * (index % 5), -220 * (index // 5))
+    inputs, output = group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
+    build = _Builder(group, inputs)
+    cloud = group.nodes.new("GeometryNodeMeshToPoints")
+    build.link(_lean(build), cloud.inputs["Mesh"])
+    build.link(_kept(build), cloud.inputs["Selection"])
+    points = _points(build, cloud.outputs[0])
+    shapes = _shapes(build, cloud.outputs[0])
+    solid = build.input("Solid View")
+    shown = build.switch(build.either(build.input("Ellipsoids"), solid), points, shapes)
+    build.link(build.switch(solid, shown, _real(build, shapes)), output.inputs["Geometry"])
+    for index, node in enumerate(group.nodes):
+        node.location = (220 * (index % 8), -260 * (index // 8))
     return group
 
 
-def _points(group: Any, inputs: Any, cloud: Any) -> Any:
-    """Equal spheres; returns the geometry socket."""
-    radius = group.nodes.new("ShaderNodeMath")
-    radius.operation = "MULTIPLY"
-    radius.inputs[1].default_value = POINT_RADIUS_M
-    group.links.new(inputs.outputs["Size"], radius.inputs[0])
-    node = group.nodes.new("GeometryNodeSetPointRadius")
-    group.links.new(cloud.outputs["Points"], node.inputs[0])
-    group.links.new(radius.outputs[0], node.inputs["Radius"])
-    return _set_material(group, node.outputs[0], "GEOMETRY")
+class _Builder:
+    """Adds nodes to a group and joins them."""
+
+    def __init__(self, group: Any, inputs: Any) -> None:
+        self.nodes, self.link, self._inputs = group.nodes, group.links.new, inputs
+
+    def input(self, name: str) -> Any:
+        return self._inputs.outputs[name]
+
+    def attribute(self, name: str, kind: str) -> Any:
+        node = self.nodes.new("GeometryNodeInputNamedAttribute")
+        node.data_type = kind
+        node.inputs["Name"].default_value = name
+        return next(socket for socket in node.outputs if socket.enabled and socket.name[0] == "A")
+
+    def either(self, first: Any, second: Any) -> Any:
+        return self._boolean("OR", first, second)
+
+    def both(self, first: Any, second: Any) -> Any:
+        return self._boolean("AND", first, second)
+
+    def negated(self, value: Any) -> Any:
+        return self._boolean("NOT", value)
+
+    def _boolean(self, operation: str, *values: Any) -> Any:
+        node = self.nodes.new("FunctionNodeBooleanMath")
+        node.operation = operation
+        for value, socket in zip(values, node.inputs, strict=False):
+            self.link(value, socket)
+        return node.outputs[0]
+
+    def compare(self, operation: str, first: Any, second: Any, kind: str = "FLOAT") -> Any:
+        node = self.nodes.new("FunctionNodeCompare")
+        node.data_type, node.operation = kind, operation
+        places = {socket.name: socket for socket in node.inputs if socket.enabled}
+        for value, socket in ((first, places["A"]), (second, places["B"])):
+            if isinstance(value, int | float):
+                socket.default_value = value
+            else:
+                self.link(value, socket)
+        return node.outputs["Result"]
+
+    def switch(self, condition: Any, false: Any, true: Any, kind: str = "GEOMETRY") -> Any:
+        node = self.nodes.new("GeometryNodeSwitch")
+        node.input_type = kind
+        places = {socket.name: socket for socket in node.inputs if socket.enabled}
+        self.link(condition, places["Switch"])
+        for value, socket in ((false, places["False"]), (true, places["True"])):
+            if isinstance(value, int):
+                socket.default_value = value
+            else:
+                self.link(value, socket)
+        return next(socket for socket in node.outputs if socket.enabled)
+
+    def vector(self, operation: str, first: Any, second: Any = None) -> Any:
+        node = self.nodes.new("ShaderNodeVectorMath")
+        node.operation = operation
+        self.link(first, node.inputs[0])
+        if second is not None:
+            self.link(second, node.inputs["Scale" if operation == "SCALE" else 1])
+        return next(socket for socket in node.outputs if socket.enabled)
+
+    def material(self, geometry: Any, domain: str) -> Any:
+        node = self.nodes.new("GeometryNodeSetMaterial")
+        node.inputs["Material"].default_value = material(domain, COLOR_ATTRIBUTE)
+        self.link(geometry, node.inputs["Geometry"])
+        return node.outputs["Geometry"]
 
 
-def _ellipsoids(group: Any, inputs: Any, cloud: Any) -> Any:
-    """One instanced sphere per Gaussian; returns the geometry socket."""
-    sphere = group.nodes.new("GeometryNodeMeshIcoSphere")
-    sphere.inputs["Subdivisions"].default_value = 3
+def _lean(build: _Builder) -> Any:
+    """The cloud without what is kept for writing it back: copying that would cost time."""
+    node = build.nodes.new("GeometryNodeRemoveAttribute")
+    if hasattr(node, "pattern_mode"):
+        node.pattern_mode = "WILDCARD"
+    else:  # Blender 5.0 made it a socket.
+        node.inputs["Pattern Mode"].default_value = "Wildcard"
+    node.inputs["Name"].default_value = "ply_*"
+    build.link(build.input("Geometry"), node.inputs["Geometry"])
+    return node.outputs[0]
+
+
+def _kept(build: _Builder) -> Any:
+    """Which Gaussians are shown."""
+    opaque = build.compare(
+        "GREATER_EQUAL", build.attribute("opacity", "FLOAT"), build.input("Opacity Threshold")
+    )
+    power = build.attribute("rf_power_db", "FLOAT")
+    weak = build.compare("LESS_THAN", power, build.input("Power Threshold"))
+    box = build.nodes.new("GeometryNodeObjectInfo")
+    box.transform_space = "RELATIVE"
+    build.link(build.input("Crop Box"), box.inputs["Object"])
+    invert = build.nodes.new("FunctionNodeInvertMatrix")
+    build.link(box.outputs["Transform"], invert.inputs[0])
+    place = build.nodes.new("FunctionNodeTransformPoint")
+    build.link(build.nodes.new("GeometryNodeInputPosition").outputs[0], place.inputs["Vector"])
+    build.link(invert.outputs[0], place.inputs["Transform"])
+    split = build.nodes.new("ShaderNodeSeparateXYZ")
+    build.link(build.vector("ABSOLUTE", place.outputs[0]), split.inputs[0])
+    inside = build.negated(build.input("Crop"))
+    within = [build.compare("LESS_EQUAL", axis, 1.0) for axis in split.outputs]
+    inside = build.either(inside, build.both(within[0], build.both(within[1], within[2])))
+    return build.both(build.both(opaque, build.negated(weak)), inside)
+
+
+def _points(build: _Builder, cloud: Any) -> Any:
+    """Equal spheres as a point cloud; the fastest to draw."""
+    node = build.nodes.new("GeometryNodeSetPointRadius")
+    build.link(cloud, node.inputs[0])
+    build.link(_radius(build), node.inputs["Radius"])
+    return build.material(node.outputs[0], "GEOMETRY")
+
+
+def _radius(build: _Builder) -> Any:
+    node = build.nodes.new("ShaderNodeMath")
+    node.operation = "MULTIPLY"
+    node.inputs[1].default_value = POINT_RADIUS_M
+    build.link(build.input("Size"), node.inputs[0])
+    return node.outputs[0]
+
+
+def _shapes(build: _Builder, cloud: Any) -> Any:
+    """One instanced sphere per Gaussian, coarse for the Solid view, stretched as an ellipsoid."""
+    sphere = build.nodes.new("GeometryNodeMeshIcoSphere")
+    build.link(build.switch(build.input("Solid View"), 3, 1, "INT"), sphere.inputs["Subdivisions"])
     sphere.inputs["Radius"].default_value = 1.0
-    smooth = group.nodes.new("GeometryNodeSetShadeSmooth")
-    group.links.new(sphere.outputs["Mesh"], smooth.inputs[0])
-    scale = group.nodes.new("ShaderNodeVectorMath")
-    scale.operation = "SCALE"
-    group.links.new(_attribute(group, "scale", "FLOAT_VECTOR"), scale.inputs[0])
-    group.links.new(inputs.outputs["Size"], scale.inputs["Scale"])
-    node = group.nodes.new("GeometryNodeInstanceOnPoints")
-    group.links.new(cloud.outputs["Points"], node.inputs["Points"])
-    shaped = _set_material(group, smooth.outputs[0], "INSTANCER")
-    group.links.new(shaped, node.inputs["Instance"])
-    group.links.new(_attribute(group, "rotation", "QUATERNION"), node.inputs["Rotation"])
-    group.links.new(scale.outputs["Vector"], node.inputs["Scale"])
+    smooth = build.nodes.new("GeometryNodeSetShadeSmooth")
+    build.link(sphere.outputs["Mesh"], smooth.inputs[0])
+    stretched = build.vector("SCALE", build.attribute("scale", "FLOAT_VECTOR"), build.input("Size"))
+    ball = build.nodes.new("ShaderNodeCombineXYZ")
+    for socket in ball.inputs:
+        build.link(_radius(build), socket)
+    node = build.nodes.new("GeometryNodeInstanceOnPoints")
+    build.link(cloud, node.inputs["Points"])
+    build.link(build.material(smooth.outputs[0], "INSTANCER"), node.inputs["Instance"])
+    build.link(build.attribute("rotation", "QUATERNION"), node.inputs["Rotation"])
+    scale = build.switch(build.input("Ellipsoids"), ball.outputs[0], stretched, "VECTOR")
+    build.link(scale, node.inputs["Scale"])
     return node.outputs["Instances"]
 
 
-def _attribute(group: Any, name: str, kind: str) -> Any:
-    node = group.nodes.new("GeometryNodeInputNamedAttribute")
-    node.data_type = kind
-    node.inputs["Name"].default_value = name
-    return next(socket for socket in node.outputs if socket.enabled and socket.name == "Attribute")
+def _real(build: _Builder, shapes: Any) -> Any:
+    """The shapes as one mesh whose active colour is the cloud's.
 
-
-def _set_material(group: Any, geometry: Any, domain: str) -> Any:
-    node = group.nodes.new("GeometryNodeSetMaterial")
-    node.inputs["Material"].default_value = _material(domain)
-    group.links.new(geometry, node.inputs["Geometry"])
-    return node.outputs["Geometry"]
-
-
-def _material(domain: str) -> bpy.types.Material:
-    """Shows `rfgs_color`; part of the light is the surface's own, so dark rooms do not hide it."""
-    name = f"{GROUP} {domain.lower()}"
-    material = bpy.data.materials.get(name)
-    if material is not None:
-        return material
-    material = bpy.data.materials.new(name)
-    if material.node_tree is None:
-        material.use_nodes = True
-    tree = material.node_tree
-    shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
-    colour = tree.nodes.new("ShaderNodeAttribute")
-    colour.attribute_type, colour.attribute_name = domain, "rfgs_color"
-    colour.location = (-300, 200)
-    tree.links.new(colour.outputs["Color"], shader.inputs["Base Color"])
-    tree.links.new(colour.outputs["Color"], shader.inputs["Emission Color"])
-    shader.inputs["Emission Strength"].default_value = 0.5
-    shader.inputs["Roughness"].default_value = 0.9
-    shader.inputs["Specular IOR Level"].default_value = 0.1
-    return material
+    One loose point of the cloud comes first: from it the mesh takes over which colour is
+    active. Nothing shows it, as it has no face.
+    """
+    index = build.nodes.new("GeometryNodeInputIndex").outputs[0]
+    rest = build.nodes.new("GeometryNodeDeleteGeometry")
+    build.link(_lean(build), rest.inputs["Geometry"])
+    build.link(build.compare("GREATER_THAN", index, 0, "INT"), rest.inputs["Selection"])
+    join = build.nodes.new("GeometryNodeJoinGeometry")
+    build.link(shapes, join.inputs[0])
+    build.link(rest.outputs[0], join.inputs[0])
+    real = build.nodes.new("GeometryNodeRealizeInstances")
+    build.link(join.outputs[0], real.inputs["Geometry"])
+    return build.material(real.outputs[0], "GEOMETRY")

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel that brings Gaussians back into the scene."""
+"""The panels that bring Gaussians back into the scene and inspect them."""
 
 import bpy
 
 from ..tab import Tab
+from .cloud_mesh import FRAME
+from .coloring import RAMPED
 
 
 class RFGS_PT_gaussians(Tab, bpy.types.Panel):
@@ -13,12 +15,97 @@ class RFGS_PT_gaussians(Tab, bpy.types.Panel):
     bl_label = "Gaussians"
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Shows the path, display settings and buttons."""
+        """Shows the path and the buttons."""
         layout, settings = self.layout, context.scene.rfgs.gaussians
         layout.use_property_split = True
         layout.use_property_decorate = False
         layout.prop(settings, "path")
         layout.operator("rfgs.import_gaussians", icon="IMPORT")
-        layout.prop(settings, "display_mode")
-        layout.prop(settings, "opacity_threshold")
-        layout.operator("rfgs.update_display", icon="FILE_REFRESH")
+        item = context.object
+        if item is not None and item.type == "MESH" and FRAME in item.data:
+            layout.label(text=f"{item.name}: recorded at frame {item.data[FRAME]}", icon="INFO")
+
+
+class _Part(Tab):
+    """A panel below the one above."""
+
+    bl_parent_id = "RFGS_PT_gaussians"
+    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
+    names: tuple[str, ...] = ()
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Shows the settings `names`."""
+        self.layout.use_property_split = True
+        self.layout.use_property_decorate = False
+        for name in self.names:
+            self.layout.prop(context.scene.rfgs.gaussians, name)
+
+
+class RFGS_PT_gaussians_display(_Part, bpy.types.Panel):
+    """How Gaussians are shown; acts at once."""
+
+    bl_idname = "RFGS_PT_gaussians_display"
+    bl_label = "Display"
+    bl_options = set()  # noqa: RUF012
+    names = ("display_mode", "size", "opacity_threshold", "power_threshold_db", "solid_view")
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Shows shapes and thresholds."""
+        super().draw(context)
+        self.layout.operator("rfgs.color_solid_view", icon="SHADING_SOLID")
+        self.layout.operator("rfgs.update_display", icon="FILE_REFRESH")
+
+
+class RFGS_PT_gaussians_color(_Part, bpy.types.Panel):
+    """What the colour of Gaussians says."""
+
+    bl_idname = "RFGS_PT_gaussians_color"
+    bl_label = "Colour"
+    bl_options = set()  # noqa: RUF012
+    names = ("color_by",)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Shows the mode, and the range where it has one."""
+        super().draw(context)
+        settings = context.scene.rfgs.gaussians
+        if settings.color_by == "ATTRIBUTE":
+            self.layout.prop(settings, "color_attribute")
+        if settings.color_by in {*RAMPED, "ATTRIBUTE", "AUTO"}:
+            self.layout.prop(settings, "use_range")
+            if settings.use_range:
+                self.layout.prop(settings, "range_low")
+                self.layout.prop(settings, "range_high")
+
+
+class RFGS_PT_gaussians_crop(_Part, bpy.types.Panel):
+    """Only the Gaussians inside a box."""
+
+    bl_idname = "RFGS_PT_gaussians_crop"
+    bl_label = "Crop"
+    names = ("crop_box",)
+
+    def draw_header(self, context: bpy.types.Context) -> None:
+        """Switches cropping."""
+        self.layout.prop(context.scene.rfgs.gaussians, "use_crop", text="")
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Shows the box."""
+        super().draw(context)
+        self.layout.operator("rfgs.add_crop_box", icon="CUBE")
+
+
+class RFGS_PT_gaussians_timing(_Part, bpy.types.Panel):
+    """When each cloud is seen."""
+
+    bl_idname = "RFGS_PT_gaussians_timing"
+    bl_label = "Timeline"
+    names = ("frame_offset", "interpolation")
+
+
+CLASSES = (
+    RFGS_PT_gaussians,
+    RFGS_PT_gaussians_display,
+    RFGS_PT_gaussians_color,
+    RFGS_PT_gaussians_crop,
+    RFGS_PT_gaussians_timing,
+)

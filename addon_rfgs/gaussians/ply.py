@@ -1,141 +1,147 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""PLY files: 3D Gaussians in (binary little-endian)."""
+"""PLY files as columns: text and binary of both byte orders in, binary little-endian out."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import re
+import warnings
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import AddonError
+from ..files import replacing
+from .ply_header import TYPES, Element, Header, read_header
 
-#: First spherical-harmonics basis function, 1/(2·sqrt(π)): colour = 0.5 + C0·f_dc.
-SH_C0 = 0.28209479177387814
+#: Vertices by property, in file order; the type is the file's own, in this machine's byte order.
+Columns = dict[str, np.ndarray]
 
-_TYPES = {
-    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1",
-    "short": "<i2", "int16": "<i2", "ushort": "<u2", "uint16": "<u2",
-    "int": "<i4", "int32": "<i4", "uint": "<u4", "uint32": "<u4",
-    "float": "<f4", "float32": "<f4", "double": "<f8", "float64": "<f8",
-}  # fmt: skip
-
-_NEEDED = (
-    "x",
-    "y",
-    "z",
-    "opacity",
-    *(f"scale_{i}" for i in range(3)),
-    *(f"rot_{i}" for i in range(4)),
-)
+#: Rows that are turned into columns at a time: their pages stay in the cache.
+_BLOCK = 1 << 14
+#: NumPy type → the name written into headers.
+_WRITTEN = {kind: name for name, kind in reversed(TYPES.items())}
 
 
-@dataclass(frozen=True)
-class Cloud:
-    """Gaussians with activations applied."""
+def read_columns(path: Path) -> Columns:
+    """Reads every scalar property of the vertices; other elements are left out.
 
-    means: np.ndarray
-    """Centres [m], float32 [M, 3]."""
-    scales: np.ndarray
-    """Standard deviations along the own axes [m], float32 [M, 3]."""
-    quats: np.ndarray
-    """Unit quaternions, w first, float32 [M, 4]."""
-    opacities: np.ndarray
-    """Opacities in [0, 1], float32 [M]."""
-    colors: np.ndarray
-    """Display colours, sRGB-encoded as 3DGS trains them, in [0, 1], float32 [M, 3]."""
-
-    def __len__(self) -> int:
-        return len(self.means)
-
-
-def read_gaussians(path: Path) -> Cloud:
-    """Reads a 3DGS PLY: logit opacity, log scales, quaternion w first, colour in f_dc.
-
-    Gaussians without colour are grey, as the convention's zero f_dc means.
+    Nothing is allocated before the file is known to be long enough for it.
 
     Raises:
-        AddonError: The file is missing, not such a PLY, truncated or holds bad numbers.
+        AddonError: The file is missing, no PLY, cut short, longer than its header says, or
+            holds what vertices of numbers cannot.
     """
-    table = _read_vertices(path)
-    missing = [name for name in _NEEDED if name not in (table.dtype.names or ())]
-    if missing:
-        raise AddonError(f"{path}: not a 3DGS PLY, vertices lack {', '.join(missing)}")
-
-    def columns(*names: str) -> np.ndarray:
-        return np.stack([table[name].astype(np.float32) for name in names], axis=-1)
-
-    means = columns("x", "y", "z")
-    logits = columns("opacity")[:, 0]
-    log_scales = columns("scale_0", "scale_1", "scale_2")
-    quats = columns("rot_0", "rot_1", "rot_2", "rot_3")
-    if "f_dc_0" in table.dtype.names:
-        colors = 0.5 + SH_C0 * columns("f_dc_0", "f_dc_1", "f_dc_2")
-    else:
-        colors = np.full_like(means, 0.5)
-    for name, values in (
-        ("position", means), ("scale", log_scales), ("rotation", quats), ("colour", colors),
-    ):  # fmt: skip
-        if not np.isfinite(values).all():
-            raise AddonError(f"{path}: {name} holds numbers that are not finite")
-    if np.isnan(logits).any() or (log_scales > 10).any():
-        raise AddonError(f"{path}: opacity or scale is out of range; expected logits and logs")
-    length = np.linalg.norm(quats, axis=1, keepdims=True)
-    identity = np.array([1, 0, 0, 0], np.float32)
-    return Cloud(
-        means=means,
-        scales=np.exp(log_scales),
-        quats=np.where(length > 0, quats / np.where(length > 0, length, 1), identity),
-        opacities=1 / (1 + np.exp(-np.clip(logits, -60, 60))),
-        colors=np.clip(colors, 0, 1),
-    )
+    header = read_header(path)
+    length = path.stat().st_size - header.size
+    if header.order is None:
+        return _read_text(path, header, length)
+    return _read_binary(path, header, length)
 
 
-def _read_vertices(path: Path) -> np.ndarray:
-    """The first element, which must be `vertex`, as a structured array."""
-    try:
-        data = path.read_bytes()
-    except FileNotFoundError as error:
-        raise AddonError(f"{path}: no such file") from error
-    except OSError as error:
-        raise AddonError(f"{path}: cannot be read ({error.strerror})") from error
-    end = data.find(b"end_header")
-    body = data.find(b"\n", end) + 1
-    if not data.startswith(b"ply") or end < 0 or body == 0:
-        raise AddonError(f"{path}: expected a PLY file")
-    count, fields = _parse_header(path, data[:end].decode("ascii", "replace"))
-    dtype = np.dtype(fields)
-    have = len(data) - body
-    if have < count * dtype.itemsize:
+def write_columns(path: Path, columns: Columns) -> None:
+    """Writes one element `vertex` with these properties, whole or not at all.
+
+    Args:
+        path: File to write.
+        columns: One-dimensional arrays of one length and of types that PLY knows.
+    """
+    fields = [(name, values.dtype.newbyteorder("<")) for name, values in columns.items()]
+    count = len(next(iter(columns.values())))
+    rows = np.zeros(count, np.dtype(fields))
+    for name, values in columns.items():
+        rows[name] = values
+    lines = ["ply", "format binary_little_endian 1.0", f"element vertex {count}"]
+    lines += [f"property {_WRITTEN[kind.str[1:]]} {name}" for name, kind in fields]
+    with replacing(path) as temporary, temporary.open("wb") as stream:
+        stream.write(("\n".join([*lines, "end_header"]) + "\n").encode("ascii"))
+        rows.tofile(stream)
+
+
+def _read_binary(path: Path, header: Header, length: int) -> Columns:
+    kinds = [np.dtype(kind).newbyteorder(header.order) for _, kind in header.vertex.fields]
+    names, count = [name for name, _ in header.vertex.fields], header.vertex.count
+    width = sum(kind.itemsize for kind in kinds)
+    skipped = sum(element.count * _width(element) for element in header.before)
+    spare = length - skipped - count * width
+    if spare < 0:
         raise AddonError(
-            f"{path}: truncated, {count} vertices need {count * dtype.itemsize} bytes, got {have}"
+            f"{path}: truncated, {count} vertices need {skipped + count * width} bytes, "
+            f"got {length}"
         )
-    return np.frombuffer(data, dtype, count, body)
+    if header.last and spare >= width:
+        raise AddonError(f"{path}: holds {spare} bytes more than its {count} vertices need")
+    offset = header.size + skipped
+    if len(set(kinds)) == 1:
+        table = np.fromfile(path, kinds[0], count * len(names), offset=offset)
+        return _split(names, table.reshape(count, len(names)))
+    fields = list(zip(names, kinds, strict=True))
+    rows = np.fromfile(path, np.dtype(fields), count, offset=offset)
+    return {name: rows[name].astype(kind.newbyteorder("=")) for name, kind in fields}
 
 
-def _parse_header(path: Path, header: str) -> tuple[int, list[tuple[str, str]]]:
-    count, fields, element = -1, [], ""
-    for line in header.splitlines()[1:]:
-        words = line.split()
-        if not words or words[0] in {"comment", "obj_info"}:
-            continue
-        if words[0] == "format":
-            if words[1:2] != ["binary_little_endian"]:
-                raise AddonError(
-                    f"{path}: expected binary_little_endian, got {' '.join(words[1:])}"
-                )
-        elif words[0] == "element" and len(words) == 3 and words[2].isdigit():
-            if element == "" and words[1] != "vertex":
-                raise AddonError(f"{path}: expected vertices first, got element {words[1]!r}")
-            element = words[1]
-            count = int(words[2]) if element == "vertex" else count
-        elif words[0] == "property" and len(words) == 3 and words[1] in _TYPES:
-            if element == "vertex":
-                fields.append((words[2], _TYPES[words[1]]))
-        elif words[0] == "property" and element != "vertex":
-            continue
-        else:
-            raise AddonError(f"{path}: header line {line.strip()!r} is not understood")
-    if count < 0 or not fields or len({name for name, _ in fields}) != len(fields):
-        raise AddonError(f"{path}: the header describes no vertices")
-    return count, fields
+def _split(names: list[str], table: np.ndarray) -> Columns:
+    """Columns of a table of one type; block by block, ten times as fast as column by column."""
+    columns = np.zeros(table.shape[::-1], table.dtype.newbyteorder("="))
+    for start in range(0, len(table), _BLOCK):
+        columns[:, start : start + _BLOCK] = table[start : start + _BLOCK].T
+    return dict(zip(names, columns, strict=True))
+
+
+def _width(element: Element) -> int:
+    return sum(np.dtype(kind).itemsize for _, kind in element.fields)
+
+
+def _read_text(path: Path, header: Header, length: int) -> Columns:
+    skipped = sum(element.count * len(element.fields) for element in header.before)
+    wanted = skipped + header.vertex.count * len(header.vertex.fields)
+    if 2 * wanted - 1 > length:  # a digit and a space each
+        raise AddonError(
+            f"{path}: truncated, {header.vertex.count} vertices need {wanted} numbers, "
+            f"got {length} characters"
+        )
+    with path.open("rb") as stream:
+        stream.seek(header.size)
+        body = stream.read()
+    # The zero behind the last number is only reached if nothing before it is no number.
+    numbers = _numbers(path, body + b"\n0", wanted + 1 if not header.last else -1)
+    spare = len(numbers) - wanted - 1
+    if spare < 0:
+        raise AddonError(
+            f"{path}: {header.vertex.count} vertices need {wanted} numbers; what stands after "
+            f"the first {len(numbers)} is missing or no number"
+        )
+    if spare > 0:
+        raise AddonError(f"{path}: holds {spare} numbers too many")
+    names = [name for name, _ in header.vertex.fields]
+    table = numbers[skipped:wanted].reshape(header.vertex.count, len(names))
+    found = _split(names, table)
+    return {name: _typed(path, name, found[name], kind) for name, kind in header.vertex.fields}
+
+
+def _numbers(path: Path, body: bytes, count: int) -> np.ndarray:
+    """The numbers of a text up to the first thing that is none, float64."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # said of what is no number
+            return np.fromstring(body, np.float64, count, sep=" ")
+    except ValueError as error:  # the same in newer NumPy
+        word = re.sub(r"[^ -~]", "?", str(error))[:60]
+        raise AddonError(f"{path}: the text holds something that is no number ({word})") from error
+
+
+def _typed(path: Path, name: str, values: np.ndarray, kind: str) -> np.ndarray:
+    """Numbers as the header's type; whole numbers must fit."""
+    if kind == "f8":
+        return values
+    with np.errstate(over="ignore", invalid="ignore"):
+        cast = values.astype(kind)
+    if kind != "f4" and not np.array_equal(cast, values):
+        raise AddonError(f"{path}: {name} holds numbers that are no {_WRITTEN[kind]}")
+    return cast
+
+
+def stacked(columns: Columns, names: Iterable[str]) -> np.ndarray:
+    """Some columns side by side, float32 [M, len(names)]."""
+    with np.errstate(over="ignore"):
+        return np.stack([columns[name].astype(np.float32) for name in names], axis=-1)

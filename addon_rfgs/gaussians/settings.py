@@ -1,12 +1,69 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings of the Gaussians panel."""
+"""Settings of the Gaussians panels; those of display and timing act at once."""
+
+from __future__ import annotations
+
+from typing import Any
 
 import bpy
+
+from ..errors import AddonError
+from .clouds import Inspection, clouds_in_file
+from .coloring import Coloring, color_clouds
+from .display import Display, set_display
+from .nodes import NO_POWER_DB
+from .timing import key_visibility
 
 DISPLAY_MODES = [
     ("points", "Points", "One sphere of equal size per Gaussian; fast", 0),
     ("ellipsoids", "Ellipsoids", "One ellipsoid per Gaussian at one standard deviation", 1),
 ]
+
+INTERPOLATIONS = [
+    ("NONE", "None", "A cloud is seen at its own frame alone", 0),
+    ("NEAREST", "Nearest", "Between recorded frames, the nearest one is seen", 1),
+    ("HOLD", "Hold", "A cloud is seen until the next recorded frame", 2),
+]
+
+COLOR_MODES = [
+    ("AUTO", "Automatic", "Display colours where they were fitted, else reflected power", 0),
+    ("DISPLAY", "Display RGB", "Colours fitted to pictures, for display alone", 1),
+    ("POWER", "Reflected power", "Power that each Gaussian reflects [dB]", 2),
+    ("PHASE", "Phase", "Phase of the reflectivity on a circle of hues", 3),
+    ("FEATURES", "Features", "First three principal components of the radio features", 4),
+    ("ERROR", "Distance to mesh", "Distance to the true surface, after Compare with Mesh", 5),
+    ("TRACK", "Track", "One hue for each Gaussian that is followed from frame to frame", 6),
+    ("ATTRIBUTE", "Attribute", "Any number of the PLY or of the points, by name", 7),
+]
+
+TRUE_MESHES = [
+    ("MOVING", "What moves", "Every visible mesh that moves within the scene's frames", 0),
+    ("SELECTED", "Selected", "The selected meshes", 1),
+]
+
+
+def _show(settings: RFGS_PG_gaussians, _context: Any) -> None:
+    _each(lambda items: [set_display(item, settings.display()) for item in items])
+
+
+def _color(settings: RFGS_PG_gaussians, _context: Any) -> None:
+    _each(lambda items: color_clouds([item.data for item in items], settings.coloring()))
+
+
+def _time(settings: RFGS_PG_gaussians, _context: Any) -> None:
+    _each(lambda items: key_visibility(items, settings.frame_offset, settings.interpolation))
+
+
+def _each(change: Any) -> None:
+    """Changes the clouds that are here. A setting can also be made before there are any."""
+    try:
+        change(clouds_in_file())
+    except AddonError:
+        return
+
+
+def _is_empty(_settings: Any, item: bpy.types.Object) -> bool:
+    return item.type == "EMPTY"
 
 
 class RFGS_PG_gaussians(bpy.types.PropertyGroup):
@@ -19,7 +76,11 @@ class RFGS_PG_gaussians(bpy.types.PropertyGroup):
         subtype="FILE_PATH",
     )
     display_mode: bpy.props.EnumProperty(  # type: ignore[valid-type]
-        name="Show as", items=DISPLAY_MODES, default="points"
+        name="Show as",
+        description="What stands for a Gaussian",
+        items=DISPLAY_MODES,
+        default="points",
+        update=_show,
     )
     opacity_threshold: bpy.props.FloatProperty(  # type: ignore[valid-type]
         name="Opacity threshold",
@@ -28,4 +89,122 @@ class RFGS_PG_gaussians(bpy.types.PropertyGroup):
         min=0.0,
         max=1.0,
         subtype="FACTOR",
+        update=_show,
     )
+    power_threshold_db: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="Power threshold",
+        description="Gaussians known to reflect less power [dB] are hidden",
+        default=NO_POWER_DB,
+        min=NO_POWER_DB,
+        max=300.0,
+        soft_min=-100.0,
+        soft_max=100.0,
+        precision=1,
+        update=_show,
+    )
+    size: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="Size",
+        description="Size of points, or how many standard deviations ellipsoids reach",
+        default=1.0,
+        min=0.0,
+        max=100.0,
+        soft_max=5.0,
+        update=_show,
+    )
+    solid_view: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Real meshes",
+        description="Make real meshes of the Gaussians, which the Solid view can colour; slower",
+        default=False,
+        update=_show,
+    )
+    use_crop: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Crop",
+        description="Hide Gaussians outside the crop box",
+        default=False,
+        update=_show,
+    )
+    crop_box: bpy.props.PointerProperty(  # type: ignore[valid-type]
+        name="Box",
+        description="Empty whose cube of half edge one, turned and scaled with it, is the box",
+        type=bpy.types.Object,
+        poll=_is_empty,
+        update=_show,
+    )
+    color_by: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Colour by",
+        description="What the colour of a Gaussian says",
+        items=COLOR_MODES,
+        default="AUTO",
+        update=_color,
+    )
+    color_attribute: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Attribute",
+        description="Name of a property of the PLY, or of an attribute of the points",
+        default="",
+        update=_color,
+    )
+    use_range: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Fixed range",
+        description="Give the ends of the colour ramp instead of finding them from the values",
+        default=False,
+        update=_color,
+    )
+    range_low: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="From",
+        description="Value of the first colour: dB for power, metres for distance",
+        default=-20.0,
+        update=_color,
+    )
+    range_high: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="To",
+        description="Value of the last colour: dB for power, metres for distance",
+        default=20.0,
+        update=_color,
+    )
+    frame_offset: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Frame offset",
+        description="The cloud of frame f is shown at frame f + offset",
+        default=0,
+        min=-500_000,
+        max=500_000,
+        update=_time,
+    )
+    interpolation: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Between frames",
+        description="What is seen between recorded frames",
+        items=INTERPOLATIONS,
+        default="HOLD",
+        update=_time,
+    )
+    compare_with: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="True mesh",
+        description="Surfaces that Gaussians are compared with",
+        items=TRUE_MESHES,
+        default="MOVING",
+    )
+    image_path: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="CSI image",
+        description="PNG of measured and predicted channels, as `rfgs csi` writes it",
+        default="",
+        subtype="FILE_PATH",
+    )
+
+    def display(self) -> Display:
+        """How the panel says Gaussians are shown."""
+        return Display(
+            self.display_mode,
+            self.opacity_threshold,
+            self.power_threshold_db,
+            self.size,
+            self.solid_view,
+            self.crop_box if self.use_crop else None,
+        )
+
+    def coloring(self) -> Coloring:
+        """What the panel says Gaussians are coloured by."""
+        limits = (self.range_low, self.range_high) if self.use_range else None
+        return Coloring(self.color_by, limits, self.color_attribute)
+
+    def inspection(self) -> Inspection:
+        """All that the panel says about an import."""
+        return Inspection(self.display(), self.coloring(), self.frame_offset, self.interpolation)

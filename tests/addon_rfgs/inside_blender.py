@@ -4,58 +4,22 @@
 from __future__ import annotations
 
 import json
-import struct
 from pathlib import Path
 
 import bpy
 import mathutils
 import numpy as np
 import pytest
-from plyfile import PlyData, PlyElement
+from plyfile import PlyData
 
 import addon_rfgs
 from addon_rfgs import naming, tables
 from addon_rfgs.errors import AddonError
 from addon_rfgs.export import exr, mesh_ply
-from addon_rfgs.gaussians import ply
 from addon_rfgs.scene import rig
 from addon_rfgs.scene.frames import chosen_frames
 from addon_rfgs.scene.override_file import read_overrides
 from addon_rfgs.scene.overrides import RadioMaterial, first_match
-
-COLUMNS = [
-    *("x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2", "opacity"),
-    *(f"scale_{i}" for i in range(3)),
-    *(f"rot_{i}" for i in range(4)),
-]
-
-
-def splats(path: Path, count: int = 50, grey: bool = False) -> dict[str, np.ndarray]:
-    rng = np.random.default_rng(1)
-    rows = np.zeros(count, [(name, "<f4") for name in COLUMNS])
-    for name in COLUMNS:
-        rows[name] = rng.normal(size=count)
-    if grey:
-        for name in ("f_dc_0", "f_dc_1", "f_dc_2"):
-            rows[name] = 0
-    PlyData([PlyElement.describe(rows, "vertex")]).write(str(path))
-    return {name: rows[name] for name in COLUMNS}
-
-
-def test_gaussians_written_by_plyfile_are_read_with_activations(tmp_path: Path) -> None:
-    rows = splats(tmp_path / "a.ply")
-    cloud = ply.read_gaussians(tmp_path / "a.ply")
-    np.testing.assert_array_equal(cloud.means[:, 2], rows["z"])
-    np.testing.assert_allclose(cloud.opacities, 1 / (1 + np.exp(-rows["opacity"])), rtol=1e-6)
-    np.testing.assert_allclose(cloud.scales[:, 1], np.exp(rows["scale_1"]), rtol=1e-6)
-    np.testing.assert_allclose(np.linalg.norm(cloud.quats, axis=1), 1, rtol=1e-6)
-    np.testing.assert_allclose(
-        cloud.quats[:, 0] * np.abs(rows["rot_1"]),
-        np.abs(cloud.quats[:, 1]) * rows["rot_0"],
-        rtol=1e-5,
-    )
-    expected = np.clip(0.5 + 0.28209479177387814 * rows["f_dc_2"], 0, 1)
-    np.testing.assert_allclose(cloud.colors[:, 2], expected, rtol=1e-6)
 
 
 def test_mesh_is_read_back_by_plyfile(tmp_path: Path) -> None:
@@ -65,28 +29,6 @@ def test_mesh_is_read_back_by_plyfile(tmp_path: Path) -> None:
     data = PlyData.read(str(tmp_path / "m.ply"))
     np.testing.assert_array_equal(np.stack([data["vertex"][axis] for axis in "xyz"], 1), vertices)
     np.testing.assert_array_equal(np.vstack(data["face"]["vertex_indices"]), faces)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (lambda data: data[:-7], "truncated"),
-        (lambda data: b"", "expected a PLY"),
-        (lambda data: b"\x00" * 400, "expected a PLY"),
-        (lambda data: data.replace(b"opacity", b"opakity"), "lack opacity"),
-        (lambda data: data.replace(b"binary_little_endian", b"ascii"), "binary_little_endian"),
-        (lambda data: data.replace(b"float x", b"quark x"), "not understood"),
-        (lambda data: data[:-4] + struct.pack("<f", float("nan")), "not finite"),
-        (lambda data: data.replace(b"element vertex 50", b"element vertex 99999999"), "truncated"),
-    ],
-)
-def test_bad_ply_gets_one_line(tmp_path: Path, change, message: str) -> None:
-    path = tmp_path / "bad.ply"
-    splats(path)
-    path.write_bytes(change(path.read_bytes()))
-    with pytest.raises(AddonError, match=message) as caught:
-        ply.read_gaussians(path)
-    assert "\n" not in str(caught.value) and str(path) in str(caught.value)
 
 
 def test_exr_agrees_with_openexr(tmp_path: Path) -> None:

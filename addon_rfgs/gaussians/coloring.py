@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the colour of imported Gaussians says."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ..errors import AddonError
+from . import attributes, color_maps
+from .splats import COLOR, SH_C0
+
+#: The attribute that nodes, materials and the Solid view take colours from.
+COLOR_ATTRIBUTE = "rfgs_color"
+#: Features are kept in attributes of these names.
+FEATURE_NAME = "f_{:02d}"
+#: Attribute whose values a mode shows on the ramp, and what to do where no cloud has it.
+RAMPED = {
+    "POWER": ("rf_power_db", "import a run with its features.npz"),
+    "ERROR": ("error_m", "press Compare with Mesh first"),
+}
+
+
+@dataclass(frozen=True)
+class Coloring:
+    """What Gaussians are coloured by."""
+
+    mode: str = "AUTO"
+    """AUTO, DISPLAY, POWER, PHASE, FEATURES, ERROR, TRACK or ATTRIBUTE."""
+    limits: tuple[float, float] | None = None
+    """Ends of the ramp of POWER, ERROR and ATTRIBUTE; None finds them from the values."""
+    attribute: str = ""
+    """Name for ATTRIBUTE; a property of the PLY goes by its own name."""
+
+
+def color_clouds(
+    meshes: Sequence[bpy.types.Mesh], coloring: Coloring
+) -> tuple[float, float] | None:
+    """Writes the colours of all clouds.
+
+    Returns:
+        Ends of the ramp, None where the mode has none.
+
+    Raises:
+        AddonError: No cloud has what the mode shows.
+    """
+    mode = _chosen(meshes) if coloring.mode == "AUTO" else coloring.mode
+    limits = None
+    if mode == "DISPLAY":
+        colors = [color_maps.linear(encoded_colors(mesh)) for mesh in meshes]
+    elif mode == "PHASE":
+        phases = _needed(meshes, "rf_phase", "import a run with its features.npz")
+        colors = [color_maps.hues(phase / (2 * np.pi)) for phase in phases]
+    elif mode == "TRACK":
+        tracks = _needed(meshes, "gid", "import a run with its features.npz")
+        colors = [color_maps.categories(ids) for ids in tracks]
+    elif mode == "FEATURES":
+        colors = _feature_colors(meshes)
+    else:
+        name, remedy = RAMPED.get(mode, (coloring.attribute, "see its name in the Spreadsheet"))
+        values = _needed(meshes, name, remedy)
+        limits = coloring.limits or color_maps.found_range(values)
+        colors = [color_maps.ramp(array, *limits) for array in values]
+    for mesh, rgb in zip(meshes, colors, strict=True):
+        rgba = np.concatenate([rgb, np.ones((len(rgb), 1))], axis=1)
+        attributes.put(mesh, COLOR_ATTRIBUTE, "FLOAT_COLOR", rgba)
+        mesh.attributes.active_color_name = COLOR_ATTRIBUTE
+        mesh.update()
+    return limits
+
+
+def encoded_colors(mesh: bpy.types.Mesh) -> np.ndarray:
+    """Display colours as the PLY says, sRGB-encoded in [0, 1], [M, 3]; grey if it does not."""
+    f_dc = [attributes.get(mesh, f"ply_{name}") for name in COLOR]
+    if any(values is None for values in f_dc):
+        return np.full((len(mesh.vertices), 3), 0.5)
+    return np.clip(0.5 + SH_C0 * np.stack(f_dc, axis=1), 0, 1)
+
+
+def _chosen(meshes: Sequence[bpy.types.Mesh]) -> str:
+    """Display colours where some were fitted, else power where it is known."""
+    spreads = [float(np.ptp(encoded_colors(mesh))) for mesh in meshes if len(mesh.vertices)]
+    powers = [attributes.get(mesh, "rf_power_db") for mesh in meshes]
+    known = any(values is not None and np.isfinite(values).any() for values in powers)
+    return "POWER" if known and max(spreads, default=0.0) < 1e-4 else "DISPLAY"
+
+
+def _needed(meshes: Sequence[bpy.types.Mesh], name: str, remedy: str) -> list[np.ndarray]:
+    """Values of an attribute of all clouds, NaN where a cloud lacks it."""
+    found = []
+    for mesh in meshes:
+        values = attributes.get(mesh, name) if name else None
+        if values is None and name:
+            values = attributes.get(mesh, f"ply_{name}")
+        found.append(values if values is not None and values.ndim == 1 else None)
+    if not any(values is not None and np.isfinite(values).any() for values in found):
+        raise AddonError(f"no Gaussian here has numbers of the name {name!r}; {remedy}")
+    return [
+        np.full(len(mesh.vertices), np.nan) if values is None else values.astype(np.float64)
+        for mesh, values in zip(meshes, found, strict=True)
+    ]
+
+
+def _feature_colors(meshes: Sequence[bpy.types.Mesh]) -> list[np.ndarray]:
+    tables = [_features(mesh) for mesh in meshes]
+    known = [table for table in tables if table is not None]
+    if not known:
+        raise AddonError("no Gaussian here has features; import a run with its features.npz")
+    if len({table.shape[1] for table in known}) > 1:
+        raise AddonError("the clouds have features of different lengths; import one run alone")
+    colors = iter(color_maps.principal_colors(known))
+    return [
+        np.full((len(mesh.vertices), 3), color_maps.UNKNOWN) if table is None else next(colors)
+        for mesh, table in zip(meshes, tables, strict=True)
+    ]
+
+
+def _features(mesh: bpy.types.Mesh) -> np.ndarray | None:
+    columns = []
+    while (values := attributes.get(mesh, FEATURE_NAME.format(len(columns)))) is not None:
+        columns.append(values)
+    return np.stack(columns, axis=1) if columns else None

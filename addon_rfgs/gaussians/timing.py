@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which cloud is seen when: visibility is keyed, so files show it without the add-on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import bpy
+
+from .cloud_mesh import FRAME
+
+_VISIBILITY = ("hide_viewport", "hide_render")
+
+
+def key_visibility(items: Sequence[bpy.types.Object], offset: int, interpolation: str) -> None:
+    """Keys when each cloud of a frame is visible, in place of earlier keys.
+
+    Args:
+        items: Clouds; those that belong to no frame stay visible.
+        offset: The cloud of frame f is shown at frame f + offset.
+        interpolation: `NONE` shows a cloud at its own frame alone, `NEAREST` while no other
+            recorded frame is nearer, `HOLD` until the next recorded frame.
+    """
+    framed = {int(item.data[FRAME]): item for item in items if FRAME in item.data}
+    shown = _spans(sorted(framed), interpolation)
+    for (frame, item), (first, last) in zip(sorted(framed.items()), shown, strict=True):
+        _drop_keys(item)
+        keys = [] if first is None else [(first - 1 + offset, True)]
+        keys += [((frame if first is None else first) + offset, False)]
+        keys += [] if last is None else [(last + 1 + offset, True)]
+        for name in _VISIBILITY:
+            for at, hidden in keys:
+                setattr(item, name, hidden)
+                item.keyframe_insert(name, frame=at)
+
+
+def _spans(frames: list[int], interpolation: str) -> list[tuple[int | None, int | None]]:
+    """First and last frame at which each recorded frame is shown; None where there is no end."""
+    spans: list[tuple[int | None, int | None]] = []
+    for index, frame in enumerate(frames):
+        earlier = frames[index - 1] if index else None
+        later = frames[index + 1] if index + 1 < len(frames) else None
+        if interpolation == "NONE":
+            spans.append((frame, frame))
+        elif interpolation == "NEAREST":
+            first = None if earlier is None else (earlier + frame) // 2 + 1
+            spans.append((first, None if later is None else (frame + later) // 2))
+        else:
+            spans.append((frame, None if later is None else later - 1))
+    return spans
+
+
+def _drop_keys(item: bpy.types.Object) -> None:
+    """Removes the keys of visibility and leaves every other animation of the object alone."""
+    action = item.animation_data.action if item.animation_data else None
+    if action is None:
+        return
+    for curves in _curve_lists(action):
+        for curve in [curve for curve in curves if curve.data_path in _VISIBILITY]:
+            curves.remove(curve)
+
+
+def _curve_lists(action: Any) -> list[Any]:
+    if hasattr(action, "fcurves"):
+        return [action.fcurves]
+    # Blender 5.0 keeps curves in the channel bags of strips.
+    strips = [strip for layer in action.layers for strip in layer.strips]
+    return [bag.fcurves for strip in strips for bag in strip.channelbags]

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Buttons about how imported Gaussians are seen."""
+
+import bpy
+import numpy as np
+
+from ..errors import AddonError
+from ..reporting import Progress, Reporting
+from .attributes import positions
+from .clouds import COLLECTION, clouds_in_file
+from .coloring import color_clouds
+from .display import set_display, shown
+from .timing import key_visibility
+
+#: Share of the clouds' extent that the crop box leaves free around them.
+_MARGIN = 0.02
+
+
+class _WithClouds(Reporting):
+    """Needs imported Gaussians."""
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        """Whether any were imported."""
+        return COLLECTION in bpy.data.collections
+
+
+class RFGS_OT_update_display(_WithClouds, bpy.types.Operator):
+    """Apply all settings of display, colour and timing to Gaussians that are already here."""
+
+    bl_idname = "rfgs.update_display"
+    bl_label = "Update Display"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    def work(self, context: bpy.types.Context, _progress: Progress) -> str:
+        """Writes the panel's settings into every cloud."""
+        settings, items = context.scene.rfgs.gaussians, clouds_in_file()
+        for item in items:
+            set_display(item, settings.display())
+        key_visibility(items, settings.frame_offset, settings.interpolation)
+        limits = color_clouds([item.data for item in items], settings.coloring())
+        ramp = f", colours from {limits[0]:.3g} to {limits[1]:.3g}" if limits else ""
+        return f"Updated {len(items)} clouds{ramp}"
+
+
+class RFGS_OT_color_solid_view(_WithClouds, bpy.types.Operator):
+    """Make real meshes of the Gaussians and colour them in this Solid view, no other view."""
+
+    bl_idname = "rfgs.color_solid_view"
+    bl_label = "Colour in Solid View"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    def work(self, context: bpy.types.Context, _progress: Progress) -> str:
+        """Sets the clouds, and the view the button was pressed in."""
+        clouds_in_file()
+        context.scene.rfgs.gaussians.solid_view = True
+        space = context.space_data
+        if space is None or space.type != "VIEW_3D":
+            return "Gaussians are real meshes now; no 3D view is open to colour"
+        space.shading.type, space.shading.color_type = "SOLID", "VERTEX"
+        return "Gaussians are coloured in this Solid view"
+
+
+class RFGS_OT_add_crop_box(_WithClouds, bpy.types.Operator):
+    """Add an Empty around the visible Gaussians and show only what is inside its cube."""
+
+    bl_idname = "rfgs.add_crop_box"
+    bl_label = "Add Crop Box"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    def work(self, context: bpy.types.Context, _progress: Progress) -> str:
+        """Fits the box and crops with it."""
+        settings, low, high = context.scene.rfgs.gaussians, [], []
+        settings.use_crop = False
+        for item in clouds_in_file():
+            matrix = np.array(item.matrix_world)
+            local = positions(item.data)[shown(item, settings.display())]
+            points = local @ matrix[:3, :3].T + matrix[:3, 3]
+            if len(points) and not item.hide_viewport:
+                low.append(points.min(axis=0))
+                high.append(points.max(axis=0))
+        if not low:
+            raise AddonError("no Gaussian is visible at this frame; lower the thresholds")
+        bounds = np.array([np.min(low, axis=0), np.max(high, axis=0)])
+        box = bpy.data.objects.new("RFGS crop box", None)
+        box.empty_display_type = "CUBE"
+        box.location = bounds.mean(axis=0)
+        box.scale = np.maximum(0.5 * np.ptp(bounds, axis=0) * (1 + _MARGIN), 1e-3)
+        context.scene.collection.objects.link(box)
+        settings.crop_box, settings.use_crop = box, True
+        return f"Cropping to {box.name}; move and scale it"

@@ -18,7 +18,7 @@ def main(arguments: list[str]) -> int:
     if arguments[:1] in (["-h"], ["--help"]):
         return run(["--help"], program)
     if len(arguments) < 2 or arguments[0] != "--blend":
-        sys.stderr.write(f"error: expected {program} check|export|groundtruth|import …\n")
+        sys.stderr.write(f"error: expected {program} COMMAND …\n")
         return USER_ERROR
     register()
     atexit.register(close_scripted_file)

@@ -8,12 +8,13 @@ import os
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import NoReturn, TextIO
 
 import bpy
 
+from .devices.commands import add_devices
 from .errors import AddonError
 from .export.commands import add_export
 from .gaussians.commands import add_import
@@ -34,7 +35,7 @@ def parser(program: str) -> argparse.ArgumentParser:
     """The parser of all commands."""
     main = _Parser(prog=program, description="RF-GS inside Blender")
     commands = main.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for add in (add_check, add_export, add_import):
+    for add in (add_check, add_devices, add_export, add_import):
         add(commands)
     return main
 
@@ -49,7 +50,8 @@ def run(arguments: Sequence[str], program: str = "rfgs", blend: Path | None = No
     """
     with _quiet() as out:
         try:
-            options = parser(program).parse_args(arguments)
+            with redirect_stdout(out):  # for --help
+                options = parser(program).parse_args(arguments)
             if blend is not None:
                 open_blend(blend)
             out.write(options.run(options, out) + "\n")

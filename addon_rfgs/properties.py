@@ -5,10 +5,11 @@ import zlib
 
 import bpy
 
-from .devices.properties import RFGS_PG_radio
+from .devices.properties import RFGS_PG_radio, search_radios
+from .devices.settings import RFGS_PG_devices
 from .export.settings import RFGS_PG_export
 from .gaussians.settings import RFGS_PG_gaussians
-from .tables import MATERIALS, RADIOS
+from .tables import MATERIALS
 
 ROLES = [
     ("NONE", "None", "Not a radio device", 0),
@@ -37,10 +38,6 @@ def _material_items() -> list[tuple[str, str, str, int]]:
     return items
 
 
-def _search_radios(_self: object, _context: object, text: str) -> list[str]:
-    return [name for name in ("any", "scene", *RADIOS) if text.lower() in name]
-
-
 class RFGS_PG_object(bpy.types.PropertyGroup):
     """Radio meaning of an object."""
 
@@ -55,7 +52,7 @@ class RFGS_PG_object(bpy.types.PropertyGroup):
         description="Preset this device belongs to, 'any' for every radio, or 'scene' for the one "
         "described below",
         default="any",
-        search=_search_radios,
+        search=search_radios,
     )
     rf: bpy.props.PointerProperty(type=RFGS_PG_radio)  # type: ignore[valid-type]
     object_class: bpy.props.EnumProperty(  # type: ignore[valid-type]
@@ -110,6 +107,7 @@ class RFGS_PG_material(bpy.types.PropertyGroup):
 class RFGS_PG_scene(bpy.types.PropertyGroup):
     """Settings of the panels, a group for each."""
 
+    devices: bpy.props.PointerProperty(type=RFGS_PG_devices)  # type: ignore[valid-type]
     export: bpy.props.PointerProperty(type=RFGS_PG_export)  # type: ignore[valid-type]
     gaussians: bpy.props.PointerProperty(type=RFGS_PG_gaussians)  # type: ignore[valid-type]
 
@@ -118,6 +116,7 @@ CLASSES_TO_REGISTER = (
     RFGS_PG_radio,
     RFGS_PG_object,
     RFGS_PG_material,
+    RFGS_PG_devices,
     RFGS_PG_export,
     RFGS_PG_gaussians,
     RFGS_PG_scene,

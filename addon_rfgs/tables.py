@@ -11,6 +11,18 @@ _TABLES = json.loads((Path(__file__).parent / "tables.json").read_text("utf-8"))
 #: Name and one-line description of every radio preset.
 RADIOS: dict[str, str] = {row["name"]: row["description"] for row in _TABLES["radios"]}
 
+#: What Empties hold of a radio, for every preset.
+RADIO_FIELDS: dict[str, dict] = {row["name"]: row["fields"] for row in _TABLES["radios"]}
+
+#: Of every preset: placement (the rule), num_places, heights_m [m] and inset_m [m].
+RADIO_PLACEMENTS: dict[str, dict] = {row["name"]: row["placement"] for row in _TABLES["radios"]}
+
+#: In vacuum [m/s].
+SPEED_OF_LIGHT: float = _TABLES["speed_of_light"]
+
+#: A closed mesh that fills more of the scene than this is the room itself, not furniture.
+ROOM_FRACTION: float = _TABLES["room_fraction"]
+
 #: Fields of a radio that Empties hold, with the value each starts with.
 RADIO_DEFAULTS: dict[str, object] = _TABLES["radio_defaults"]
 

@@ -14,6 +14,8 @@ from typing import Any, get_args
 
 from rfgs_core.files import write_text
 from rfgs_core.radio.antennas import PATTERNS, POLARIZATIONS
+from rfgs_core.radio.check import ROOM_FRACTION
+from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.materials import MATERIALS
 from rfgs_core.radio.presets import PRESETS, OwnLinks, Radio, preset
 from rfgs_core.skeleton import JOINTS, PARENTS
@@ -30,6 +32,9 @@ SCENE_FIELDS = (
     *("pattern", "polarization"),
 )
 
+#: Fields of a radio that say where its devices stand in a scene that brings none.
+PLACEMENT_FIELDS = ("placement", "num_places", "heights_m", "inset_m")
+
 
 def describe(radio: Radio) -> str:
     """One line about a radio for a tooltip."""
@@ -44,8 +49,16 @@ def tables() -> dict[str, Any]:
     """Everything the add-on shares with this package, as plain JSON values."""
     return {
         "schema": "rfgs-tables/1",
+        "speed_of_light": SPEED_OF_LIGHT,
+        "room_fraction": ROOM_FRACTION,
         "radios": [
-            {"name": radio.name, "description": describe(radio)} for radio in PRESETS.values()
+            {
+                "name": radio.name,
+                "description": describe(radio),
+                "fields": {name: getattr(radio, name) for name in SCENE_FIELDS},
+                "placement": {name: getattr(radio, name) for name in PLACEMENT_FIELDS},
+            }
+            for radio in PRESETS.values()
         ],
         "radio_defaults": {name: getattr(preset("wifi"), name) for name in SCENE_FIELDS},
         "radio_choices": {

@@ -1,16 +1,97 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel of the active object: what it is to the radio."""
+"""The panels of radio devices: the list of all, and what the active object is to the radio."""
+
+from __future__ import annotations
+
+from typing import Any
 
 import bpy
 
 from ..tab import Tab
+from .empties import OWN_RADIOS, is_device
+from .fields import draw_fields
+
+_ICONS = {
+    "TRANSMITTER": "TRIA_RIGHT",
+    "RECEIVER": "TRIA_LEFT",
+    "ACCESS_POINT": "ARROW_LEFTRIGHT",
+    "NONE": "BLANK1",
+}
+
+
+class RFGS_UL_devices(bpy.types.UIList):
+    """Radio devices among all objects of the file."""
+
+    def draw_item(
+        self,
+        _context: bpy.types.Context,
+        layout: bpy.types.UILayout,
+        _data: Any,
+        item: bpy.types.Object,
+        _icon: int,
+        _active_data: Any,
+        _active_property: str,
+    ) -> None:
+        """One device: role, name (double click to rename), radio."""
+        row = layout.row(align=True)
+        row.prop(item, "name", text="", emboss=False, icon=_ICONS[item.rfgs.role])
+        side = row.row()
+        side.alignment = "RIGHT"
+        side.label(text=item.rfgs.radio)
+
+    def filter_items(
+        self, context: bpy.types.Context, data: Any, name: str
+    ) -> tuple[list[int], list[int]]:
+        """Shows devices of this scene by name, and of these what is searched for."""
+        items = getattr(data, name)
+        wanted = self.filter_name.lower()
+        here = context.scene.objects
+        shown = [
+            self.bitflag_filter_item
+            if is_device(item) and item.name in here and wanted in item.name.lower()
+            else 0
+            for item in items
+        ]
+        return shown, bpy.types.UI_UL_list.sort_items_by_name(items, "name")
+
+
+class RFGS_PT_devices(Tab, bpy.types.Panel):
+    """Radio devices of the scene."""
+
+    bl_idname = "RFGS_PT_devices"
+    bl_label = "Radio Devices"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Shows buttons that add, the list, and buttons for what is selected."""
+        layout, settings = self.layout, context.scene.rfgs.devices
+        row = layout.row(align=True)
+        for role, text in (
+            ("TRANSMITTER", "Transmitter"),
+            ("RECEIVER", "Receiver"),
+            ("ACCESS_POINT", "Access Point"),
+        ):
+            row.operator("rfgs.add_device", text=text, icon=_ICONS[role]).role = role
+        layout.operator_menu_enum("rfgs.place_radio", "radio", text="Place Preset", icon="ADD")
+        row = layout.row()
+        row.template_list(*("RFGS_UL_devices", "", bpy.data, "objects", settings, "active"), rows=4)
+        side = row.column(align=True)
+        side.operator("rfgs.remove_device", text="", icon="REMOVE")
+        side.operator("rfgs.duplicate_device", text="", icon="DUPLICATE")
+        side.separator()
+        side.operator_menu_enum("rfgs.mirror_device", "axis", text="", icon="MOD_MIRROR")
+        row = layout.row(heading="Overlay")
+        row.prop(settings, "overlay")
+        part = row.row()
+        part.active = settings.overlay
+        part.prop(settings, "names")
 
 
 class RFGS_PT_object(Tab, bpy.types.Panel):
     """Radio meaning of the active object."""
 
     bl_idname = "RFGS_PT_object"
-    bl_label = "Radio"
+    bl_label = "Active Object"
+    bl_parent_id = "RFGS_PT_devices"
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows what applies to the type of the active object."""
@@ -22,13 +103,11 @@ class RFGS_PT_object(Tab, bpy.types.Panel):
             return
         if item.type == "EMPTY":
             layout.prop(item.rfgs, "role")
-            if item.rfgs.role != "NONE":
+            if is_device(item):
                 layout.prop(item.rfgs, "radio")
-                if item.rfgs.radio in {"any", "scene"}:
-                    box = layout.box()
-                    box.label(text="Radio 'scene'")
-                    for name in item.rfgs.rf.bl_rna.properties.keys()[2:]:
-                        box.prop(item.rfgs.rf, name)
+                if item.rfgs.radio in OWN_RADIOS:
+                    draw_fields(layout, item.rfgs.rf, item.rfgs.role)
+                    layout.operator("rfgs.match_devices", icon="PASTEDOWN").device = item.name
         if item.type in {"MESH", "CURVE", "SURFACE", "FONT", "META", "EMPTY"}:
             layout.prop(item.rfgs, "object_class")
             layout.prop(item.rfgs, "instance")

@@ -4,13 +4,20 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Mapping
 from typing import Any
 
 import bpy
 
-from ..tables import RADIO_CHOICES, RADIO_DEFAULTS
+from ..tables import RADIO_CHOICES, RADIO_DEFAULTS, RADIOS
+from .layout import spacing_m, wavelength_m
 
 _GHZ = 1e9
+
+
+def search_radios(_self: object, _context: object, text: str) -> list[str]:
+    """Radios that an Empty may belong to and that hold `text`."""
+    return [name for name in ("any", "scene", *RADIOS) if text.lower() in name]
 
 
 def _choice(name: str, label: str, text: str) -> Any:
@@ -34,6 +41,41 @@ def _number(name: str, label: str, text: str, **limits: float) -> Any:
     )
 
 
+def _spacing_m(name: str, label: str) -> Any:
+    return bpy.props.FloatProperty(
+        name=label,
+        description="Distance of neighbouring elements; 0 takes half a wavelength of any band",
+        default=RADIO_DEFAULTS[name],
+        min=0.0,
+        soft_max=1.0,
+        precision=4,
+        step=0.1,
+        subtype="DISTANCE",
+    )
+
+
+def _spacing_wavelengths(array: str, label: str) -> Any:
+    """The same distance in wavelengths: nothing more is stored."""
+
+    def read(self: RadioFields) -> float:
+        fields = RadioFields.row(self)  # Operators hand over their bare properties.
+        return spacing_m(fields, array) / wavelength_m(fields)
+
+    def write(self: RadioFields, value: float) -> None:
+        value_m = value * wavelength_m(RadioFields.row(self))
+        setattr(self, f"{array}_spacing_m", 0.0 if abs(value - 0.5) < 1e-6 else value_m)
+
+    return bpy.props.FloatProperty(
+        name=label,
+        description="Distance of neighbouring elements in wavelengths at the middle of the band",
+        get=read,
+        set=write,
+        min=0.01,
+        soft_max=10.0,
+        precision=3,
+    )
+
+
 def _edge_ghz(name: str, label: str) -> Any:
     return bpy.props.FloatProperty(
         name=label,
@@ -45,8 +87,8 @@ def _edge_ghz(name: str, label: str) -> Any:
     )
 
 
-class RFGS_PG_radio(bpy.types.PropertyGroup):
-    """Fields of the radio `scene`, the same at every Empty of it; units as in the names."""
+class RadioFields:
+    """Fields of a radio as properties, of Empties and of the operator that adds them."""
 
     freq_min_ghz: _edge_ghz("freq_min_hz", "From [GHz]")  # type: ignore[valid-type]
     freq_max_ghz: _edge_ghz("freq_max_hz", "To [GHz]")  # type: ignore[valid-type]
@@ -57,11 +99,13 @@ class RFGS_PG_radio(bpy.types.PropertyGroup):
     tx_cols: _count("tx_cols", "TX columns", "Elements along local y")  # type: ignore[valid-type]
     rx_rows: _count("rx_rows", "RX rows", "Elements along local z")  # type: ignore[valid-type]
     rx_cols: _count("rx_cols", "RX columns", "Elements along local y")  # type: ignore[valid-type]
-    tx_spacing_m: _number(  # type: ignore[valid-type]
-        "tx_spacing_m", "TX spacing", "[m]; 0 takes half a wavelength", min=0.0
+    tx_spacing_m: _spacing_m("tx_spacing_m", "TX spacing")  # type: ignore[valid-type]
+    rx_spacing_m: _spacing_m("rx_spacing_m", "RX spacing")  # type: ignore[valid-type]
+    tx_spacing_wavelengths: _spacing_wavelengths(  # type: ignore[valid-type]
+        "tx", "TX spacing [λ]"
     )
-    rx_spacing_m: _number(  # type: ignore[valid-type]
-        "rx_spacing_m", "RX spacing", "[m]; 0 takes half a wavelength", min=0.0
+    rx_spacing_wavelengths: _spacing_wavelengths(  # type: ignore[valid-type]
+        "rx", "RX spacing [λ]"
     )
     tx_offset_m: bpy.props.FloatVectorProperty(  # type: ignore[valid-type]
         name="TX offset",
@@ -98,3 +142,15 @@ class RFGS_PG_radio(bpy.types.PropertyGroup):
             else:
                 out[name] = round(value, 6) if isinstance(value, float) else value
         return out
+
+    def take(self, fields: Mapping[str, Any]) -> None:
+        """Sets fields given under the names of a radio file; the others stay."""
+        for name, value in fields.items():
+            if name in ("freq_min_hz", "freq_max_hz"):
+                setattr(self, name.replace("_hz", "_ghz"), value / _GHZ)
+            else:
+                setattr(self, name, value)
+
+
+class RFGS_PG_radio(RadioFields, bpy.types.PropertyGroup):
+    """Fields of the radio `scene`, the same at every Empty of it; units as in the names."""

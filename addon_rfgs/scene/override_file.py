@@ -188,7 +188,7 @@ def _device(label: str, value: Any, index: int) -> dict[str, Any]:
             raise AddonError(f"{label}: quat_wxyz: expected a rotation, got {row['quat_wxyz']!r}")
         turn = tuple(item / length for item in turn)
     elif "look_at_m" in row:
-        turn = _boresight(place, _numbers(f"{label}: look_at_m", row["look_at_m"], 3))
+        turn = boresight(place, _numbers(f"{label}: look_at_m", row["look_at_m"], 3))
     return {
         "name": str(row.get("name", f"device_{index}")),
         "radio": radio,
@@ -198,7 +198,7 @@ def _device(label: str, value: Any, index: int) -> dict[str, Any]:
     }
 
 
-def _boresight(place: tuple[float, ...], target: tuple[float, ...]) -> tuple[float, ...]:
+def boresight(place: tuple[float, ...], target: tuple[float, ...]) -> tuple[float, ...]:
     """Turn (w, x, y, z) that points local +X from `place` to `target` with local +Y level."""
     along = np.subtract(target, place)
     yaw = np.arctan2(along[1], along[0])

@@ -1,0 +1,278 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Buttons that add, place, copy, mirror and remove radio devices."""
+
+from __future__ import annotations
+
+import bpy
+import mathutils
+import numpy as np
+
+from ..errors import AddonError
+from ..reporting import Progress, Reporting
+from ..scene.bounds import MARGIN_M
+from ..scene.frames import unit_scale
+from ..scene.override_file import boresight
+from ..tables import RADIOS
+from . import authoring, empties
+from .fields import draw_fields
+from .properties import RadioFields, search_radios
+
+ROLES = [
+    ("TRANSMITTER", "Transmitter", "Only transmits", "TRIA_RIGHT", 0),
+    ("RECEIVER", "Receiver", "Only receives", "TRIA_LEFT", 1),
+    ("ACCESS_POINT", "Access Point", "Transmits and receives", "ARROW_LEFTRIGHT", 2),
+]
+AXES = [("X", "X", "Across the plane of constant X"), ("Y", "Y", "Across that of constant Y")]
+
+
+def _device_name() -> bpy.types.StringProperty:
+    return bpy.props.StringProperty(
+        name="Device",
+        description="Name of the device; empty takes those that are selected",
+        options={"SKIP_SAVE"},
+    )
+
+
+def _chosen(context: bpy.types.Context, name: str) -> list[bpy.types.Object]:
+    """The device of a name, else the selected ones.
+
+    Raises:
+        AddonError: There is none.
+    """
+    if name:
+        return [empties.named_device(context.scene, name)]
+    found = [item for item in empties.devices(context.scene) if item.select_get()]
+    if not found:
+        raise AddonError("no radio device is selected")
+    return found
+
+
+def _show(context: bpy.types.Context, items: list[bpy.types.Object]) -> None:
+    """Selects devices, and nothing else; the first becomes active."""
+    context.view_layer.update()
+    for item in context.selected_objects:
+        item.select_set(False)
+    for item in items:
+        item.select_set(True)
+    context.view_layer.objects.active = items[0] if items else None
+
+
+class RFGS_OT_add_device(RadioFields, Reporting, bpy.types.Operator):
+    """Add an Empty that transmits, receives or does both.
+
+    It looks along its local X; new devices of the scene's own radio are like those that are there
+    """
+
+    bl_idname = "rfgs.add_device"
+    bl_label = "Add Radio Device"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    role: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Role", description="What the device does", items=ROLES, default="ACCESS_POINT"
+    )
+    radio: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Radio",
+        description="'scene' for the radio described below, 'any', or the name of a preset",
+        default="scene",
+        search=search_radios,
+    )
+    location: bpy.props.FloatVectorProperty(  # type: ignore[valid-type]
+        name="Location", description="Where the device stands", subtype="TRANSLATION", size=3
+    )
+    rotation: bpy.props.FloatVectorProperty(  # type: ignore[valid-type]
+        name="Rotation",
+        description="How the device is turned; unturned it looks along X",
+        subtype="EULER",
+        size=3,
+    )
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        """Puts it at the 3D cursor, looking at the middle of what is there."""
+        self.location = context.scene.cursor.location
+        corners = [
+            item.matrix_world @ mathutils.Vector(corner)
+            for item in context.visible_objects
+            if item.type == "MESH"
+            for corner in item.bound_box
+        ]
+        if corners:
+            middle = 0.5 * (np.min(corners, axis=0) + np.max(corners, axis=0))
+            turn = boresight(tuple(self.location), (*middle[:2], self.location[2]))
+            self.rotation = mathutils.Quaternion(turn).to_euler()
+        fields = empties.alike(context.scene)
+        if fields is not None:
+            self.take(fields)
+        return self.execute(context)
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        """Shows what belongs to the role."""
+        layout = self.layout
+        layout.use_property_split = True
+        for name in ("role", "radio", "location", "rotation"):
+            layout.prop(self, name)
+        if self.radio in empties.OWN_RADIOS:
+            draw_fields(layout, self, self.role)
+
+    def work(self, context: bpy.types.Context, _progress: Progress) -> str:
+        """Adds the Empty."""
+        turn = mathutils.Euler(self.rotation).to_matrix().to_4x4()
+        place = mathutils.Matrix.Translation(
+            mathutils.Vector(self.location) * unit_scale(context.scene)
+        )
+        fields = dict(empties.alike(context.scene) or {})
+        fields.update(self._said())
+        item = empties.add_device(
+            *(context.scene, self.role.lower(), self.role, self.radio, np.array(place @ turn)),
+            fields,
+        )
+        _show(context, [item])
+        return f"Added {item.name}"
+
+    def _said(self) -> dict[str, object]:
+        """Fields of the radio that somebody set."""
+        row = self.row()
+        spelt = {name: name.replace("_hz", "_ghz") for name in row}
+        said = {name for name in row if self.properties.is_property_set(spelt[name])}
+        said |= {
+            f"{array}_spacing_m"
+            for array in ("tx", "rx")
+            if self.properties.is_property_set(f"{array}_spacing_wavelengths")
+        }
+        return {name: row[name] for name in said}
+
+
+class RFGS_OT_place_radio(Reporting, bpy.types.Operator):
+    """Place all devices of a preset in the scene, as a dataset without devices would have them.
+
+    Devices of the same preset that are there already are replaced
+    """
+
+    bl_idname = "rfgs.place_radio"
+    bl_label = "Place Radio"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    radio: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Radio",
+        description="Which preset",
+        items=[(name, name, text) for name, text in RADIOS.items()],
+    )
+    around: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Around",
+        description="What the devices surround",
+        items=[
+            ("SCENE", "Scene", "The bounds of what radio sees"),
+            ("SELECTION", "Selection", "A box around what is selected, wider by the margin"),
+        ],
+    )
+    margin_m: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="Margin",
+        description="Free space on each side of the selection",
+        default=MARGIN_M,
+        min=0.0,
+        soft_max=10.0,
+        subtype="DISTANCE",
+    )
+    keep: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Keep Others",
+        description="Leave devices of this preset that are there already",
+        default=False,
+    )
+
+    def work(self, context: bpy.types.Context, _progress: Progress) -> str:
+        """Places the devices."""
+        scene = context.scene
+        selected = list(context.selected_objects)
+        bounds, meshes = authoring.scene_space(scene)
+        if self.around == "SELECTION":
+            bounds = authoring.around(scene, selected, self.margin_m)
+        placed = authoring.place_radio(scene, self.radio, bounds, meshes, keep=self.keep)
+        _show(context, placed)
+        more = authoring.others_of(scene, self.radio)
+        return f"Placed {len(placed)} devices of {self.radio}{more}"
+
+
+class RFGS_OT_duplicate_device(Reporting, bpy.types.Operator):
+    """Copy radio devices in place, with their radio."""
+
+    bl_idname = "rfgs.duplicate_device"
+    bl_label = "Duplicate Device"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    device: _device_name()  # type: ignore[valid-type]
+    offset: bpy.props.FloatVectorProperty(  # type: ignore[valid-type]
+        name="Offset",
+        description="From the device to its copy, along the scene's axes",
+        default=(0.0, 0.0, 0.5),
+        subtype="TRANSLATION",
+        size=3,
+    )
+
+    def work(self, context: bpy.types.Context, _progress: Progress) -> str:
+        """Copies what is chosen."""
+        twins = [empties.duplicate(item) for item in _chosen(context, self.device)]
+        context.view_layer.update()
+        for twin in twins:
+            matrix = twin.matrix_world.copy()
+            matrix.translation += mathutils.Vector(self.offset)
+            twin.matrix_world = matrix
+        _show(context, twins)
+        return f"Added {', '.join(twin.name for twin in twins)}"
+
+
+class RFGS_OT_mirror_device(Reporting, bpy.types.Operator):
+    """Mirror radio devices at the middle of the scene's bounds."""
+
+    bl_idname = "rfgs.mirror_device"
+    bl_label = "Mirror Device"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    device: _device_name()  # type: ignore[valid-type]
+    axis: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Axis", description="Coordinate that changes its sign", items=AXES
+    )
+    copy: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Copy", description="Mirror a copy and leave the device", default=True
+    )
+
+    def work(self, context: bpy.types.Context, _progress: Progress) -> str:
+        """Mirrors what is chosen."""
+        chosen = _chosen(context, self.device)
+        twins = authoring.mirror_devices(
+            context.scene, chosen, "XY".index(self.axis), copy=self.copy
+        )
+        _show(context, twins)
+        return f"Mirrored {', '.join(item.name for item in twins)}"
+
+
+class RFGS_OT_remove_device(Reporting, bpy.types.Operator):
+    """Remove radio devices from the file."""
+
+    bl_idname = "rfgs.remove_device"
+    bl_label = "Remove Device"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    device: _device_name()  # type: ignore[valid-type]
+
+    def work(self, context: bpy.types.Context, _progress: Progress) -> str:
+        """Removes what is chosen."""
+        chosen = _chosen(context, self.device)
+        names = ", ".join(item.name for item in chosen)
+        empties.remove(chosen)
+        return f"Removed {names}"
+
+
+class RFGS_OT_match_devices(Reporting, bpy.types.Operator):
+    """Give every device of the scene's own radio the band, arrays and power of this one."""
+
+    bl_idname = "rfgs.match_devices"
+    bl_label = "Copy Radio to All"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    device: _device_name()  # type: ignore[valid-type]
+
+    def work(self, context: bpy.types.Context, _progress: Progress) -> str:
+        """Copies the properties."""
+        source, *more = _chosen(context, self.device)
+        if more:
+            raise AddonError("select the one device that the others shall be like")
+        return f"Changed {authoring.match_devices(context.scene, source)} devices"

@@ -9,8 +9,9 @@ import atexit
 import bpy
 
 from . import command, properties, registration
+from .jobs import following
 
-_MODULES = (properties, registration, command)
+_MODULES = (properties, registration, command, following)
 
 
 def register() -> None:

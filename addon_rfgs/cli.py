@@ -18,7 +18,28 @@ from .devices.commands import add_devices
 from .errors import AddonError
 from .export.commands import add_export
 from .gaussians.commands import add_import
+from .jobs.commands import (
+    add_environment,
+    add_evaluate,
+    add_generate,
+    add_resume,
+    add_stop,
+    add_train,
+)
 from .scene.commands import add_check
+
+_COMMANDS = (
+    add_check,
+    add_devices,
+    add_export,
+    add_import,
+    add_environment,
+    add_generate,
+    add_train,
+    add_evaluate,
+    add_resume,
+    add_stop,
+)
 
 #: Exit code of every mistake a user can repair.
 USER_ERROR = 2
@@ -35,7 +56,7 @@ def parser(program: str) -> argparse.ArgumentParser:
     """The parser of all commands."""
     main = _Parser(prog=program, description="RF-GS inside Blender")
     commands = main.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for add in (add_check, add_devices, add_export, add_import):
+    for add in _COMMANDS:
         add(commands)
     return main
 

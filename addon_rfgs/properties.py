@@ -9,6 +9,7 @@ from .devices.properties import RFGS_PG_radio, search_radios
 from .devices.settings import RFGS_PG_devices
 from .export.settings import RFGS_PG_export
 from .gaussians.settings import RFGS_PG_gaussians
+from .jobs.settings import RFGS_PG_jobs
 from .tables import MATERIALS
 
 ROLES = [
@@ -110,6 +111,7 @@ class RFGS_PG_scene(bpy.types.PropertyGroup):
     devices: bpy.props.PointerProperty(type=RFGS_PG_devices)  # type: ignore[valid-type]
     export: bpy.props.PointerProperty(type=RFGS_PG_export)  # type: ignore[valid-type]
     gaussians: bpy.props.PointerProperty(type=RFGS_PG_gaussians)  # type: ignore[valid-type]
+    jobs: bpy.props.PointerProperty(type=RFGS_PG_jobs)  # type: ignore[valid-type]
 
 
 CLASSES_TO_REGISTER = (
@@ -119,6 +121,7 @@ CLASSES_TO_REGISTER = (
     RFGS_PG_devices,
     RFGS_PG_export,
     RFGS_PG_gaussians,
+    RFGS_PG_jobs,
     RFGS_PG_scene,
 )
 

@@ -6,10 +6,11 @@ import bpy
 from .devices.interface import CLASSES as DEVICES
 from .export.interface import CLASSES as EXPORT
 from .gaussians.interface import CLASSES as GAUSSIANS
+from .jobs.interface import CLASSES as JOBS
 from .materials.interface import CLASSES as MATERIALS
 
 #: Panels appear in this order.
-_CLASSES = (*DEVICES, *MATERIALS, *EXPORT, *GAUSSIANS)
+_CLASSES = (*DEVICES, *MATERIALS, *EXPORT, *JOBS, *GAUSSIANS)
 
 
 def register() -> None:

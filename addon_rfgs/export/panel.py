@@ -10,7 +10,8 @@ class RFGS_PT_dataset(Tab, bpy.types.Panel):
     """Bundle and ground truth."""
 
     bl_idname = "RFGS_PT_dataset"
-    bl_label = "Dataset"
+    bl_label = "Bundle and Ground Truth"
+    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows settings and the two buttons."""

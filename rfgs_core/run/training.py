@@ -178,7 +178,8 @@ def _open_or_create(out: Path, settings: dict[str, Any]) -> Run:
     if not path.exists():
         if out.exists() and not out.is_dir():
             raise RfgsError(f"{out} is a file; expected a folder, choose another --out")
-        if out.exists() and any(out.iterdir()):
+        # Whoever starts a training from elsewhere keeps its log there.
+        if out.exists() and any(entry.name != "log" for entry in out.iterdir()):
             raise RfgsError(f"{out} is not empty and not a run; choose another --out")
         write_json(path, settings)
         return Run(out, settings)

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The add-on's preferences: programs outside of Blender, and the rows of the job list."""
+
+from __future__ import annotations
+
+import textwrap
+
+import bpy
+
+from .checking import CHECK
+
+#: The add-on's own name; Blender keeps its preferences under it.
+ADDON = __package__.rpartition(".")[0]
+#: Labels do not break; so many characters fit into a sidebar of usual width.
+_LINE = 40
+
+
+class RFGS_PG_job(bpy.types.PropertyGroup):
+    """One row of the job list; the job itself lives in `queue.py`."""
+
+    title: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Job", description="What the job does, and where", options={"SKIP_SAVE"}
+    )
+    state: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="State", description="Whether it waits, runs or has ended", options={"SKIP_SAVE"}
+    )
+    message: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Message", description="How far it is, or why it ended", options={"SKIP_SAVE"}
+    )
+    share: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="Progress",
+        description="Share of its stage that is done",
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        options={"SKIP_SAVE"},
+    )
+
+
+class RFGS_AP_preferences(bpy.types.AddonPreferences):
+    """Programs outside of Blender."""
+
+    bl_idname = ADDON
+
+    python: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Python Environment",
+        description="Python program, or folder of a virtual environment, that has rfgs and "
+        "rfgs-factory; jobs run there",
+        default="",
+        subtype="FILE_PATH",
+    )
+    blender: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Blender",
+        description="Blender program, with this add-on, that jobs open the file with; empty: this "
+        "one",
+        default="",
+        subtype="FILE_PATH",
+    )
+    jobs: bpy.props.CollectionProperty(  # type: ignore[valid-type]
+        name="Jobs", description="Rows of the job list", type=RFGS_PG_job, options={"SKIP_SAVE"}
+    )
+    active_job: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Active job",
+        description="Which row of the job list is chosen",
+        default=0,
+        options={"SKIP_SAVE"},
+    )
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        """Shows the programs, and what the environment answered."""
+        self.layout.prop(self, "python")
+        self.layout.prop(self, "blender")
+        draw_check(self.layout)
+
+
+def draw_check(layout: bpy.types.UILayout) -> None:
+    """Shows the button that tests the environment, and its answer."""
+    layout.operator("rfgs.test_environment", icon="CHECKMARK")
+    box = layout.box() if CHECK.running or CHECK.problems or CHECK.versions else None
+    if CHECK.running:
+        box.label(text="Asking the environment", icon="SORTTIME")
+    for problem in CHECK.problems:
+        for number, line in enumerate(textwrap.wrap(problem, _LINE)):
+            box.label(text=line, icon="BLANK1" if number else "ERROR")
+    if CHECK.versions and not CHECK.problems:
+        box.label(text="Ready", icon="CHECKMARK")
+    for version in CHECK.versions:
+        box.label(text=version, icon="BLANK1")
+
+
+def preferences() -> RFGS_AP_preferences | None:
+    """The add-on's preferences; None where it is registered without being installed."""
+    found = bpy.context.preferences.addons.get(ADDON)
+    return found.preferences if found else None
+
+
+def environment_path() -> str:
+    """Path of the environment that the user chose; empty if none."""
+    chosen = preferences()
+    return bpy.path.abspath(chosen.python) if chosen else ""
+
+
+def blender_program() -> str:
+    """The Blender that jobs open files with; empty for the environment's own bpy."""
+    chosen = preferences()
+    if chosen and chosen.blender:
+        return bpy.path.abspath(chosen.blender)
+    return bpy.app.binary_path

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Jobs out of the settings of a scene, begun in the background or carried out at once."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import bpy
+
+from ..errors import AddonError
+from ..reporting import chosen_path
+from .environment import interpreter
+from .following import QUEUE, follow
+from .plans import EvaluatePlan, GeneratePlan, Plan, TrainPlan
+from .preferences import blender_program, environment_path
+from .queue import ACTIVE, DONE, Job
+from .record import log_file
+
+_EVERY_S = 0.2
+
+
+def generate_plan(scene: bpy.types.Scene) -> GeneratePlan:
+    """A dataset of the open file, as the panel describes it.
+
+    Raises:
+        AddonError: The file was never saved.
+    """
+    if not bpy.data.filepath:
+        raise AddonError("the scene was never saved; save it first")
+    said = scene.rfgs.jobs
+    return GeneratePlan(
+        out=_absolute(said.dataset_folder),
+        blend=bpy.data.filepath,
+        blender=blender_program(),
+        radios=said.radios,
+        frames=said.frames,
+        cameras=said.cameras,
+        resolution=said.resolution,
+        samples=said.samples,
+        images=said.images,
+        depth=said.depth,
+        workers=said.workers,
+        paths=said.paths,
+        seed=said.seed,
+    )
+
+
+def train_plan(scene: bpy.types.Scene) -> TrainPlan:
+    """A training on the panel's dataset."""
+    said = scene.rfgs.jobs
+    return TrainPlan(
+        out=_absolute(said.run_folder),
+        dataset=_absolute(said.dataset_folder),
+        radio=said.train_radio or said.radios.split(",")[0].strip(),
+        frames=said.train_frames,
+        iterations=said.iterations,
+        gaussians=said.gaussians,
+        seed=said.seed,
+    )
+
+
+def evaluate_plan(scene: bpy.types.Scene) -> EvaluatePlan:
+    """The evaluation of the panel's run."""
+    return EvaluatePlan(out=_absolute(scene.rfgs.jobs.run_folder))
+
+
+def start(plan: Plan) -> str:
+    """Begins a job, or puts it behind those that run; without a window it is carried out at once.
+
+    Returns:
+        What happened, in one line.
+
+    Raises:
+        AddonError: No environment is set, the folder is taken, or the job fails at once.
+    """
+    job = QUEUE.add(plan, interpreter(environment_path()))
+    if bpy.app.background:
+        return carry_out(job)
+    follow()
+    return f"{job.title} is in the list of jobs"
+
+
+def carry_out(job: Job, report: Callable[[int, int], None] | None = None) -> str:
+    """Runs a job to its end.
+
+    Args:
+        job: One of the queue.
+        report: Called with done and total of the present stage.
+
+    Raises:
+        AddonError: The job failed; the message is the program's own.
+    """
+    seen = None
+    try:
+        while job.state in ACTIVE:
+            QUEUE.step()
+            if report and job.progress and job.progress != seen:
+                seen = job.progress
+                report(int(seen.done), int(seen.total))
+            time.sleep(_EVERY_S)
+    except BaseException:
+        if job.process:
+            job.process.interrupt()
+        raise
+    if job.state != DONE:
+        reason = job.message.removeprefix("error: ")
+        raise AddonError(f"{job.state.lower()}: {reason} (log: {log_file(job.plan)})")
+    return f"{job.title} is done: {job.plan.out}"
+
+
+def _absolute(folder: str) -> str:
+    return str(Path(chosen_path(folder)).absolute())

@@ -1,0 +1,274 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Jobs outside of Blender; `test_inside_jobs.py` runs this file in a Python of its own."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import bpy
+import pytest
+
+import addon_rfgs
+from addon_rfgs.errors import AddonError
+from addon_rfgs.jobs import environment, following, queue
+from addon_rfgs.jobs.plans import GeneratePlan, TrainPlan, plan_of_json, plan_to_json
+from addon_rfgs.jobs.process import Process, birth
+from addon_rfgs.jobs.progress import Progress, read_log
+from addon_rfgs.jobs.record import log_file, read_record, record_file, remembered
+
+#: Programs that stand where the environment's Python would: they are given a job's arguments.
+PROGRAMS = {
+    "quick": "echo at work; exit 0",
+    "failing": "echo error: no wall anywhere; exit 2",
+    "polite": "trap 'exit 130' INT; echo begun; while :; do sleep 0.05; done",
+    "deaf": "trap '' INT; echo begun; while :; do sleep 0.05; done",
+}
+
+
+@pytest.fixture
+def program(tmp_path: Path):
+    def make(name: str) -> Path:
+        path = tmp_path / name
+        path.write_text(f"#!/bin/bash\n{PROGRAMS[name]}\n")
+        path.chmod(0o755)
+        return path
+
+    return make
+
+
+@pytest.fixture
+def jobs(tmp_path: Path) -> queue.Queue:
+    return queue.Queue(lambda: tmp_path / "jobs.json")
+
+
+def plan(tmp_path: Path, name: str) -> TrainPlan:
+    return TrainPlan(out=str(tmp_path / name), dataset=str(tmp_path / "data"))
+
+
+def step_until(jobs: queue.Queue, job: queue.Job, *states: str) -> None:
+    end_s = time.monotonic() + 20
+    while job.state not in states:
+        assert time.monotonic() < end_s, f"{job.state}: {job.message}"
+        jobs.step()
+        time.sleep(0.02)
+
+
+def step_until_said(jobs: queue.Queue, job: queue.Job, text: str) -> None:
+    end_s = time.monotonic() + 20
+    while text not in job.tail:
+        assert time.monotonic() < end_s
+        jobs.step()
+        time.sleep(0.02)
+
+
+def test_jobs_run_one_after_the_other(jobs, program, tmp_path: Path) -> None:
+    first = jobs.add(plan(tmp_path, "a"), program("polite"))
+    second = jobs.add(plan(tmp_path, "b"), program("quick"))
+    step_until_said(jobs, first, "begun")
+    for _ in range(5):
+        jobs.step()
+    assert (first.state, second.state) == (queue.RUNNING, queue.WAITING)
+    jobs.stop(first)
+    step_until(jobs, second, queue.DONE)
+    assert first.state == queue.STOPPED and second.tail == ["at work"]
+    assert not jobs.step(), "nothing is left to look after"
+    assert remembered(tmp_path / "jobs.json") == [record_file(first.plan)]
+    jobs.forget(first)
+    assert not (tmp_path / "jobs.json").exists() and record_file(first.plan).exists()
+
+
+def test_a_failure_is_told_in_its_own_words(jobs, program, tmp_path: Path) -> None:
+    job = jobs.add(plan(tmp_path, "a"), program("failing"))
+    step_until(jobs, job, queue.FAILED)
+    assert job.message == "error: no wall anywhere"
+    gone = jobs.add(plan(tmp_path, "b"), tmp_path / "nothing")
+    step_until(jobs, gone, queue.FAILED)
+    assert "cannot be started" in gone.message
+
+
+def test_who_does_not_stop_is_killed(jobs, program, tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(queue, "GRACE_S", 0.3)
+    job = jobs.add(plan(tmp_path, "a"), program("deaf"))
+    step_until_said(jobs, job, "begun")
+    jobs.stop(job)
+    jobs.step()
+    assert job.state == queue.STOPPING
+    step_until(jobs, job, queue.STOPPED)
+    assert not birth(job.process.pid)
+
+
+def test_a_second_job_for_the_folder_waits_its_turn(jobs, program, tmp_path: Path) -> None:
+    job = jobs.add(plan(tmp_path, "a"), program("quick"))
+    with pytest.raises(AddonError, match="in the list already"):
+        jobs.add(plan(tmp_path, "a"), program("quick"))
+    with pytest.raises(AddonError, match="not over"):
+        jobs.forget(job)
+    jobs.stop(job)
+    assert job.state == queue.STOPPED and not jobs.step()
+    again = jobs.add(plan(tmp_path, "a"), program("quick"))
+    assert jobs.jobs == [again]
+
+
+@pytest.mark.parametrize("done", [True, False])
+def test_the_next_blender_finds_a_job_and_its_end(
+    jobs, program, tmp_path: Path, done: bool
+) -> None:
+    job = jobs.add(plan(tmp_path, "a"), program("polite"))
+    step_until_said(jobs, job, "begun")
+    later = queue.Queue(lambda: None)
+    later.restore(read_record(remembered(tmp_path / "jobs.json")[0]))
+    assert later.jobs[0].state == queue.RUNNING and later.jobs[0].tail == ["begun"]
+    if done:
+        (tmp_path / "a" / "point_cloud.ply").touch()
+    later.stop(later.jobs[0])
+    step_until(jobs, job, queue.STOPPED)
+    later.step()
+    assert later.jobs[0].state == (queue.DONE if done else queue.STOPPED)
+
+
+def test_another_process_of_that_number_is_left_alone(jobs, tmp_path: Path) -> None:
+    with subprocess.Popen(["sleep", "60"], start_new_session=True) as child:
+        stranger = Process(child.pid, "born at another time")
+        assert not stranger.running()
+        stranger.interrupt()
+        stranger.kill()
+        assert child.poll() is None
+        child.kill()
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda row: [],
+        lambda row: {**row, "schema": "other"},
+        lambda row: {**row, "kind": "rm"},
+        lambda row: {**row, "pid": "1"},
+        lambda row: {**row, "pid": -1},
+        lambda row: {**row, "settings": {**row["settings"], "shell": "rm -rf /"}},
+        lambda row: {**row, "settings": {**row["settings"], "seed": "0"}},
+        lambda row: {**row, "settings": {**row["settings"], "dataset": "relative"}},
+        lambda row: {**row, "settings": {**row["settings"], "out": "/elsewhere"}},
+        lambda row: {**row, "settings": {"out": row["settings"]["out"]}},
+    ],
+)
+def test_records_from_anywhere_are_refused_in_one_line(
+    jobs, tmp_path: Path, damage, program
+) -> None:
+    job = jobs.add(plan(tmp_path, "a"), program("quick"))
+    file = record_file(job.plan)
+    file.write_text(json.dumps(damage(json.loads(file.read_text()))))
+    with pytest.raises(AddonError) as caught:
+        read_record(file)
+    assert "\n" not in str(caught.value) and str(file) in str(caught.value)
+
+
+def test_plans_come_back_and_values_cannot_become_options(tmp_path: Path) -> None:
+    made = GeneratePlan(
+        str(tmp_path), "/a b.blend", radios="wifi, mmwave", frames="--help", depth=1
+    )
+    assert plan_of_json(json.loads(json.dumps(plan_to_json(made))), tmp_path) == made
+    command = made.arguments()
+    assert "/a b.blend" in command and "--frames=--help" in command
+    assert [text for text in command if text.startswith("--radio")] == [
+        "--radio=wifi",
+        "--radio=mmwave",
+    ]
+    with pytest.raises(AddonError, match="no radio"):
+        GeneratePlan(str(tmp_path), "/a.blend", radios=" ,").arguments()
+
+
+def test_bars_of_the_programs_are_read(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setenv("PYTHONHOME", "/nowhere")
+    log = tmp_path / "log"
+    code = (
+        "from tqdm import tqdm; import time; print('first')\n"
+        "with tqdm(desc='export', unit='frame') as bar: bar.total = 2; bar.update(2)\n"
+        "bar = tqdm(total=40, desc='trace wifi', mininterval=0); bar.update(0)\n"
+        "for _ in range(10): time.sleep(0.02); bar.update()\n"
+        "print('\\nlast'); import os; os._exit(0)\n"
+    )
+    process = Process.start([sys.executable, "-c", code], log)
+    while process.running():
+        time.sleep(0.05)
+    progress, tail = read_log(log)
+    assert process.code == 0 and tail == ["first", "last"], log.read_text()
+    assert progress.stage == "trace wifi" and (progress.done, progress.total) == (10, 40)
+    assert 0 < progress.left_s <= 10 and progress.share == 0.25
+
+
+def test_logs_of_any_bytes_are_read(tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    log.write_bytes(os.urandom(50_000) + b"\rprogress 3 7 75 render: \r\x1b[Aend\n")
+    progress, tail = read_log(log, 1)
+    assert str(progress) == "render 3/7, 1:15 left" and tail == ["end"]
+    assert str(Progress("export", 7, 7, 0)) == "export 7/7"
+    assert read_log(tmp_path / "none") == (None, [])
+
+
+def test_interpreters_are_found_and_others_refused(tmp_path: Path) -> None:
+    folder = tmp_path / "venv"
+    (folder / "bin").mkdir(parents=True)
+    (folder / "bin" / "python").symlink_to(sys.executable)
+    assert environment.interpreter(str(folder)) == folder / "bin" / "python"
+    assert environment.interpreter(str(folder / "bin" / "python")) == folder / "bin" / "python"
+    (tmp_path / "text").write_text("")
+    for path, words in (
+        ("", "no Python environment is set"),
+        (tmp_path, "no bin/python"),
+        (tmp_path / "gone", "no such file"),
+        (tmp_path / "text", "not a program"),
+    ):
+        with pytest.raises(AddonError, match=words):
+            environment.interpreter(str(path))
+
+
+@pytest.mark.parametrize(
+    ("code", "output", "words"),
+    [
+        (None, "", "does not answer"),
+        (1, "", "it said nothing"),
+        (2, "ls: no such file", "ls: no such file"),
+        (0, "rfgs-environment {", "no Python that works"),
+        (0, 'rfgs-environment {"versions": [], "problems": []}', "no Python that works"),
+        (0, 'rfgs-environment {"versions": {"rfgs": ""}, "problems": []}', "rfgs is not installed"),
+    ],
+)
+def test_wrong_environments_are_explained(code, output: str, words: str) -> None:
+    _, problems = environment.read_check(code, output)
+    assert problems and words in problems[0] and "\n" not in problems[0]
+
+
+def test_this_environment_is_ready() -> None:
+    command = environment.check_arguments(Path(sys.executable))
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    versions, problems = environment.read_check(done.returncode, done.stdout)
+    assert not problems and any(line.startswith("torch 2") for line in versions)
+
+
+def test_operators_refuse_in_one_line_what_they_cannot_do() -> None:
+    addon_rfgs.register()
+    try:
+        for name, words in (
+            ("generate_dataset", "never saved"),
+            ("test_environment", "no Python environment is set"),
+        ):
+            with pytest.raises(RuntimeError, match=words):
+                getattr(bpy.ops.rfgs, name)()
+        for name in ("stop_job", "resume_job", "forget_job", "import_result"):
+            assert not getattr(bpy.ops.rfgs, name).poll()
+        assert not bpy.app.timers.is_registered(following._tick)
+        following.follow()
+        assert bpy.app.timers.is_registered(following._tick)
+    finally:
+        addon_rfgs.unregister()
+    assert not bpy.app.timers.is_registered(following._tick)
+
+
+def test_the_log_lies_in_the_output_folder(tmp_path: Path) -> None:
+    made = plan(tmp_path, "run")
+    assert log_file(made) == tmp_path / "run" / "log" / "job_train.log"

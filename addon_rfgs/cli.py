@@ -17,7 +17,7 @@ import bpy
 from .devices.commands import add_devices
 from .errors import AddonError
 from .export.commands import add_export
-from .gaussians.commands import add_import
+from .gaussians.commands import add_export_gaussians, add_import
 from .jobs.commands import (
     add_environment,
     add_evaluate,
@@ -33,6 +33,7 @@ _COMMANDS = (
     add_devices,
     add_export,
     add_import,
+    add_export_gaussians,
     add_environment,
     add_generate,
     add_train,

@@ -59,9 +59,6 @@ def import_gaussians(scene: bpy.types.Scene, path: Path, wanted: Inspection) -> 
     Raises:
         AddonError: There is nothing to import, or a file is damaged; nothing has changed then.
     """
-    threshold = wanted.display.opacity_threshold
-    if not 0 <= threshold <= 1:
-        raise AddonError(f"opacity threshold: expected 0 to 1, got {threshold}")
     meshes: list[bpy.types.Mesh] = []
     try:
         for frame, file in _find_files(path):
@@ -96,6 +93,13 @@ def clouds_in_file() -> list[bpy.types.Object]:
     if not found:
         raise AddonError("no imported Gaussians in this file")
     return found
+
+
+def chosen_clouds(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The selected clouds, else all that are seen at this frame."""
+    items = clouds_in_file()
+    chosen = [item for item in items if item in context.selected_objects]
+    return chosen or [item for item in items if not item.hide_viewport]
 
 
 def _find_files(path: Path) -> list[tuple[int | None, Path]]:

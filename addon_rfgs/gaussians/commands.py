@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The command `import`."""
+"""The commands `import` and `export-gaussians`."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from typing import Any, TextIO
 import bpy
 
 from ..errors import AddonError
-from .clouds import Inspection
-from .coloring import Coloring
-from .display import Display
+from ..naming import closest
+from .clouds import clouds_in_file
+from .export_ply import export_gaussians
 from .import_run import Picture, import_run
 from .nodes import NO_POWER_DB
 from .settings import COLOR_MODES, INTERPOLATIONS
@@ -35,7 +35,7 @@ def add_import(commands: Any) -> None:
     load.add_argument("--samples", type=int, default=16, help="samples per pixel (16)")
     load.add_argument("--mode", choices=("points", "ellipsoids"), default="points")
     load.add_argument("--size", type=float, default=1.0, help="factor on the size drawn (1)")
-    load.add_argument("--opacity-threshold", type=float, default=0.005, help="hide below (0.005)")
+    load.add_argument("--opacity-threshold", type=_share, default=0.005, help="hide below (0.005)")
     load.add_argument(
         "--power-threshold", type=float, default=NO_POWER_DB, metavar="DB", help="hide weaker ones"
     )
@@ -57,7 +57,36 @@ def add_import(commands: Any) -> None:
         default="hold",
         help="what is seen between recorded frames (hold)",
     )
+    load.add_argument(
+        "--compare",
+        action="store_true",
+        help="colour by distance to what moves, all frames; tells mean and median",
+    )
     load.set_defaults(run=_import)
+
+
+def add_export_gaussians(commands: Any) -> None:
+    """Adds `export-gaussians` to the commands."""
+    save = commands.add_parser(
+        "export-gaussians",
+        help="write imported Gaussians back as a PLY",
+        description="Writes clouds of the file as one binary 3DGS PLY. Points deleted or moved in "
+        "edit mode and the object's transform are taken over; every other property of the PLY "
+        "that was imported, spherical harmonics and unknown ones too, is written bit for bit.",
+    )
+    save.add_argument("out", type=Path, help="PLY to write")
+    save.add_argument("--frame", type=int, help="clouds seen at this frame (default: the file's)")
+    save.add_argument(
+        "--object", action="append", metavar="NAME", help="this cloud alone; repeatable"
+    )
+    save.set_defaults(run=_export_gaussians)
+
+
+def _share(text: str) -> float:
+    value = float(text)
+    if not 0 <= value <= 1:
+        raise ValueError
+    return value
 
 
 def _names(items: list[tuple[str, str, str, int]]) -> list[str]:
@@ -65,26 +94,46 @@ def _names(items: list[tuple[str, str, str, int]]) -> list[str]:
 
 
 def _import(options: argparse.Namespace, out: TextIO) -> str:
-    display = Display(
-        options.mode,
-        options.opacity_threshold,
-        options.power_threshold,
-        options.size,
-        options.solid_view,
-        _empty(options.crop_box),
-    )
-    limits = tuple(options.range) if options.range else None
-    coloring = Coloring(options.color_by.upper(), limits, options.attribute)
-    timing = options.frame_offset, options.interpolation.upper()
+    # Kept in the file, so that its panel says what is shown.
+    settings = bpy.context.scene.rfgs.gaussians
+    settings.path = str(options.path.resolve())
+    settings.display_mode, settings.size = options.mode, options.size
+    settings.opacity_threshold = options.opacity_threshold
+    settings.power_threshold_db = options.power_threshold
+    settings.solid_view = options.solid_view
+    settings.crop_box = _empty(options.crop_box)
+    settings.use_crop = options.crop_box is not None
+    settings.color_by, settings.color_attribute = options.color_by.upper(), options.attribute
+    settings.use_range = options.range is not None
+    if options.range:
+        settings.range_low, settings.range_high = options.range
+    settings.frame_offset = options.frame_offset
+    settings.interpolation = options.interpolation.upper()
     return import_run(
         bpy.context.scene,
         options.path,
-        Inspection(display, coloring, *timing),
+        settings.inspection(),
         blend=options.out,
         picture=Picture(options.picture, options.camera, options.resolution, options.samples)
         if options.picture
         else None,
+        compare=options.compare,
     )
+
+
+def _export_gaussians(options: argparse.Namespace, out: TextIO) -> str:
+    scene, clouds = bpy.context.scene, clouds_in_file()
+    if options.frame is not None:
+        scene.frame_set(options.frame)
+    if options.object:
+        known = {item.name: item for item in clouds}
+        for name in options.object:
+            if name not in known:
+                raise AddonError(f"--object: no cloud {name!r}{closest(name, known)}")
+        chosen = [known[name] for name in options.object]
+    else:
+        chosen = [item for item in clouds if not item.hide_viewport]
+    return f"wrote {options.out}: {export_gaussians(scene, chosen, options.out)} Gaussians"
 
 
 def _empty(name: str | None) -> bpy.types.Object | None:

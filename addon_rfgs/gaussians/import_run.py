@@ -22,6 +22,7 @@ from ..scene.state import Keeper, kept, show_what_renders
 from ..scene.survey import survey
 from .attributes import positions
 from .clouds import Imported, Inspection, import_gaussians
+from .compare import compare_with_mesh
 from .display import Display, shown
 
 #: Gaussians that vote for the picture's camera.
@@ -52,8 +53,9 @@ def import_run(
     wanted: Inspection,
     blend: Path | None = None,
     picture: Picture | None = None,
+    compare: bool = False,
 ) -> str:
-    """Imports, saves and renders; returns one line about it.
+    """Imports, compares, saves and renders; returns one line about it.
 
     Raises:
         AddonError: Nothing to import, nothing to write, or an unknown camera.
@@ -66,9 +68,13 @@ def import_run(
             f"{', '.join(sorted(_cameras(scene))) or 'none'}"
         )
     imported = import_gaussians(scene, path, wanted)
+    done = [f"imported {imported.count} Gaussians in {len(imported.objects)} clouds"]
+    if compare:
+        found = compare_with_mesh(scene, imported.objects, wanted.display, every_frame=True)
+        scene.rfgs.gaussians.color_by = "ERROR"  # acts at once
+        done.append(found.sentence())
     if imported.frames:
         scene.frame_set(imported.frames[len(imported.frames) // 2])
-    done = [f"imported {imported.count} Gaussians in {len(imported.objects)} clouds"]
     if blend is not None:
         with replacing(blend) as temporary:
             bpy.ops.wm.save_as_mainfile(filepath=str(temporary.resolve()), compress=True, copy=True)

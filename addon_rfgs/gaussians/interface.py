@@ -2,7 +2,11 @@
 """Operators and panels of this folder, in the order they are registered."""
 
 from . import panel
-from .operators import RFGS_OT_import_gaussians
+from .operators import (
+    RFGS_OT_compare_gaussians,
+    RFGS_OT_export_gaussians,
+    RFGS_OT_import_gaussians,
+)
 from .view_operators import (
     RFGS_OT_add_crop_box,
     RFGS_OT_color_solid_view,
@@ -11,6 +15,8 @@ from .view_operators import (
 
 CLASSES = (
     RFGS_OT_import_gaussians,
+    RFGS_OT_export_gaussians,
+    RFGS_OT_compare_gaussians,
     RFGS_OT_update_display,
     RFGS_OT_color_solid_view,
     RFGS_OT_add_crop_box,

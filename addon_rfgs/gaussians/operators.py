@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Buttons that bring Gaussians in, write them out and compare them."""
 
+from typing import Any
+
 import bpy
 
 from ..reporting import Progress, Reporting, chosen_path
-from .clouds import import_gaussians
+from .clouds import chosen_clouds, clouds_in_file, import_gaussians
+from .compare import compare_with_mesh
+from .export_ply import export_gaussians
+from .with_clouds import WithClouds
 
 
 class RFGS_OT_import_gaussians(Reporting, bpy.types.Operator):
@@ -19,3 +24,62 @@ class RFGS_OT_import_gaussians(Reporting, bpy.types.Operator):
         settings = context.scene.rfgs.gaussians
         done = import_gaussians(context.scene, chosen_path(settings.path), settings.inspection())
         return f"Imported {done.count} Gaussians in {len(done.objects)} clouds"
+
+
+class RFGS_OT_export_gaussians(WithClouds, bpy.types.Operator):
+    """Write the selected clouds, or those seen at this frame, as one 3DGS PLY."""
+
+    bl_idname = "rfgs.export_gaussians"
+    bl_label = "Export Gaussians"
+    bl_options = {"REGISTER"}  # noqa: RUF012
+
+    filepath: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="File", description="PLY to write", subtype="FILE_PATH"
+    )
+    filter_glob: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Filter", description="Which files are listed", default="*.ply", options={"HIDDEN"}
+    )
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[Any]:
+        """Asks where to."""
+        if not self.filepath:
+            self.filepath = f"{chosen_clouds(context)[0].name.replace(' ', '_')}.ply"
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def work(self, context: bpy.types.Context, _progress: Progress) -> str:
+        """Writes the file."""
+        path = chosen_path(self.filepath)
+        count = export_gaussians(context.scene, chosen_clouds(context), path)
+        return f"Wrote {count} Gaussians to {path}"
+
+
+class RFGS_OT_compare_gaussians(WithClouds, bpy.types.Operator):
+    """Colour Gaussians by their distance to the true meshes, and report its mean and median."""
+
+    bl_idname = "rfgs.compare_gaussians"
+    bl_label = "Compare with Mesh"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    every_frame: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="All frames",
+        description="Compare the cloud of every frame, not only what is seen now; takes a while",
+        default=False,
+    )
+
+    def work(self, context: bpy.types.Context, progress: Progress) -> str:
+        """Measures and colours."""
+        settings, clouds = context.scene.rfgs.gaussians, clouds_in_file()
+        selected = [
+            item for item in context.selected_objects if item.type == "MESH" and item not in clouds
+        ]
+        found = compare_with_mesh(
+            context.scene,
+            clouds,
+            settings.display(),
+            selected if settings.compare_with == "SELECTED" else None,
+            self.every_frame,
+            progress,
+        )
+        settings.color_by = "ERROR"
+        return found.sentence()

@@ -21,6 +21,7 @@ class RFGS_PT_gaussians(Tab, bpy.types.Panel):
         layout.use_property_decorate = False
         layout.prop(settings, "path")
         layout.operator("rfgs.import_gaussians", icon="IMPORT")
+        layout.operator("rfgs.export_gaussians", icon="EXPORT")
         item = context.object
         if item is not None and item.type == "MESH" and FRAME in item.data:
             layout.label(text=f"{item.name}: recorded at frame {item.data[FRAME]}", icon="INFO")
@@ -102,10 +103,26 @@ class RFGS_PT_gaussians_timing(_Part, bpy.types.Panel):
     names = ("frame_offset", "interpolation")
 
 
+class RFGS_PT_gaussians_compare(_Part, bpy.types.Panel):
+    """How far Gaussians are from the true surface."""
+
+    bl_idname = "RFGS_PT_gaussians_compare"
+    bl_label = "Compare with Mesh"
+    names = ("compare_with",)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Shows the choice of meshes and the buttons."""
+        super().draw(context)
+        row = self.layout.row(align=True)
+        row.operator("rfgs.compare_gaussians", text="This Frame", icon="SNAP_NORMAL")
+        row.operator("rfgs.compare_gaussians", text="All Frames").every_frame = True
+
+
 CLASSES = (
     RFGS_PT_gaussians,
     RFGS_PT_gaussians_display,
     RFGS_PT_gaussians_color,
     RFGS_PT_gaussians_crop,
     RFGS_PT_gaussians_timing,
+    RFGS_PT_gaussians_compare,
 )

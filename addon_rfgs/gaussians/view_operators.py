@@ -5,27 +5,19 @@ import bpy
 import numpy as np
 
 from ..errors import AddonError
-from ..reporting import Progress, Reporting
+from ..reporting import Progress
 from .attributes import positions
-from .clouds import COLLECTION, clouds_in_file
+from .clouds import clouds_in_file
 from .coloring import color_clouds
 from .display import set_display, shown
 from .timing import key_visibility
+from .with_clouds import WithClouds
 
 #: Share of the clouds' extent that the crop box leaves free around them.
 _MARGIN = 0.02
 
 
-class _WithClouds(Reporting):
-    """Needs imported Gaussians."""
-
-    @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        """Whether any were imported."""
-        return COLLECTION in bpy.data.collections
-
-
-class RFGS_OT_update_display(_WithClouds, bpy.types.Operator):
+class RFGS_OT_update_display(WithClouds, bpy.types.Operator):
     """Apply all settings of display, colour and timing to Gaussians that are already here."""
 
     bl_idname = "rfgs.update_display"
@@ -43,7 +35,7 @@ class RFGS_OT_update_display(_WithClouds, bpy.types.Operator):
         return f"Updated {len(items)} clouds{ramp}"
 
 
-class RFGS_OT_color_solid_view(_WithClouds, bpy.types.Operator):
+class RFGS_OT_color_solid_view(WithClouds, bpy.types.Operator):
     """Make real meshes of the Gaussians and colour them in this Solid view, no other view."""
 
     bl_idname = "rfgs.color_solid_view"
@@ -61,7 +53,7 @@ class RFGS_OT_color_solid_view(_WithClouds, bpy.types.Operator):
         return "Gaussians are coloured in this Solid view"
 
 
-class RFGS_OT_add_crop_box(_WithClouds, bpy.types.Operator):
+class RFGS_OT_add_crop_box(WithClouds, bpy.types.Operator):
     """Add an Empty around the visible Gaussians and show only what is inside its cube."""
 
     bl_idname = "rfgs.add_crop_box"

@@ -111,8 +111,15 @@ def survey(
 
 
 def surface_of(scene: bpy.types.Scene, item: bpy.types.Object) -> Surface:
-    """The surface of one object at the current frame."""
-    return next(_first_look(*found) for found in _instances(scene) if found[3] == item)
+    """The surface of one object at the current frame.
+
+    Raises:
+        AddonError: It has no faces that render.
+    """
+    for found in _instances(scene):
+        if found[3] == item:
+            return _first_look(*found)
+    raise AddonError(f"{item.name}: has no faces that render at frame {scene.frame_current}")
 
 
 def positions(scene: bpy.types.Scene, surfaces: list[Surface], frame: int) -> dict[str, np.ndarray]:

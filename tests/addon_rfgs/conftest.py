@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -32,3 +32,27 @@ def scenes(python: Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def results(scenes: Path) -> dict[str, Any]:
     """What happened to each scene."""
     return json.loads((scenes / "results.json").read_text())
+
+
+@pytest.fixture(scope="session")
+def registered() -> Iterator[None]:
+    """The add-on, switched on; for tests that run inside Blender."""
+    import addon_rfgs
+
+    addon_rfgs.register()
+    yield
+    addon_rfgs.unregister()
+
+
+@pytest.fixture
+def settings(registered: None, tmp_path: Path) -> Any:
+    """The Gaussians panel's settings, after a run of three frames was imported."""
+    import bpy
+    from splat_files import write_run
+    from splat_scene import FRAMES
+
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    found = bpy.context.scene.rfgs.gaussians
+    found.path = str(write_run(tmp_path / "run", FRAMES))
+    assert bpy.ops.rfgs.import_gaussians() == {"FINISHED"}
+    return found

@@ -9,34 +9,13 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from splat_files import BARE, COLUMNS, rows_of, write, write_run
+from splat_files import BARE, COLUMNS, rows_of, write
+from splat_scene import FRAMES, cloud
 
-import addon_rfgs
 from addon_rfgs.gaussians import attributes, color_maps
 from addon_rfgs.gaussians.display import shown
 
-FRAMES = (2, 5, 9)
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _registered():
-    addon_rfgs.register()
-    yield
-    addon_rfgs.unregister()
-
-
-@pytest.fixture
-def settings(tmp_path: Path):
-    """The panel's settings, after a run of three frames was imported."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    found = bpy.context.scene.rfgs.gaussians
-    found.path = str(write_run(tmp_path / "run", FRAMES))
-    assert bpy.ops.rfgs.import_gaussians() == {"FINISHED"}
-    return found
-
-
-def cloud(frame: int) -> bpy.types.Object:
-    return bpy.data.objects[f"Gaussians {frame:06d}"]
+pytestmark = pytest.mark.usefixtures("registered")
 
 
 def geometry(item: bpy.types.Object):

@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 from splat_files import BARE, COLUMNS, FORMATS, REST, rows_of, write, write_run
 
-import addon_rfgs
 from addon_rfgs.errors import AddonError
 from addon_rfgs.gaussians import cloud_mesh, features, ply, splats
 from addon_rfgs.gaussians.clouds import Inspection, import_gaussians
+
+pytestmark = pytest.mark.usefixtures("registered")
 
 
 def test_gaussians_written_by_plyfile_are_read_with_activations(tmp_path: Path) -> None:
@@ -224,10 +225,3 @@ def test_hostile_features_run_nothing_and_allocate_nothing(tmp_path: Path) -> No
         np.lib.format.write_array_header_1_0(stream, header)
     with pytest.raises(AddonError, match="features has shape"):
         features.read_features(tmp_path / "a.ply", 3)
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _registered():
-    addon_rfgs.register()
-    yield
-    addon_rfgs.unregister()

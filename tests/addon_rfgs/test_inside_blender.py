@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 
-@pytest.mark.parametrize("name", ["blender", "ply", "gaussians"])
+@pytest.mark.parametrize("name", ["blender", "ply", "gaussians", "edited_clouds"])
 def test_all_tests_inside_blender_pass(python, name: str) -> None:
     inner = Path(__file__).with_name(f"inside_{name}.py")
     done = python("-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", inner)

@@ -9,9 +9,10 @@ import atexit
 import bpy
 
 from . import command, properties, registration
+from .devices import overlay
 from .jobs import following
 
-_MODULES = (properties, registration, command, following)
+_MODULES = (properties, registration, overlay, command, following)
 
 
 def register() -> None:

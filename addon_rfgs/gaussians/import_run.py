@@ -15,6 +15,7 @@ import numpy as np
 from ..errors import AddonError
 from ..export.groundtruth import can_denoise, keep_format, render_to
 from ..files import replacing
+from ..saving import save_copy
 from ..scene.cameras import look_at, picture_size
 from ..scene.frames import file_label
 from ..scene.lights import lights_ready
@@ -76,8 +77,7 @@ def import_run(
     if imported.frames:
         scene.frame_set(imported.frames[len(imported.frames) // 2])
     if blend is not None:
-        with replacing(blend) as temporary:
-            bpy.ops.wm.save_as_mainfile(filepath=str(temporary.resolve()), compress=True, copy=True)
+        save_copy(blend)
         done.append(f"wrote {blend}")
     if picture is not None:
         camera = render_picture(scene, imported, wanted.display, picture)

@@ -15,7 +15,8 @@ from build_scenes import room
 
 import addon_rfgs
 from addon_rfgs.cli import open_blend, run
-from addon_rfgs.devices import authoring, empties, layout, placement
+from addon_rfgs.devices import authoring, empties, layout, overlay, placement
+from addon_rfgs.devices.sketch import joined, sketch
 from addon_rfgs.errors import AddonError
 from addon_rfgs.scene.cameras import find_devices
 from addon_rfgs.scene.enclosure import enclosed
@@ -253,3 +254,35 @@ def test_mistakes_get_one_line(
 def test_help_is_printed(capfd: pytest.CaptureFixture) -> None:
     assert say("add", "--help") == 0
     assert "--rx-spacing-wavelengths" in capfd.readouterr().out
+
+
+@pytest.mark.parametrize("role", ["ACCESS_POINT", "TRANSMITTER", "RECEIVER"])
+def test_the_overlay_is_to_scale(role: str) -> None:
+    fields = {**RADIO_FIELDS["wifi"], "rx_spacing_m": 0.04}
+    pose = placement.Spot((1.0, 2.0, 3.0), pi / 2).pose()
+    lines = sketch(fields, role, pose)
+    for array, count in (("tx", 1), ("rx", 64)):
+        squares = getattr(lines, array).reshape(-1, 4, 2, 3)
+        if array not in layout.arrays_of(role):
+            assert len(squares) == 0
+            continue
+        assert len(squares) == count
+        # Each square closes around its element, in the plane across the boresight.
+        np.testing.assert_allclose(squares[:, :, 1], np.roll(squares[:, :, 0], -1, axis=1))
+        elements = layout.world_elements(fields, array, pose)
+        np.testing.assert_allclose(squares.mean(axis=(1, 2)), elements, atol=1e-12)
+        assert np.ptp(squares[..., 1]) == pytest.approx(0), "boresight is +y"
+    if role != "TRANSMITTER":
+        side = np.linalg.norm(lines.rx[0, 1] - lines.rx[0, 0])
+        assert 0 < side < 0.04, "neighbours do not touch"
+    start, tip = lines.boresight[0]
+    np.testing.assert_allclose((tip - start) / np.linalg.norm(tip - start), [0, 1, 0], atol=1e-12)
+    origin = [1, 2, 2.7] if role == "TRANSMITTER" else [1, 2, 3]
+    np.testing.assert_allclose(start, origin, atol=1e-12)
+    np.testing.assert_allclose(lines.boresight[1:, 1], np.tile(tip, (4, 1)))
+    both = joined([lines, lines])
+    assert len(both.boresight) == 2 * len(lines.boresight)
+
+
+def test_nothing_is_drawn_without_a_window() -> None:
+    assert bpy.app.background and not overlay._handles

@@ -65,11 +65,7 @@ class RFGS_PT_devices(Tab, bpy.types.Panel):
         """Shows buttons that add, the list, and buttons for what is selected."""
         layout, settings = self.layout, context.scene.rfgs.devices
         row = layout.row(align=True)
-        for role, text in (
-            ("TRANSMITTER", "Transmitter"),
-            ("RECEIVER", "Receiver"),
-            ("ACCESS_POINT", "Access Point"),
-        ):
+        for role, text in (("TRANSMITTER", "TX"), ("RECEIVER", "RX"), ("ACCESS_POINT", "AP")):
             row.operator("rfgs.add_device", text=text, icon=_ICONS[role]).role = role
         layout.operator_menu_enum("rfgs.place_radio", "radio", text="Place Preset", icon="ADD")
         row = layout.row()
@@ -79,11 +75,11 @@ class RFGS_PT_devices(Tab, bpy.types.Panel):
         side.operator("rfgs.duplicate_device", text="", icon="DUPLICATE")
         side.separator()
         side.operator_menu_enum("rfgs.mirror_device", "axis", text="", icon="MOD_MIRROR")
-        row = layout.row(heading="Overlay")
-        row.prop(settings, "overlay")
-        part = row.row()
+        row = layout.row(align=True)
+        row.prop(settings, "overlay", text="Antennas", toggle=True, icon="OVERLAY")
+        part = row.row(align=True)
         part.active = settings.overlay
-        part.prop(settings, "names")
+        part.prop(settings, "names", toggle=True)
 
 
 class RFGS_PT_object(Tab, bpy.types.Panel):

@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 # Installs a real Blender >= 5.0 into DIR (default .blender) from Debian unstable, beside the
 # running system and without touching it, and leaves the wrapper DIR/blender.
-# Falls back to Debian 13's 4.3 where unstable cannot be installed, and says which it took.
+# Falls back to Debian 13's 4.3 where unstable cannot be installed, and says which it took;
+# the second argument, sid or trixie, allows that one only.
 set -eu
 
-usage() { echo "usage: $0 [DIR]    installs Blender into DIR (default: .blender of this clone)"; }
+usage() { echo "usage: $0 [DIR [sid|trixie]]    installs Blender into DIR (default: .blender of this clone)"; }
 fail() { echo "error: $*" >&2; exit 2; }
 
 case "${1:-}" in
@@ -14,6 +15,11 @@ case "${1:-}" in
 esac
 clone=$(cd "$(dirname "$0")/.." && pwd)
 dir=${1:-$clone/.blender}
+wanted=${2:-}
+case "$wanted" in
+  "" | sid | trixie) ;;
+  *) usage >&2; exit 2 ;;
+esac
 
 version_of() { "$1" --version 2>/dev/null | sed -n 's/^Blender \([0-9][0-9.]*\).*/\1/p' | head -n 1; }
 
@@ -69,9 +75,14 @@ install_suite() {
   mv "$staging" "$dir/root"
 }
 
-suite=sid
+suite=${wanted:-sid}
 if [ -x "$dir/root/usr/bin/blender" ]; then
   suite="as installed before"
+elif [ -n "$wanted" ]; then
+  if ! install_suite "$wanted"; then
+    discard "$dir/.staging-$wanted"
+    fail "Debian $wanted cannot be installed here, see $dir/install-$wanted.log"
+  fi
 elif ! install_suite sid; then
   echo "Debian unstable cannot be installed here (see $dir/install-sid.log); trying Debian 13's Blender 4.3" >&2
   discard "$dir/.staging-sid"

@@ -26,6 +26,7 @@ from .jobs.commands import (
     add_stop,
     add_train,
 )
+from .paths.commands import add_paths
 from .scene.commands import add_check
 
 _COMMANDS = (
@@ -40,6 +41,7 @@ _COMMANDS = (
     add_evaluate,
     add_resume,
     add_stop,
+    add_paths,
 )
 
 #: Exit code of every mistake a user can repair.

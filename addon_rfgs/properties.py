@@ -10,6 +10,7 @@ from .devices.settings import RFGS_PG_devices
 from .export.settings import RFGS_PG_export
 from .gaussians.settings import RFGS_PG_gaussians
 from .jobs.settings import RFGS_PG_jobs
+from .paths.settings import RFGS_PG_paths
 from .tables import MATERIALS
 
 ROLES = [
@@ -112,6 +113,7 @@ class RFGS_PG_scene(bpy.types.PropertyGroup):
     export: bpy.props.PointerProperty(type=RFGS_PG_export)  # type: ignore[valid-type]
     gaussians: bpy.props.PointerProperty(type=RFGS_PG_gaussians)  # type: ignore[valid-type]
     jobs: bpy.props.PointerProperty(type=RFGS_PG_jobs)  # type: ignore[valid-type]
+    paths: bpy.props.PointerProperty(type=RFGS_PG_paths)  # type: ignore[valid-type]
 
 
 CLASSES_TO_REGISTER = (
@@ -122,6 +124,7 @@ CLASSES_TO_REGISTER = (
     RFGS_PG_export,
     RFGS_PG_gaussians,
     RFGS_PG_jobs,
+    RFGS_PG_paths,
     RFGS_PG_scene,
 )
 

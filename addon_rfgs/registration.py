@@ -8,9 +8,10 @@ from .export.interface import CLASSES as EXPORT
 from .gaussians.interface import CLASSES as GAUSSIANS
 from .jobs.interface import CLASSES as JOBS
 from .materials.interface import CLASSES as MATERIALS
+from .paths.interface import CLASSES as PATHS
 
 #: Panels appear in this order.
-_CLASSES = (*DEVICES, *MATERIALS, *EXPORT, *JOBS, *GAUSSIANS)
+_CLASSES = (*DEVICES, *MATERIALS, *EXPORT, *JOBS, *GAUSSIANS, *PATHS)
 
 
 def register() -> None:

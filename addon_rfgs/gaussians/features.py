@@ -3,15 +3,11 @@
 
 from __future__ import annotations
 
-import struct
-import tokenize
-import zipfile
-import zlib
 from pathlib import Path
 
 import numpy as np
-from numpy.lib import format as npy
 
+from ..array_file import array_file
 from ..errors import AddonError
 
 #: Array → kinds of numbers it may hold, and whether it has a second axis.
@@ -25,11 +21,6 @@ _ARRAYS = {
 }
 #: Most numbers per Gaussian of one array.
 _MAX_WIDTH = 256
-#: What zipfile, zlib and NumPy say of damaged files.
-_DAMAGE = (
-    zipfile.BadZipFile, zlib.error, tokenize.TokenError, struct.error, OSError, EOFError,
-    ValueError, KeyError, TypeError, SyntaxError, NotImplementedError, RuntimeError,
-)  # fmt: skip
 
 
 def read_features(ply: Path, count: int) -> dict[str, np.ndarray]:
@@ -48,30 +39,17 @@ def read_features(ply: Path, count: int) -> dict[str, np.ndarray]:
     path = ply.with_name(ply.stem + ".features.npz")
     if not path.is_file():
         return {}
-    try:
-        with zipfile.ZipFile(path) as archive:
-            names = [name for name in _ARRAYS if f"{name}.npy" in archive.namelist()]
-            return {name: _read(path, archive, name, count) for name in names}
-    except _DAMAGE as error:
-        raise AddonError(f"{path}: damaged array file ({' '.join(str(error).split())[:80]})") from (
-            error
-        )
+    with array_file(path) as arrays:
+        return {
+            name: arrays.read(name, lambda *found, name=name: _check(path, name, count, *found))
+            for name in _ARRAYS
+            if name in arrays
+        }
 
 
-def _read(path: Path, archive: zipfile.ZipFile, name: str, count: int) -> np.ndarray:
+def _check(path: Path, name: str, count: int, shape: tuple[int, ...], dtype: np.dtype) -> None:
     kinds, wide = _ARRAYS[name]
-    with archive.open(f"{name}.npy") as stream:
-        version = npy.read_magic(stream)
-        header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-        shape, fortran, dtype = header(stream)
-        if len(shape) != 1 + wide or shape[0] != count or max(shape[1:], default=1) > _MAX_WIDTH:
-            raise AddonError(
-                f"{path}: {name} has shape {list(shape)}; the PLY holds {count} Gaussians"
-            )
-        if dtype.kind not in kinds or dtype.hasobject:
-            raise AddonError(f"{path}: {name} holds {dtype}, which it cannot be")
-        size = int(np.prod(shape, dtype=np.int64)) * dtype.itemsize
-        data = stream.read(size)
-    if len(data) != size:
-        raise AddonError(f"{path}: {name} is cut short, {len(data)} of {size} bytes")
-    return np.frombuffer(data, dtype).reshape(shape, order="F" if fortran else "C")
+    if len(shape) != 1 + wide or shape[0] != count or max(shape[1:], default=1) > _MAX_WIDTH:
+        raise AddonError(f"{path}: {name} has shape {list(shape)}; the PLY holds {count} Gaussians")
+    if dtype.kind not in kinds:
+        raise AddonError(f"{path}: {name} holds {dtype}, which it cannot be")

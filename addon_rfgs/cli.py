@@ -27,6 +27,7 @@ from .jobs.commands import (
     add_train,
 )
 from .paths.commands import add_paths
+from .removal.commands import add_remove_data
 from .scene.commands import add_check
 
 _COMMANDS = (
@@ -42,6 +43,7 @@ _COMMANDS = (
     add_resume,
     add_stop,
     add_paths,
+    add_remove_data,
 )
 
 #: Exit code of every mistake a user can repair.

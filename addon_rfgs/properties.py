@@ -11,6 +11,7 @@ from .export.settings import RFGS_PG_export
 from .gaussians.settings import RFGS_PG_gaussians
 from .jobs.settings import RFGS_PG_jobs
 from .paths.settings import RFGS_PG_paths
+from .removal.stored import prune_properties
 from .tables import MATERIALS
 
 ROLES = [
@@ -145,3 +146,4 @@ def unregister() -> None:
     del bpy.types.Object.rfgs
     for cls in reversed(CLASSES_TO_REGISTER):
         bpy.utils.unregister_class(cls)
+    prune_properties()

@@ -9,9 +9,10 @@ from .gaussians.interface import CLASSES as GAUSSIANS
 from .jobs.interface import CLASSES as JOBS
 from .materials.interface import CLASSES as MATERIALS
 from .paths.interface import CLASSES as PATHS
+from .removal.interface import CLASSES as REMOVAL
 
 #: Panels appear in this order.
-_CLASSES = (*DEVICES, *MATERIALS, *EXPORT, *JOBS, *GAUSSIANS, *PATHS)
+_CLASSES = (*DEVICES, *MATERIALS, *EXPORT, *JOBS, *GAUSSIANS, *PATHS, *REMOVAL)
 
 
 def register() -> None:

@@ -34,8 +34,9 @@ class RFGS_UL_jobs(bpy.types.UIList):
         _active_property: str,
     ) -> None:
         """Shows state and title."""
-        layout.label(text=item.title, icon=_ICONS.get(item.state, "DOT"))
-        layout.label(text=item.state)
+        row = layout.split(factor=0.7)
+        row.label(text=item.title, icon=_ICONS.get(item.state, "DOT"))
+        row.label(text=item.state)
 
 
 class RFGS_PT_jobs(Tab, bpy.types.Panel):
@@ -53,7 +54,8 @@ class RFGS_PT_jobs(Tab, bpy.types.Panel):
         if not environment_path():
             layout.label(text="Choose a Python environment", icon="INFO")
             layout.prop(stored, "python", text="")
-        layout.operator("preferences.addon_show", icon="PREFERENCES").module = ADDON
+        shown = layout.operator("preferences.addon_show", icon="PREFERENCES", text="Preferences")
+        shown.module = ADDON
         draw_check(layout)
         if not stored.jobs:
             return

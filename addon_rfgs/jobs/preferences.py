@@ -84,8 +84,8 @@ def draw_check(layout: bpy.types.UILayout) -> None:
             box.label(text=line, icon="BLANK1" if number else "ERROR")
     if CHECK.versions and not CHECK.problems:
         box.label(text="Ready", icon="CHECKMARK")
-    for version in CHECK.versions:
-        box.label(text=version, icon="BLANK1")
+    for line in textwrap.wrap(", ".join(CHECK.versions), _LINE):
+        box.label(text=line, icon="BLANK1")
 
 
 def preferences() -> RFGS_AP_preferences | None:

@@ -8,13 +8,15 @@ handle events and to draw.
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import runpy
 import shutil
 import sys
+import time
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +24,7 @@ import bpy
 
 EXTENSION = "bl_ext.user_default.addon_rfgs"
 #: Pixels between the places where a button is looked for; buttons are 20 high.
-_SEARCH_PX = 9
+_SEARCH_PX = 13
 
 
 class Stage:
@@ -31,6 +33,8 @@ class Stage:
     def __init__(self, framebuffer: Path, out: Path, arguments: list[str]) -> None:
         self._framebuffer, self.out = framebuffer, out
         self.arguments = arguments
+        self.longest_s = 0.0
+        self._places: dict[str, tuple[int, int]] = {}
 
     @property
     def window(self) -> bpy.types.Window:
@@ -50,9 +54,14 @@ class Stage:
         found = next(item for item in area.regions if item.type == region)
         return bpy.context.temp_override(window=self.window, area=area, region=found)
 
-    def open_tab(self, *, alone: bool = True) -> Iterator[float]:
-        """Shows our tab with every panel unfolded; `alone` gives the 3D view the whole window."""
-        unfold_panels()
+    def open_tab(self, *only: str, alone: bool = True) -> Iterator[float]:
+        """Shows our tab.
+
+        Args:
+            *only: Panels that are unfolded, as in `RFGS_PT_jobs`; all of them if none is named.
+            alone: Give the 3D view the whole window.
+        """
+        unfold_panels(only)
         if alone:
             with self.override():
                 bpy.ops.screen.screen_full_area(use_hide_panels=True)
@@ -80,6 +89,20 @@ class Stage:
             crop = [place.x, self.window.height - place.y - place.height, place.width, place.height]
         (self.out / f"{name}.json").write_text(json.dumps({"crop": crop}))
 
+    def part(self, name: str) -> Any:
+        """A module of the extension, as in `jobs.following`."""
+        return importlib.import_module(f"{EXTENSION}.{name}")
+
+    def wait(self, until: Callable[[], bool], what: str, seconds: float = 400.0) -> Iterator[float]:
+        """Lets Blender go on until something is so; notes the longest time it did not answer."""
+        begin_s = last_s = time.monotonic()
+        while not until():
+            if time.monotonic() - begin_s > seconds:
+                raise TimeoutError(f"not within {seconds:g} s: {what}")
+            yield 0.1
+            self.longest_s = max(self.longest_s, time.monotonic() - last_s)
+            last_s = time.monotonic()
+
     def click(self, operator: str) -> Iterator[float]:
         """Finds the sidebar's button of an operator, say `rfgs.import_gaussians`, and clicks it."""
         found = yield from self._find(operator)
@@ -92,13 +115,21 @@ class Stage:
     def _find(self, operator: str) -> Iterator[float]:
         # Blender does not tell where buttons are, but which one is below the pointer.
         region = self.sidebar
+        place = self._places.get(operator)
+        if place is not None and (yield from self._hover(*place)) == operator:
+            return place
         for x in (region.x + region.width // 2, region.x + region.width // 6):
             for y in range(region.y + region.height - 10, region.y, -_SEARCH_PX):
-                self.window.event_simulate(type="MOUSEMOVE", value="NOTHING", x=x, y=y)
-                yield 0.02
-                if self._below_pointer() == operator:
+                seen = yield from self._hover(x, y)
+                self._places[seen] = (x, y)
+                if seen == operator:
                     return x, y
         return None
+
+    def _hover(self, x: int, y: int) -> Iterator[float]:
+        self.window.event_simulate(type="MOUSEMOVE", value="NOTHING", x=x, y=y)
+        yield 0.02
+        return self._below_pointer()
 
     def _below_pointer(self) -> str:
         manager = bpy.context.window_manager
@@ -109,13 +140,14 @@ class Stage:
         return manager.clipboard.removeprefix("bpy.ops.").partition("(")[0]
 
 
-def unfold_panels() -> None:
-    """Registers the extension again with no panel closed; Blender cannot be asked to open one."""
+def unfold_panels(only: tuple[str, ...] = ()) -> None:
+    """Registers the extension again with panels open; Blender cannot be asked to open one."""
     extension = sys.modules[EXTENSION]
     extension.unregister()
     for panel in our_panels():
-        options = getattr(panel, "bl_options", set())
-        panel.bl_options = set(options) - {"DEFAULT_CLOSED"}
+        options = set(getattr(panel, "bl_options", set())) - {"DEFAULT_CLOSED"}
+        folded = only and panel.__name__ not in only
+        panel.bl_options = options | {"DEFAULT_CLOSED"} if folded else options
     extension.register()
 
 

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Objects that this add-on made, and all that hangs on them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from ..devices.empties import COLLECTION as DEVICES
+from ..gaussians.clouds import COLLECTION as CLOUDS
+from ..gaussians.nodes import GROUP
+from ..paths.curves import COLLECTION as PATHS
+from ..paths.curves import clear_paths
+from .stored import remove_properties
+
+
+def remove_data() -> tuple[int, int]:
+    """Removes devices, Gaussians, paths and every property of this add-on from the file.
+
+    What a user put into collections of ours stays, and so do Empties of their own that were made
+    devices: they lose their radio.
+
+    Returns:
+        How many objects went, and how many things lost a property.
+    """
+    count = clear_paths()
+    for item in _objects():
+        _remove_object(item)
+        count += 1
+    for name in (DEVICES, CLOUDS, PATHS):
+        collection = bpy.data.collections.get(name)
+        if collection is not None and not collection.objects and not collection.children:
+            bpy.data.collections.remove(collection)
+    for rows in (bpy.data.node_groups, bpy.data.materials):
+        for row in [row for row in rows if row.name.startswith(GROUP)]:
+            if not row.users:
+                rows.remove(row)
+    return count, remove_properties()
+
+
+def _objects() -> list[bpy.types.Object]:
+    found = [item for item in bpy.data.objects if GROUP in item.modifiers]
+    devices = bpy.data.collections.get(DEVICES)
+    found += [item for item in devices.objects if item.rfgs.role != "NONE"] if devices else []
+    boxes = {scene.rfgs.gaussians.crop_box for scene in bpy.data.scenes}
+    return found + [box for box in boxes if box is not None and box.name.startswith("RFGS ")]
+
+
+def _remove_object(item: bpy.types.Object) -> None:
+    motion = item.animation_data
+    left: list[tuple[Any, Any]] = [(bpy.data.actions, motion.action if motion else None)]
+    if isinstance(item.data, bpy.types.Mesh):
+        left.append((bpy.data.meshes, item.data))
+    bpy.data.objects.remove(item)
+    for rows, row in left:
+        if row is not None and not row.users:
+            rows.remove(row)

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From the button to the imported result, in a real window, and over Blender's death."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+from window import play
+
+from rfgs_core.dataset import open_dataset
+
+pytestmark = [pytest.mark.blender, pytest.mark.slow]
+
+HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
+
+
+@pytest.fixture
+def environment(tmp_path: Path) -> Path:
+    """This Python with this tree, as a program."""
+    path = tmp_path / "python"
+    path.write_text(f'#!/bin/sh\nPYTHONPATH="{ROOT}" exec "{sys.executable}" "$@"\n')
+    path.chmod(0o755)
+    return path
+
+
+@pytest.fixture
+def tiny_blend(python, tmp_path: Path) -> Path:
+    """A box that walks through an empty room."""
+    builder = HERE.parent / "dataset_factory" / "build_tiny_scene.py"
+    python(builder, tmp_path / "tiny.blend", "moving", "concrete", "1.0", must_work=True)
+    return tmp_path / "tiny.blend"
+
+
+@pytest.fixture
+def factory_blender(blender, tmp_path: Path) -> Path:
+    """The Blender that the factory opens files with: the same one with the same settings."""
+    path = tmp_path / "blender"
+    resources = f'BLENDER_USER_RESOURCES="{blender.resources}"'
+    path.write_text(f'#!/bin/sh\n{resources} exec "{blender.program}" "$@"\n')
+    path.chmod(0o755)
+    return path
+
+
+def test_a_job_runs_from_the_button_to_the_import(
+    blender, environment: Path, factory_blender: Path, tiny_blend: Path, tmp_path: Path
+) -> None:
+    pictures = tmp_path / "pictures"
+    programs = (environment, factory_blender)
+    first = play(
+        *(blender, HERE / "play_jobs.py", tiny_blend, pictures, *programs, tmp_path),
+        size=(1400, 1500),
+        timeout=1200,
+    )
+    assert first.returncode == -9, first.stdout[-3000:] + first.stderr[-3000:]
+    assert "Traceback" not in first.stdout + first.stderr
+    told = json.loads((pictures / "told.json").read_text())
+    assert told["clouds"][1:] == [60] * 4, "a cloud per frame, beside the static one"
+    assert told["undone"] == [] and told["redone"] == told["clouds"]
+    # A frame of this window takes most of a second to draw without a GPU; jobs take minutes.
+    assert told["longest_s"] < 5.0
+
+    second = play(
+        *(blender, HERE / "play_restart.py", tiny_blend, pictures, *programs),
+        size=(1400, 1500),
+        timeout=900,
+    )
+    assert second.returncode == 0, second.stdout[-3000:] + second.stderr[-3000:]
+    whole, resumed = tmp_path / "dataset", tmp_path / "cut_off"
+    assert open_dataset(resumed).sequence().frames == [1, 2, 3, 4]
+    manifest = (whole / "MANIFEST.sha256").read_text()
+    assert (resumed / "MANIFEST.sha256").read_text() == manifest, "resumed to the same bytes"
+    shutil.rmtree(blender.resources / "extensions" / ".user", ignore_errors=True)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Adds the classes of every folder to Blender and takes them away again."""
 
+import inspect
+
 import bpy
 
 from .devices.interface import CLASSES as DEVICES
@@ -18,6 +20,8 @@ _CLASSES = (*DEVICES, *MATERIALS, *EXPORT, *JOBS, *GAUSSIANS, *PATHS, *REMOVAL)
 def register() -> None:
     """Adds the operators and panels."""
     for cls in _CLASSES:
+        if issubclass(cls, bpy.types.Operator) and "bl_description" not in vars(cls):
+            cls.bl_description = tooltip(cls.__doc__ or "")
         bpy.utils.register_class(cls)
 
 
@@ -25,3 +29,9 @@ def unregister() -> None:
     """Removes the operators and panels."""
     for cls in reversed(_CLASSES):
         bpy.utils.unregister_class(cls)
+
+
+def tooltip(docstring: str) -> str:
+    """A docstring as Blender wants it: a line per paragraph; the last full stop is Blender's."""
+    paragraphs = inspect.cleandoc(docstring).split("\n\n")
+    return "\n".join(" ".join(text.split()) for text in paragraphs).removesuffix(".")

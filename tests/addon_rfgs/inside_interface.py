@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every operator, panel and property of the add-on; `test_inside_interface.py` runs this file."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+
+import bpy
+import pytest
+
+import addon_rfgs
+from addon_rfgs.cli import parser, run
+
+#: Operator → the command that does the same; or, behind a dash, why there is none.
+COMMANDS = {
+    "add_crop_box": "- a box to be moved by hand",
+    "add_device": "devices add",
+    "clear_paths": "paths",
+    "color_solid_view": "- changes a 3D view",
+    "compare_gaussians": "import",
+    "duplicate_device": "devices duplicate",
+    "evaluate_run": "evaluate",
+    "export_bundle": "export",
+    "export_gaussians": "export-gaussians",
+    "forget_job": "- the list of jobs lives in the window",
+    "generate_dataset": "generate",
+    "import_gaussians": "import",
+    "import_result": "import",
+    "match_devices": "devices match",
+    "mirror_device": "devices mirror",
+    "place_radio": "devices preset",
+    "remove_data": "remove-data",
+    "remove_device": "devices remove",
+    "render_groundtruth": "groundtruth",
+    "resume_job": "resume",
+    "show_paths": "paths",
+    "stop_job": "stop",
+    "test_environment": "environment",
+    "train_gaussians": "train",
+    "update_display": "import",
+}
+#: Operators that leave the file as it is; all others can be undone.
+LEAVE_THE_FILE = {
+    *("evaluate_run", "export_bundle", "export_gaussians", "forget_job", "generate_dataset"),
+    *("render_groundtruth", "resume_job", "stop_job", "test_environment", "train_gaussians"),
+}
+
+
+@pytest.fixture(autouse=True)
+def registered() -> Iterator[None]:
+    addon_rfgs.register()
+    yield
+    addon_rfgs.unregister()
+
+
+def classes(base: type) -> list[type]:
+    """Registered classes of the add-on."""
+    found = [kind for kind in all_below(base) if kind.__module__.startswith("addon_rfgs.")]
+    return [kind for kind in found if kind.is_registered]
+
+
+def all_below(base: type) -> set[type]:
+    return {base, *(deeper for kind in base.__subclasses__() for deeper in all_below(kind))}
+
+
+def operators() -> dict[str, type]:
+    return {kind.bl_idname.removeprefix("rfgs."): kind for kind in classes(bpy.types.Operator)}
+
+
+def command_words(tree: argparse.ArgumentParser, before: str = "") -> dict[str, str]:
+    """Every command, those below others included, and what its help says."""
+    found = {}
+    for action in tree._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            helps = {choice.dest: choice.help or "" for choice in action._choices_actions}
+            for name, deeper in action.choices.items():
+                found[f"{before}{name}"] = helps.get(name, "")
+                found |= command_words(deeper, f"{before}{name} ")
+    return found
+
+
+def test_every_operator_has_a_command() -> None:
+    known = command_words(parser("rfgs"))
+    assert sorted(operators()) == sorted(COMMANDS)
+    wanted = {name for name in COMMANDS.values() if not name.startswith("- ")}
+    assert not wanted - set(known)
+    assert all(known.values()), "every command says what it does"
+
+
+def test_every_command_teaches_and_refuses(capfd: pytest.CaptureFixture[str]) -> None:
+    for name in command_words(parser("rfgs")):
+        assert run([*name.split(), "--help"]) == 0
+        assert "usage:" in capfd.readouterr().out, name
+        assert run([*name.split(), "--no-such-option"]) == 2
+        errors = capfd.readouterr().err.strip().splitlines()
+        assert len(errors) == 1 and errors[0].startswith("error: "), name
+
+
+def test_operators_follow_blenders_conventions() -> None:
+    for name, kind in operators().items():
+        assert kind.__name__ == f"RFGS_OT_{name}"
+        described = getattr(bpy.ops.rfgs, name).get_rna_type().description
+        assert described and not described.endswith(".") and "  " not in described, described
+        assert kind.bl_label == kind.bl_label.strip(".") and kind.bl_label[0].isupper(), name
+        assert ("UNDO" in getattr(kind, "bl_options", set())) == (name not in LEAVE_THE_FILE), name
+
+
+def test_panels_stand_in_our_tab() -> None:
+    panels = classes(bpy.types.Panel)
+    assert len(panels) > 8
+    for kind in panels:
+        assert kind.__name__.startswith("RFGS_PT_") and kind.bl_category == "RF-GS"
+    for kind in classes(bpy.types.UIList):
+        assert kind.__name__.startswith("RFGS_UL_")
+
+
+def test_every_property_says_what_it_is() -> None:
+    kinds = [
+        *classes(bpy.types.PropertyGroup),
+        *classes(bpy.types.Operator),
+        *classes(bpy.types.AddonPreferences),
+    ]
+    assert len(kinds) > 20
+    silent = []
+    for kind in kinds:
+        inherited = {"rna_type", "name", *kind.__base__.bl_rna.properties.keys()}
+        for spec in kind.bl_rna.properties:
+            if spec.identifier in inherited and spec.identifier not in own(kind):
+                continue
+            told = spec.description
+            if spec.type != "POINTER" and (not told or told.endswith(".") or not spec.name):
+                silent.append(f"{kind.__name__}.{spec.identifier}: {told!r}")
+    assert not silent
+
+
+def own(kind: type) -> set[str]:
+    return {name for base in kind.__mro__ for name in vars(base).get("__annotations__", {})}

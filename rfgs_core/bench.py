@@ -109,7 +109,9 @@ def bench_propagation(config: PropagationBench | None = None) -> dict[str, float
         "tuned_forward_s": tuned_forward_s,
         "tuned_forward_backward_s": tuned_s,
         **{field.name: getattr(config, field.name) for field in fields(config)},
-        **_hardware(),
+        **hardware(),
+        "torch_threads": torch.get_num_threads(),
+        "torch": torch.__version__,
     }
 
 
@@ -251,8 +253,8 @@ def _best(run: Callable[[], _Result], repeats: int) -> tuple[float, _Result]:
     return best_s, result
 
 
-def _hardware() -> dict[str, str | int]:
-    """Processor, cores and versions that the times belong to."""
+def hardware() -> dict[str, str | int]:
+    """Processor and number of cores that times belong to."""
     cpu_info = Path("/proc/cpuinfo")
     names = [
         line.split(":", 1)[1].strip()
@@ -262,6 +264,4 @@ def _hardware() -> dict[str, str | int]:
     return {
         "cpu": names[0] if names else platform.processor(),
         "cores": os.cpu_count() or 1,
-        "torch_threads": torch.get_num_threads(),
-        "torch": torch.__version__,
     }

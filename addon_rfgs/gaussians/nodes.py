@@ -17,6 +17,11 @@ POINT_RADIUS_M = 0.012
 #: A threshold of power that every Gaussian reaches [dB].
 NO_POWER_DB = -300.0
 
+#: Attributes that nothing is drawn from.
+_KEPT_FOR_FILES = ("ply_*", "f_*")
+#: Attributes that nothing is drawn from once shapes are there.
+_USED = ("rf_*", "opacity", "scale", "rotation", "radius", "gid", "body", "error_m")
+
 #: Input sockets: name, type, default, minimum, maximum, what it does.
 _INPUTS = (
     ("Ellipsoids", "NodeSocketBool", False, None, None, "Ellipsoids instead of equal points"),
@@ -65,13 +70,15 @@ def _build_group() -> Any:
     inputs, output = group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
     build = _Builder(group, inputs)
     cloud = group.nodes.new("GeometryNodeMeshToPoints")
-    build.link(_lean(build), cloud.inputs["Mesh"])
+    lean = _without(build, build.input("Geometry"), *_KEPT_FOR_FILES)
+    build.link(lean, cloud.inputs["Mesh"])
     build.link(_kept(build), cloud.inputs["Selection"])
     points = _points(build, cloud.outputs[0])
     shapes = _shapes(build, cloud.outputs[0])
     solid = build.input("Solid View")
     shown = build.switch(build.either(build.input("Ellipsoids"), solid), points, shapes)
-    build.link(build.switch(solid, shown, _real(build, shapes)), output.inputs["Geometry"])
+    real = _real(build, lean, shapes)
+    build.link(build.switch(solid, shown, real), output.inputs["Geometry"])
     for index, node in enumerate(group.nodes):
         node.location = (220 * (index % 8), -260 * (index // 8))
     return group
@@ -146,16 +153,18 @@ class _Builder:
         return node.outputs["Geometry"]
 
 
-def _lean(build: _Builder) -> Any:
-    """The cloud without what is kept for writing it back: copying that would cost time."""
-    node = build.nodes.new("GeometryNodeRemoveAttribute")
-    if hasattr(node, "pattern_mode"):
-        node.pattern_mode = "WILDCARD"
-    else:  # Blender 5.0 made it a socket.
-        node.inputs["Pattern Mode"].default_value = "Wildcard"
-    node.inputs["Name"].default_value = "ply_*"
-    build.link(build.input("Geometry"), node.inputs["Geometry"])
-    return node.outputs[0]
+def _without(build: _Builder, geometry: Any, *patterns: str) -> Any:
+    """The geometry without attributes of these names: copying them would cost time."""
+    for pattern in patterns:
+        node = build.nodes.new("GeometryNodeRemoveAttribute")
+        if hasattr(node, "pattern_mode"):
+            node.pattern_mode = "WILDCARD"
+        else:  # Blender 5.0 made it a socket.
+            node.inputs["Pattern Mode"].default_value = "Wildcard"
+        node.inputs["Name"].default_value = pattern
+        build.link(geometry, node.inputs["Geometry"])
+        geometry = node.outputs[0]
+    return geometry
 
 
 def _kept(build: _Builder) -> Any:
@@ -199,11 +208,14 @@ def _radius(build: _Builder) -> Any:
 
 def _shapes(build: _Builder, cloud: Any) -> Any:
     """One instanced sphere per Gaussian, coarse for the Solid view, stretched as an ellipsoid."""
-    sphere = build.nodes.new("GeometryNodeMeshIcoSphere")
-    build.link(build.switch(build.input("Solid View"), 3, 1, "INT"), sphere.inputs["Subdivisions"])
-    sphere.inputs["Radius"].default_value = 1.0
+    fine = build.nodes.new("GeometryNodeMeshIcoSphere")
+    fine.inputs["Subdivisions"].default_value, fine.inputs["Radius"].default_value = 3, 1.0
+    coarse = build.nodes.new("GeometryNodeMeshUVSphere")  # eight faces
+    coarse.inputs["Segments"].default_value, coarse.inputs["Rings"].default_value = 4, 2
+    coarse.inputs["Radius"].default_value = 1.0
+    sphere = build.switch(build.input("Solid View"), fine.outputs["Mesh"], coarse.outputs["Mesh"])
     smooth = build.nodes.new("GeometryNodeSetShadeSmooth")
-    build.link(sphere.outputs["Mesh"], smooth.inputs[0])
+    build.link(sphere, smooth.inputs[0])
     stretched = build.vector("SCALE", build.attribute("scale", "FLOAT_VECTOR"), build.input("Size"))
     ball = build.nodes.new("ShaderNodeCombineXYZ")
     for socket in ball.inputs:
@@ -217,7 +229,7 @@ def _shapes(build: _Builder, cloud: Any) -> Any:
     return node.outputs["Instances"]
 
 
-def _real(build: _Builder, shapes: Any) -> Any:
+def _real(build: _Builder, cloud: Any, shapes: Any) -> Any:
     """The shapes as one mesh whose active colour is the cloud's.
 
     One loose point of the cloud comes first: from it the mesh takes over which colour is
@@ -225,11 +237,11 @@ def _real(build: _Builder, shapes: Any) -> Any:
     """
     index = build.nodes.new("GeometryNodeInputIndex").outputs[0]
     rest = build.nodes.new("GeometryNodeDeleteGeometry")
-    build.link(_lean(build), rest.inputs["Geometry"])
+    build.link(cloud, rest.inputs["Geometry"])
     build.link(build.compare("GREATER_THAN", index, 0, "INT"), rest.inputs["Selection"])
     join = build.nodes.new("GeometryNodeJoinGeometry")
-    build.link(shapes, join.inputs[0])
-    build.link(rest.outputs[0], join.inputs[0])
+    for part in (shapes, rest.outputs[0]):
+        build.link(_without(build, part, *_USED), join.inputs[0])
     real = build.nodes.new("GeometryNodeRealizeInstances")
     build.link(join.outputs[0], real.inputs["Geometry"])
     return build.material(real.outputs[0], "GEOMETRY")

@@ -93,10 +93,10 @@ def test_solid_view_gets_real_meshes_with_an_active_colour(settings) -> None:
     for mode in ("points", "ellipsoids"):
         settings.display_mode = mode
         mesh = item.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-        assert len(mesh.vertices) == 40 * 12 + 1 and len(mesh.polygons) == 40 * 20
+        assert len(mesh.vertices) == 40 * 6 + 1 and len(mesh.polygons) == 40 * 8
         assert mesh.attributes.active_color.name == "rfgs_color"
-        found = attributes.get(mesh, "rfgs_color")[1:].reshape(40, 12, 4)
-        np.testing.assert_array_equal(found, np.repeat(found[:, :1], 12, axis=1))
+        found = attributes.get(mesh, "rfgs_color")[1:].reshape(40, 6, 4)
+        np.testing.assert_array_equal(found, np.repeat(found[:, :1], 6, axis=1))
         expected = attributes.get(item.data, "rfgs_color")
         np.testing.assert_allclose(np.sort(found[:, 0, 0]), np.sort(expected[:, 0]), atol=1e-6)
 

@@ -101,3 +101,15 @@ def blender(
     done = bare.run(*install, extension_zip)
     assert 'Installed "addon_rfgs"' in done.stdout, done.stdout + done.stderr
     return RealBlender(program, match[1], bare.resources)
+
+
+@pytest.fixture
+def programs(blender: RealBlender, tmp_path: Path) -> tuple[Path, Path]:
+    """What jobs are run by: this Python with this tree, and the Blender that opens files for it."""
+    environment, opener = tmp_path / "python", tmp_path / "blender"
+    environment.write_text(f'#!/bin/sh\nPYTHONPATH="{ROOT}" exec "{sys.executable}" "$@"\n')
+    resources = f'BLENDER_USER_RESOURCES="{blender.resources}"'
+    opener.write_text(f'#!/bin/sh\n{resources} exec "{blender.program}" "$@"\n')
+    for program in (environment, opener):
+        program.chmod(0o755)
+    return environment, opener

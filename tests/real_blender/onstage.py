@@ -58,7 +58,7 @@ class Stage:
         """Shows our tab.
 
         Args:
-            *only: Panels that are unfolded, as in `RFGS_PT_jobs`; all of them if none is named.
+            *only: Panels that are shown, as in `RFGS_PT_jobs`; all of them if none is named.
             alone: Give the 3D view the whole window.
         """
         unfold_panels(only)
@@ -141,14 +141,27 @@ class Stage:
 
 
 def unfold_panels(only: tuple[str, ...] = ()) -> None:
-    """Registers the extension again with panels open; Blender cannot be asked to open one."""
+    """Registers the extension again with every panel open; Blender cannot be asked to open one.
+
+    Args:
+        only: Panels that are shown; all of them if none is named.
+    """
     extension = sys.modules[EXTENSION]
     extension.unregister()
     for panel in our_panels():
-        options = set(getattr(panel, "bl_options", set())) - {"DEFAULT_CLOSED"}
-        folded = only and panel.__name__ not in only
-        panel.bl_options = options | {"DEFAULT_CLOSED"} if folded else options
+        panel.bl_options = set(getattr(panel, "bl_options", set())) - {"DEFAULT_CLOSED"}
+        own = _POLLS.setdefault(panel.__name__, getattr(panel, "poll", None))
+        if only and panel.__name__ not in only:
+            panel.poll = classmethod(lambda _cls, _context: False)
+        elif own is not None:
+            panel.poll = own
+        elif "poll" in vars(panel):
+            del panel.poll
     extension.register()
+
+
+#: Panel → its own `poll`.
+_POLLS: dict[str, Any] = {}
 
 
 def our_panels() -> list[type]:

@@ -9,6 +9,8 @@ import sys
 import zipfile
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -41,3 +43,28 @@ def test_add_on_imports_only_itself_numpy_and_the_standard_library() -> None:
                 assert {alias.name.split(".")[0] for alias in node.names} <= allowed, path
             elif isinstance(node, ast.ImportFrom) and node.level == 0:
                 assert str(node.module).split(".")[0] in allowed, path
+
+
+def test_add_on_reaches_for_no_network_shell_or_pickle() -> None:
+    banned = {"socket", "ssl", "http", "urllib", "ftplib", "smtplib", "xmlrpc", "pickle", "shelve"}
+    for path in (ROOT / "addon_rfgs").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.Import):
+                assert not {alias.name.split(".")[0] for alias in node.names} & banned, path
+            elif isinstance(node, ast.ImportFrom) and node.level == 0:
+                assert str(node.module).split(".")[0] not in banned, path
+            elif isinstance(node, ast.Call):
+                assert not any(row.arg in {"shell", "allow_pickle"} for row in node.keywords), path
+                name = ast.unparse(node.func)
+                assert name not in {"eval", "exec", "os.system", "os.popen", "compile"}, path
+
+
+@pytest.mark.blender
+def test_blender_itself_builds_and_validates(blender, tmp_path: Path) -> None:
+    made = tmp_path / "made.zip"
+    build = ("--source-dir", ROOT / "addon_rfgs", "--output-filepath", made)
+    done = blender.run("-b", "--command", "extension", "build", *build)
+    assert done.returncode == 0 and made.is_file(), done.stdout + done.stderr
+    for what in (made, ROOT / "addon_rfgs"):
+        done = blender.run("-b", "--command", "extension", "validate", what)
+        assert done.returncode == 0, done.stdout + done.stderr

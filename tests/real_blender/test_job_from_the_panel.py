@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 
 import pytest
@@ -15,16 +14,6 @@ from rfgs_core.dataset import open_dataset
 pytestmark = [pytest.mark.blender, pytest.mark.slow]
 
 HERE = Path(__file__).parent
-ROOT = HERE.parents[1]
-
-
-@pytest.fixture
-def environment(tmp_path: Path) -> Path:
-    """This Python with this tree, as a program."""
-    path = tmp_path / "python"
-    path.write_text(f'#!/bin/sh\nPYTHONPATH="{ROOT}" exec "{sys.executable}" "$@"\n')
-    path.chmod(0o755)
-    return path
 
 
 @pytest.fixture
@@ -35,21 +24,10 @@ def tiny_blend(python, tmp_path: Path) -> Path:
     return tmp_path / "tiny.blend"
 
 
-@pytest.fixture
-def factory_blender(blender, tmp_path: Path) -> Path:
-    """The Blender that the factory opens files with: the same one with the same settings."""
-    path = tmp_path / "blender"
-    resources = f'BLENDER_USER_RESOURCES="{blender.resources}"'
-    path.write_text(f'#!/bin/sh\n{resources} exec "{blender.program}" "$@"\n')
-    path.chmod(0o755)
-    return path
-
-
 def test_a_job_runs_from_the_button_to_the_import(
-    blender, environment: Path, factory_blender: Path, tiny_blend: Path, tmp_path: Path
+    blender, programs: tuple[Path, Path], tiny_blend: Path, tmp_path: Path
 ) -> None:
     pictures = tmp_path / "pictures"
-    programs = (environment, factory_blender)
     first = play(
         *(blender, HERE / "play_jobs.py", tiny_blend, pictures, *programs, tmp_path),
         size=(1400, 1500),

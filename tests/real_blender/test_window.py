@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from leaving_nothing import write_material
 from PIL import Image
 from window import play
 
@@ -34,3 +35,14 @@ def test_every_panel_is_drawn(blender, tiny_blend: Path, tmp_path: Path) -> None
     for picture in tmp_path.glob("*.png"):
         with Image.open(picture) as image:
             assert np.asarray(image.convert("L")).std() > 8, f"{picture} is blank"
+
+
+def test_every_change_can_be_undone(blender, tiny_blend: Path, tmp_path: Path) -> None:
+    write_material(tmp_path)
+    done = play(blender, HERE / "play_undo.py", tiny_blend, tmp_path, tmp_path)
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
+    told = json.loads((tmp_path / "undo.json").read_text())
+    # What these two do shows in modifiers and radios, not in what there is.
+    quiet = {"update_display", "match_devices"}
+    for name, (changed, undone, redone) in told.items():
+        assert undone and redone and (changed or name in quiet), (name, changed, undone, redone)

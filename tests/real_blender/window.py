@@ -33,7 +33,8 @@ def screen(folder: Path, size: tuple[int, int] = SIZE) -> Iterator[str]:
     reading, writing = os.pipe()
     server = subprocess.Popen(
         [
-            *(program, "-displayfd", str(writing), "-nolisten", "tcp", "-fbdir", str(folder)),
+            *(program, "-displayfd", str(writing), "-nolisten", "tcp", "-nocursor"),
+            *("-fbdir", str(folder)),
             *("-screen", "0", f"{size[0]}x{size[1]}x24"),
         ],
         pass_fds=[writing],

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Played inside Blender: the pictures of docs/blender.md, in the living room.
+
+Arguments: Python program of the environment, Blender program.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import bpy
+import mathutils
+
+FRAME = 25
+
+
+def play(stage: Any) -> Iterator[float]:
+    """Radios, a job, its Gaussians and its paths."""
+    bpy.context.scene.frame_set(FRAME)
+    yield from tab(stage, "RFGS_PT_devices")
+    look_from_above(stage)
+    yield from stage.shoot("overview", "VIEW")
+    yield from jobs(stage)
+    yield from gaussians(stage)
+    yield from paths(stage)
+
+
+def tab(stage: Any, *panels: str) -> Iterator[float]:
+    """Our tab with these panels, the 3D view in the whole window from the first time on."""
+    first = len(stage.window.screen.areas) > 1
+    yield from stage.open_tab(*panels, alone=first)
+
+
+def look_from_above(stage: Any) -> None:
+    """Takes the ceiling off, and what only animators want to see."""
+    for item in bpy.context.scene.objects:
+        if item.name.startswith(("ceiling", "pendant")):
+            item.hide_set(True)
+    space = stage.view.spaces.active
+    for name in ("armature", "camera", "light"):
+        setattr(space, f"show_object_viewport_{name}", False)
+    space.overlay.show_floor = space.overlay.show_axis_x = space.overlay.show_axis_y = False
+    space.shading.show_backface_culling = True
+    view = space.region_3d
+    view.view_perspective = "PERSP"
+    view.view_location = (0.6, 0.0, 0.6)
+    view.view_rotation = mathutils.Euler((0.75, 0.0, 0.5)).to_quaternion()
+    view.view_distance = 8.5
+
+
+def jobs(stage: Any) -> Iterator[float]:
+    """A dataset with ray paths, and Gaussians fitted to it."""
+    yield from tab(stage, "RFGS_PT_jobs", "RFGS_PT_generate", "RFGS_PT_train")
+    stored = stage.part("jobs.preferences").preferences()
+    stored.python, stored.blender = stage.arguments
+    bpy.ops.rfgs.test_environment()
+    check = stage.part("jobs.checking").CHECK
+    yield from stage.wait(lambda: bool(check.versions), "environment")
+    said = bpy.context.scene.rfgs.jobs
+    said.frames, said.images, said.paths = str(FRAME), False, True
+    bpy.ops.rfgs.generate_dataset()
+    bpy.ops.rfgs.train_gaussians()
+    queue = stage.part("jobs.following").QUEUE
+    begun = ("trace 1", "done")
+    yield from stage.wait(lambda: queue.jobs[0].message.startswith(begun), "tracing")
+    yield from stage.shoot("jobs", "SIDEBAR")
+    ended = ("Done", "Failed", "Stopped")
+    yield from stage.wait(lambda: all(job.state in ended for job in queue.jobs), "jobs")
+    told = [(job.state, job.message) for job in queue.jobs]
+    assert [state for state, _ in told] == ["Done", "Done"], told
+    stored.active_job = 1
+    bpy.ops.rfgs.import_result()
+
+
+def gaussians(stage: Any) -> Iterator[float]:
+    """Gaussians beside the person that they were fitted to."""
+    names = ("", "_display", "_color")
+    yield from tab(stage, *(f"RFGS_PT_gaussians{name}" for name in names))
+    said = bpy.context.scene.rfgs.gaussians
+    said.path, said.color_by = "//rfgs_run", "FEATURES"
+    with stage.override():
+        bpy.ops.rfgs.color_solid_view()
+    yield from stage.shoot("gaussians", "VIEW")
+    bpy.data.collections["RF-GS Gaussians"].hide_viewport = True
+    stage.view.spaces.active.shading.color_type = "MATERIAL"
+
+
+def paths(stage: Any) -> Iterator[float]:
+    """The strongest paths of one link."""
+    yield from tab(stage, "RFGS_PT_paths")
+    said = bpy.context.scene.rfgs.paths
+    said.tx_device, said.rx_device, said.count, said.radius_m = 0, 2, 40, 0.012
+    bpy.ops.rfgs.show_paths()
+    yield from stage.shoot("paths", "VIEW")

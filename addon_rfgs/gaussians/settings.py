@@ -8,6 +8,7 @@ from typing import Any
 import bpy
 
 from ..errors import AddonError
+from ..path_options import RELATIVE_PATH
 from .clouds import Inspection, clouds_in_file
 from .coloring import Coloring, color_clouds
 from .display import Display, set_display
@@ -74,6 +75,7 @@ class RFGS_PG_gaussians(bpy.types.PropertyGroup):
         description="A run folder, its gaussians folder or one 3DGS PLY",
         default="",
         subtype="FILE_PATH",
+        options=RELATIVE_PATH,
     )
     display_mode: bpy.props.EnumProperty(  # type: ignore[valid-type]
         name="Show as",
@@ -187,6 +189,7 @@ class RFGS_PG_gaussians(bpy.types.PropertyGroup):
         description="PNG of measured and predicted channels, as `rfgs csi` writes it",
         default="",
         subtype="FILE_PATH",
+        options=RELATIVE_PATH,
     )
 
     def display(self) -> Display:

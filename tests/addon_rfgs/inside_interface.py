@@ -4,13 +4,16 @@
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Iterator
+from pathlib import Path
 
 import bpy
 import pytest
 
 import addon_rfgs
 from addon_rfgs.cli import parser, run
+from addon_rfgs.path_options import RELATIVE_PATH
 
 #: Operator → the command that does the same; or, behind a dash, why there is none.
 COMMANDS = {
@@ -136,3 +139,24 @@ def test_every_property_says_what_it_is() -> None:
 
 def own(kind: type) -> set[str]:
     return {name for base in kind.__mro__ for name in vars(base).get("__annotations__", {})}
+
+
+def test_paths_of_settings_may_begin_at_the_file() -> None:
+    if not RELATIVE_PATH:
+        pytest.skip("this Blender does not ask")
+    paths = [
+        f"{kind.__name__}.{spec.identifier}"
+        for kind in classes(bpy.types.PropertyGroup)
+        for spec in kind.bl_rna.properties
+        if spec.type == "STRING" and spec.subtype in {"FILE_PATH", "DIR_PATH"}
+        if not spec.is_path_supports_blend_relative
+    ]
+    assert not paths
+
+
+def test_the_docs_name_every_command() -> None:
+    page = Path(addon_rfgs.__file__).parents[1] / "docs" / "blender.md"
+    prose = re.sub(r"```.*?```", "", page.read_text("utf-8"), flags=re.DOTALL)
+    words = {word for span in re.findall(r"`([^`\n]+)`", prose) for word in span.split()}
+    top = {name for name in command_words(parser("rfgs")) if " " not in name}
+    assert not sorted(top - words)

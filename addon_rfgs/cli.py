@@ -26,6 +26,7 @@ from .jobs.commands import (
     add_stop,
     add_train,
 )
+from .materials.commands import add_materials
 from .paths.commands import add_paths
 from .removal.commands import add_remove_data
 from .scene.commands import add_check
@@ -33,6 +34,7 @@ from .scene.commands import add_check
 _COMMANDS = (
     add_check,
     add_devices,
+    add_materials,
     add_export,
     add_import,
     add_export_gaussians,

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the add-on stores in a .blend: one property group each on objects, materials, scenes."""
-
-import zlib
+"""What the add-on stores: one property group each on objects, materials, scenes, windows."""
 
 import bpy
 
@@ -10,9 +8,11 @@ from .devices.settings import RFGS_PG_devices
 from .export.settings import RFGS_PG_export
 from .gaussians.settings import RFGS_PG_gaussians
 from .jobs.settings import RFGS_PG_jobs
+from .materials.coloring import restore
+from .materials.properties import RFGS_PG_guess, RFGS_PG_guesses, RFGS_PG_material
+from .materials.settings import RFGS_PG_materials
 from .paths.settings import RFGS_PG_paths
 from .removal.stored import prune_properties
-from .tables import MATERIALS
 
 ROLES = [
     ("NONE", "None", "Not a radio device", 0),
@@ -28,17 +28,6 @@ CLASSES = [
     ("VEHICLE", "Vehicle", "A rigid moving metal object", 3),
     ("IGNORE", "Ignore", "Invisible to radio and left out of the bundle", 4),
 ]
-
-
-def _material_items() -> list[tuple[str, str, str, int]]:
-    """Enum rows whose stored numbers follow from the name, so a longer table shifts nothing."""
-    items = [("AUTO", "Guess", "Guess the material from names and shape", 0)]
-    for name, row in MATERIALS.items():
-        band = f"{row['freq_min_hz'] / 1e9:g}–{row['freq_max_hz'] / 1e9:g} GHz"
-        number = zlib.crc32(name.encode()) & 0x7FFFFFFF
-        label = name.replace("_", " ").capitalize()
-        items.append((name, label, f"Valid {band}, {row['thickness_m']:g} m thick", number))
-    return items
 
 
 class RFGS_PG_object(bpy.types.PropertyGroup):
@@ -80,33 +69,6 @@ class RFGS_PG_object(bpy.types.PropertyGroup):
     )
 
 
-class RFGS_PG_material(bpy.types.PropertyGroup):
-    """Radio meaning of a material."""
-
-    radio_material: bpy.props.EnumProperty(  # type: ignore[valid-type]
-        name="Radio material",
-        description="Electrical model of this surface",
-        items=_material_items(),
-        default="AUTO",
-    )
-    thickness_m: bpy.props.FloatProperty(  # type: ignore[valid-type]
-        name="Thickness",
-        description="Thickness of the slab behind this surface [m]; 0 takes the material's own",
-        default=0.0,
-        min=0.0,
-        soft_max=1.0,
-        precision=4,
-        step=0.1,
-    )
-    scattering_coefficient: bpy.props.FloatProperty(  # type: ignore[valid-type]
-        name="Scattering",
-        description="Share of the reflected field's amplitude that is scattered diffusely, 0 to 1",
-        default=0.0,
-        min=0.0,
-        max=1.0,
-    )
-
-
 class RFGS_PG_scene(bpy.types.PropertyGroup):
     """Settings of the panels, a group for each."""
 
@@ -115,6 +77,13 @@ class RFGS_PG_scene(bpy.types.PropertyGroup):
     gaussians: bpy.props.PointerProperty(type=RFGS_PG_gaussians)  # type: ignore[valid-type]
     jobs: bpy.props.PointerProperty(type=RFGS_PG_jobs)  # type: ignore[valid-type]
     paths: bpy.props.PointerProperty(type=RFGS_PG_paths)  # type: ignore[valid-type]
+    materials: bpy.props.PointerProperty(type=RFGS_PG_materials)  # type: ignore[valid-type]
+
+
+class RFGS_PG_window(bpy.types.PropertyGroup):
+    """What lasts as long as the file is open, and is not saved in it."""
+
+    guesses: bpy.props.PointerProperty(type=RFGS_PG_guesses)  # type: ignore[valid-type]
 
 
 CLASSES_TO_REGISTER = (
@@ -126,7 +95,11 @@ CLASSES_TO_REGISTER = (
     RFGS_PG_gaussians,
     RFGS_PG_jobs,
     RFGS_PG_paths,
+    RFGS_PG_materials,
     RFGS_PG_scene,
+    RFGS_PG_guess,
+    RFGS_PG_guesses,
+    RFGS_PG_window,
 )
 
 
@@ -137,10 +110,13 @@ def register() -> None:
     bpy.types.Object.rfgs = bpy.props.PointerProperty(type=RFGS_PG_object)
     bpy.types.Material.rfgs = bpy.props.PointerProperty(type=RFGS_PG_material)
     bpy.types.Scene.rfgs = bpy.props.PointerProperty(type=RFGS_PG_scene)
+    bpy.types.WindowManager.rfgs = bpy.props.PointerProperty(type=RFGS_PG_window)
 
 
 def unregister() -> None:
     """Takes everything back that `register` added."""
+    restore()
+    del bpy.types.WindowManager.rfgs
     del bpy.types.Scene.rfgs
     del bpy.types.Material.rfgs
     del bpy.types.Object.rfgs

@@ -29,7 +29,7 @@ RADIO_DEFAULTS: dict[str, object] = _TABLES["radio_defaults"]
 #: What pattern, polarization and own_device_links may be.
 RADIO_CHOICES: dict[str, list[str]] = _TABLES["radio_choices"]
 
-#: Radio materials by name, each with freq_min_hz, freq_max_hz, thickness_m [m] and color.
+#: Radio materials by name, each with model, freq_min_hz, freq_max_hz, thickness_m [m] and color.
 MATERIALS: dict[str, dict] = {row["name"]: row for row in _TABLES["materials"]}
 
 #: Names of the 17 joints, in the order of every joint array.

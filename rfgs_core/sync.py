@@ -69,6 +69,7 @@ def tables() -> dict[str, Any]:
         "materials": [
             {
                 "name": material.name,
+                "model": material.model,
                 "freq_min_hz": material.freq_min_hz,
                 "freq_max_hz": material.freq_max_hz,
                 "thickness_m": material.thickness_m,

@@ -1,32 +1,102 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel of the active material."""
+"""The panels of radio materials: the active one, and the table of guesses."""
+
+from __future__ import annotations
+
+from typing import Any
 
 import bpy
 
+from ..scene.bands import out_of_band, used_bands, validity
 from ..tab import Tab
 from ..tables import MATERIALS
+from .coloring import colored
+from .properties import RFGS_PG_guess
 
 
 class RFGS_PT_material(Tab, bpy.types.Panel):
     """Radio meaning of the active object's material."""
 
     bl_idname = "RFGS_PT_material"
-    bl_label = "Radio Material"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """There is a material to speak of."""
-        return context.object is not None and context.object.active_material is not None
+    bl_label = "Radio Materials"
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Shows the electrical model and what replaces its defaults."""
-        layout, material = self.layout, context.object.active_material
+        """Shows the carrier, the electrical model and what replaces its defaults."""
+        layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        layout.label(text=material.name, icon="MATERIAL")
-        layout.prop(material.rfgs, "radio_material")
-        layout.prop(material.rfgs, "thickness_m")
-        if material.rfgs.thickness_m == 0 and material.rfgs.radio_material in MATERIALS:
-            thickness_m = MATERIALS[material.rfgs.radio_material]["thickness_m"]
-            layout.label(text=f"{thickness_m:g} m, the material's own")
-        layout.prop(material.rfgs, "scattering_coefficient")
+        settings = context.scene.rfgs.materials
+        layout.prop(settings, "carrier_ghz")
+        bands = used_bands(context.scene)
+        if not settings.carrier_ghz:
+            text = ", ".join(band.text for band in bands) or "no device names a band"
+            layout.label(text=f"Devices: {text}")
+        material = context.object.active_material if context.object else None
+        if material is not None:
+            box = layout.box()
+            box.label(text=material.name, icon="MATERIAL")
+            box.prop(material.rfgs, "radio_material")
+            name = material.rfgs.radio_material
+            if name in MATERIALS:
+                wrong = out_of_band(name, bands)
+                row = box.row()
+                row.alert = bool(wrong)
+                text = f"not at {wrong[0].text}: " if wrong else ""
+                row.label(text=f"{text}valid {validity(name)}", icon="ERROR" if wrong else "BLANK1")
+            box.prop(material.rfgs, "thickness_m")
+            if material.rfgs.thickness_m == 0 and name in MATERIALS:
+                box.label(text=f"{MATERIALS[name]['thickness_m']:g} m, the material's own")
+            box.prop(material.rfgs, "scattering_coefficient")
+        assign = layout.operator_menu_enum(
+            "rfgs.assign_material", "radio_material", text="Set All of Selected Objects"
+        )
+        assign.to = "SELECTED"
+        layout.operator(
+            "rfgs.color_materials",
+            text="Put Colours Back" if colored() else "Colour by Radio Material",
+            icon="COLOR",
+            depress=bool(colored()),
+        )
+        shading = context.space_data.shading
+        if colored() and shading.type == "SOLID" and shading.color_type != "MATERIAL":
+            layout.prop(shading, "color_type", text="View Shows")
+
+
+class RFGS_UL_guesses(bpy.types.UIList):
+    """Materials and what their names suggest."""
+
+    def draw_item(
+        self,
+        _context: bpy.types.Context,
+        layout: bpy.types.UILayout,
+        _data: Any,
+        item: RFGS_PG_guess,
+        _icon: int,
+        _active_data: Any,
+        _active_property: str,
+    ) -> None:
+        """One material: whether to set it, its name, what it becomes."""
+        row = layout.row(align=True)
+        row.prop(item, "use", text="")
+        row.label(text=item.material)
+        row.prop(item, "radio_material", text="", emboss=False)
+
+
+class RFGS_PT_guesses(Tab, bpy.types.Panel):
+    """What materials seem to be."""
+
+    bl_idname = "RFGS_PT_guesses"
+    bl_label = "Guesses"
+    bl_parent_id = "RFGS_PT_material"
+    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Shows the table, why the active row is as it is, and the buttons around it."""
+        layout, table = self.layout, context.window_manager.rfgs.guesses
+        layout.operator("rfgs.guess_materials", icon="VIEWZOOM")
+        if not table.rows:
+            return
+        layout.template_list("RFGS_UL_guesses", "", table, "rows", table, "active", rows=5)
+        if table.active < len(table.rows):
+            layout.label(text=table.rows[table.active].why, icon="INFO")
+        layout.operator("rfgs.apply_guesses", icon="CHECKMARK")

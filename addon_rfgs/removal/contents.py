@@ -10,6 +10,7 @@ import bpy
 from ..devices.empties import COLLECTION as DEVICES
 from ..gaussians.clouds import COLLECTION as CLOUDS
 from ..gaussians.nodes import GROUP
+from ..materials.coloring import restore
 from ..paths.curves import COLLECTION as PATHS
 from ..paths.curves import clear_paths
 from .stored import remove_properties
@@ -25,6 +26,7 @@ def remove_data() -> tuple[int, int]:
         How many objects went, and how many things lost a property.
     """
     count = clear_paths()
+    restore()
     for item in _objects():
         _remove_object(item)
         count += 1

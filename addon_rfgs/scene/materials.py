@@ -168,7 +168,8 @@ def _words(name: str) -> set[str]:
 
 def _colour(material: bpy.types.Material) -> list[float]:
     """Base colour, linear RGB: the main shader's where it is a constant."""
-    colour = material.diffuse_color
+    # Coloured by radio material for the time being: its own colour is kept.
+    colour = material.rfgs.own_color if material.rfgs.colored else material.diffuse_color
     for node in material.node_tree.nodes if material.node_tree else ():
         if node.type in {"BSDF_PRINCIPLED", "BSDF_DIFFUSE", "BSDF_GLASS", "BSDF_GLOSSY"}:
             socket = node.inputs.get("Base Color") or node.inputs.get("Color")

@@ -23,9 +23,13 @@ class Keeper:
 
     def set(self, owner: Any, name: str, value: Any) -> None:
         """Sets an attribute if it exists and differs; linked data stays as it is."""
-        if not hasattr(owner, name) or getattr(owner, name) == value:
+        if not hasattr(owner, name):
             return
         old = getattr(owner, name)
+        if isinstance(old, bpy.types.bpy_prop_array):
+            old = tuple(old)  # Blender hands out a view of what is about to change.
+        if old == value:
+            return
         try:
             setattr(owner, name, value)
         except AttributeError:  # Data linked from a library cannot be written.
@@ -70,6 +74,9 @@ def show_what_renders(keeper: Keeper, scene: bpy.types.Scene) -> None:
         keeper.set(collection, "hide_viewport", collection.hide_render)
     for layer in _layer_collections(bpy.context.view_layer.layer_collection):
         keeper.set(layer, "hide_viewport", False)
+    for material in bpy.data.materials:
+        if material.rfgs.colored:
+            keeper.set(material, "diffuse_color", tuple(material.rfgs.own_color))
     keeper.set(scene.render, "simplify_subdivision", scene.render.simplify_subdivision_render)
     for item in bpy.data.objects:
         if not item.hide_render:

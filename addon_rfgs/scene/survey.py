@@ -110,6 +110,12 @@ def survey(
     return ordered, [*changed.values(), *marked]
 
 
+def surfaces_now(scene: bpy.types.Scene) -> list[Surface]:
+    """All surfaces by key as they are at the current frame, none known to move."""
+    found = {item[0]: _first_look(*item) for item in _instances(scene)}
+    return [found[key] for key in sorted(found)]
+
+
 def surface_of(scene: bpy.types.Scene, item: bpy.types.Object) -> Surface:
     """The surface of one object at the current frame.
 

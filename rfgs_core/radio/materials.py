@@ -23,6 +23,11 @@ class RadioMaterial:
     colour: tuple[float, float, float]
     """Display colour, linear RGB in [0, 1]."""
 
+    @property
+    def model(self) -> str:
+        """Where its permittivity comes from."""
+        return "Gabriel et al. 1996" if self.name == "skin" else "ITU-R P.2040-4"
+
     def covers(self, radio: Radio) -> bool:
         """Whether the whole band of `radio` lies within the model's validity."""
         return self.freq_min_hz <= radio.freq_min_hz and radio.freq_max_hz <= self.freq_max_hz

@@ -19,7 +19,10 @@ from addon_rfgs.path_options import RELATIVE_PATH
 COMMANDS = {
     "add_crop_box": "- a box to be moved by hand",
     "add_device": "devices add",
+    "apply_guesses": "materials guess",
+    "assign_material": "materials apply",
     "clear_paths": "paths",
+    "color_materials": "materials color",
     "color_solid_view": "- changes a 3D view",
     "compare_gaussians": "import",
     "duplicate_device": "devices duplicate",
@@ -28,6 +31,7 @@ COMMANDS = {
     "export_gaussians": "export-gaussians",
     "forget_job": "- the list of jobs lives in the window",
     "generate_dataset": "generate",
+    "guess_materials": "materials guess",
     "import_gaussians": "import",
     "import_result": "import",
     "match_devices": "devices match",
@@ -46,6 +50,7 @@ COMMANDS = {
 #: Operators that leave the file as it is; all others can be undone.
 LEAVE_THE_FILE = {
     *("evaluate_run", "export_bundle", "export_gaussians", "forget_job", "generate_dataset"),
+    *("guess_materials",),
     *("render_groundtruth", "resume_job", "stop_job", "test_environment", "train_gaussians"),
 }
 

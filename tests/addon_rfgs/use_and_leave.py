@@ -111,6 +111,7 @@ def told(item: bpy.types.ID) -> dict[str, Any]:
         else {},
         "drivers": [curve.data_path for curve in motion.drivers] if motion else [],
         "action": motion.action.name if motion and motion.action else "",
+        "colour": list(getattr(item, "diffuse_color", [])),
         "modifiers": [row.name for row in getattr(item, "modifiers", [])],
         "users": item.users,
     }
@@ -133,6 +134,8 @@ def use(folder: Path) -> None:
     bpy.data.objects["Own empty"].rfgs.role = "TRANSMITTER"
     bpy.data.objects["Cube"].rfgs.object_class = "PERSON"
     bpy.data.materials["Paint"].rfgs.radio_material = "brick"
+    ops.guess_materials()
+    ops.color_materials()
     scene.rfgs.jobs.frames = "1:9"
     scene.rfgs.gaussians.path = str(folder / "cloud.ply")
     ops.import_gaussians()

@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Buttons that say what materials are to the radio."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..errors import AddonError
+from ..reporting import Progress, Reporting
+from . import coloring
+from .guesses import assign, guesses, materials_in_use, named_material
+from .properties import material_items
+
+
+class RFGS_OT_assign_material(Reporting, bpy.types.Operator):
+    """Make materials a building material of ITU-R P.2040, or skin, with its own thickness."""
+
+    bl_idname = "rfgs.assign_material"
+    bl_label = "Assign Radio Material"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    radio_material: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Radio Material",
+        description="Electrical model",
+        items=material_items(guess=False),
+    )
+    to: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="To",
+        description="Which materials are set",
+        items=[
+            ("ACTIVE", "Active Material", "The active material of the active object"),
+            ("SELECTED", "Selected Objects", "All materials of the selected objects"),
+        ],
+    )
+    thickness_m: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="Thickness",
+        description="Of the slab behind the surface; 0 takes the material's own",
+        default=0.0,
+        min=0.0,
+        soft_max=1.0,
+        precision=4,
+        subtype="DISTANCE",
+    )
+    scattering: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="Scattering",
+        description="Share of the reflected field's amplitude that is scattered diffusely",
+        default=0.0,
+        min=0.0,
+        max=1.0,
+    )
+
+    def work(self, context: bpy.types.Context, _progress: Progress) -> str:
+        """Sets the materials."""
+        chosen = _targets(context, self.to)
+        count = assign(chosen, self.radio_material, self.thickness_m, self.scattering)
+        return f"Set {count} materials to {self.radio_material}"
+
+
+class RFGS_OT_guess_materials(Reporting, bpy.types.Operator):
+    """List what the names and shapes of unlabelled materials suggest, to be confirmed."""
+
+    bl_idname = "rfgs.guess_materials"
+    bl_label = "Guess from Names"
+
+    def work(self, context: bpy.types.Context, _progress: Progress) -> str:
+        """Fills the table."""
+        table = context.window_manager.rfgs.guesses
+        found = guesses(context.scene)
+        table.rows.clear()
+        table.active = 0
+        for row in found:
+            item = table.rows.add()
+            item.material, item.radio_material = row.material, row.radio_material
+            item.why = row.why
+        return f"{len(found)} guesses to confirm" if found else "Every material in use is labelled"
+
+
+class RFGS_OT_apply_guesses(Reporting, bpy.types.Operator):
+    """Set the materials that are ticked in the table, and clear it."""
+
+    bl_idname = "rfgs.apply_guesses"
+    bl_label = "Apply Guesses"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """There is a table."""
+        return len(context.window_manager.rfgs.guesses.rows) > 0
+
+    def work(self, context: bpy.types.Context, _progress: Progress) -> str:
+        """Applies the table."""
+        table = context.window_manager.rfgs.guesses
+        chosen = [
+            (named_material(row.material), row.radio_material) for row in table.rows if row.use
+        ]
+        count = sum(assign([material], value) for material, value in chosen)
+        table.rows.clear()
+        return f"Set {count} materials"
+
+
+class RFGS_OT_color_materials(Reporting, bpy.types.Operator):
+    """Colour materials in the viewport by what they are to the radio, or put their own back.
+
+    Seen in solid view with the colour Material; grey is what would be guessed
+    """
+
+    bl_idname = "rfgs.color_materials"
+    bl_label = "Colour by Radio Material"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    action: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Action",
+        description="What to do",
+        items=[
+            ("TOGGLE", "Toggle", "Colour, or put back if coloured"),
+            ("COLOR", "Colour", "Colour every material in use"),
+            ("RESTORE", "Restore", "Put the materials' own colours back"),
+        ],
+        options={"SKIP_SAVE"},
+    )
+
+    def work(self, context: bpy.types.Context, _progress: Progress) -> str:
+        """Colours or restores."""
+        restore = self.action == "RESTORE" or (self.action == "TOGGLE" and coloring.colored())
+        if restore:
+            return f"Restored {coloring.restore()} materials"
+        return f"Coloured {coloring.color(materials_in_use(context.scene))} materials"
+
+
+def _targets(context: bpy.types.Context, to: str) -> list[bpy.types.Material]:
+    """Materials that are meant.
+
+    Raises:
+        AddonError: There is none, or one is linked from another file.
+    """
+    items = context.selected_objects if to == "SELECTED" else [context.object]
+    found = {
+        slot.material.name
+        for item in items
+        if item is not None
+        for slot in item.material_slots
+        if slot.material and (to == "SELECTED" or slot.material == item.active_material)
+    }
+    if not found:
+        where = "selected objects have" if to == "SELECTED" else "active object has"
+        raise AddonError(f"the {where} no material; add one in the material properties")
+    return [named_material(name) for name in sorted(found)]

@@ -29,8 +29,12 @@ class Check:
         """Whether the answer is awaited."""
         return self._child is not None
 
-    def start(self, python: Path) -> None:
+    def start(self, python: Path, blender: str) -> None:
         """Asks.
+
+        Args:
+            python: The environment's Python.
+            blender: The program that opens files for it; empty for the environment's own bpy.
 
         Raises:
             AddonError: The program cannot be started.
@@ -40,7 +44,7 @@ class Check:
         self._output = tempfile.TemporaryFile()
         try:
             self._child = subprocess.Popen(
-                check_arguments(python),
+                check_arguments(python, blender),
                 stdin=subprocess.DEVNULL,
                 stdout=self._output,
                 stderr=subprocess.STDOUT,

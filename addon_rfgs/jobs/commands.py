@@ -19,7 +19,7 @@ from .environment import interpreter
 from .following import QUEUE
 from .operators import await_check
 from .plans import Plan
-from .preferences import environment_path
+from .preferences import blender_program, environment_path
 from .process import Process
 from .queue import GRACE_S
 from .record import read_record
@@ -118,7 +118,7 @@ def _add_folder(command: argparse.ArgumentParser) -> None:
 
 
 def _environment(options: argparse.Namespace, out: TextIO) -> str:
-    CHECK.start(interpreter(options.python or environment_path()))
+    CHECK.start(interpreter(options.python or environment_path()), blender_program())
     return await_check()
 
 
@@ -152,8 +152,6 @@ def _finish(plan: Plan, options: argparse.Namespace, out: TextIO) -> str:
 
 def _resume(options: argparse.Namespace, out: TextIO) -> str:
     record = read_record(_record(options))
-    if Process(record.pid, record.born).running():
-        raise AddonError(f"{options.folder}: the job is running; stop it first")
     return _finish(record.plan, options, out)
 
 

@@ -23,7 +23,7 @@ _PROGRESS = {
 
 #: Runs in the environment and prints one line of JSON; imports nothing that takes long.
 _CHECK = """
-import importlib.metadata as metadata, json, platform
+import importlib.metadata as metadata, json, platform, re, subprocess, sys
 names = ("rfgs", "sionna-rt", "torch", "bpy")
 found = {"Python": platform.python_version()}
 problems = []
@@ -39,6 +39,14 @@ if found["rfgs"]:
         found["LLVM"] = str(use_llvm()[1])
     except Exception as error:
         problems.append(" ".join(str(error).split()) or type(error).__name__)
+blender = sys.argv[1] if len(sys.argv) > 1 else ""
+if blender:
+    try:
+        command = [blender, "-b", "--version"]
+        said = subprocess.run(command, capture_output=True, text=True, timeout=60).stdout
+        found["Blender"] = re.search(r"Blender ([0-9.]+)", said)[1]
+    except Exception:
+        problems.append(blender + " does not start; choose another Blender in the preferences")
 print("rfgs-environment " + json.dumps({"versions": found, "problems": problems}))
 """
 _ANSWER = "rfgs-environment "
@@ -76,9 +84,14 @@ def child_environment() -> dict[str, str]:
     return {**kept, **_PROGRESS, "PYTHONUNBUFFERED": "1"}
 
 
-def check_arguments(python: Path) -> list[str]:
-    """Command line whose output `read_check` understands."""
-    return [str(python), "-c", _CHECK]
+def check_arguments(python: Path, blender: str = "") -> list[str]:
+    """Command line whose output `read_check` understands.
+
+    Args:
+        python: The environment's Python.
+        blender: The program that opens files for it; empty for the environment's own bpy.
+    """
+    return [str(python), "-c", _CHECK, blender]
 
 
 def read_check(code: int | None, output: str) -> tuple[list[str], list[str]]:

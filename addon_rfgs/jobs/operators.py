@@ -9,7 +9,7 @@ from . import following
 from .checking import CHECK
 from .environment import interpreter
 from .plans import TrainPlan
-from .preferences import environment_path
+from .preferences import blender_program, environment_path
 from .queue import ACTIVE, DONE, RUNNING, WAITING, Job
 from .starting import evaluate_plan, generate_plan, start, train_plan
 
@@ -22,7 +22,7 @@ class RFGS_OT_test_environment(Reporting, bpy.types.Operator):
 
     def work(self, _context: bpy.types.Context, _progress: Progress) -> str:
         """Asks in the background; without a window it waits for the answer."""
-        CHECK.start(interpreter(environment_path()))
+        CHECK.start(interpreter(environment_path()), blender_program())
         if not bpy.app.background:
             following.follow()
             return "Asking the environment"
@@ -39,7 +39,10 @@ class RFGS_OT_generate_dataset(Reporting, bpy.types.Operator):
         """Saves the file if that is wanted, and begins."""
         plan = generate_plan(context.scene)
         if context.scene.rfgs.jobs.save_first and bpy.data.is_dirty and not bpy.app.background:
-            bpy.ops.wm.save_mainfile()
+            try:
+                bpy.ops.wm.save_mainfile()
+            except RuntimeError as error:
+                raise AddonError(f"{plan.blend}: cannot be saved; save it elsewhere") from error
         return start(plan)
 
 

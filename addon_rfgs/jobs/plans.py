@@ -118,8 +118,10 @@ class EvaluatePlan:
         return ["-m", "rfgs_core.cli", "eval", self.out, oracle]
 
     def complete(self) -> bool:
-        """Whether the metrics are written."""
-        return (Path(self.out) / "metrics.json").is_file()
+        """Whether the metrics are written, by this evaluation and not by an earlier one."""
+        metrics, begun = Path(self.out) / "metrics.json", Path(self.out) / "log/job_evaluate.json"
+        both = metrics.is_file() and begun.is_file()
+        return both and metrics.stat().st_mtime >= begun.stat().st_mtime
 
 
 Plan = GeneratePlan | TrainPlan | EvaluatePlan

@@ -11,7 +11,15 @@ from ..errors import AddonError
 from .plans import Plan
 from .process import Process
 from .progress import Progress, read_log
-from .record import Record, log_file, record_file, remember, write_record
+from .record import (
+    Record,
+    log_file,
+    read_record,
+    record_file,
+    remember,
+    remembered,
+    write_record,
+)
 
 WAITING, RUNNING, STOPPING = "Waiting", "Running", "Stopping"
 DONE, FAILED, STOPPED = "Done", "Failed", "Stopped"
@@ -70,6 +78,7 @@ class Queue:
         """
         self.jobs: list[Job] = []
         self._listed = listed
+        self._known: set[Path] = set()
 
     def add(self, plan: Plan, python: Path) -> Job:
         """Puts a job at the end.
@@ -80,6 +89,7 @@ class Queue:
         plan.arguments()
         if any(job.same(plan) and job.state in ACTIVE for job in self.jobs):
             raise AddonError(f"{plan.out}: such a job is in the list already")
+        _refuse_running(plan)
         write_record(Record(plan, 0, ""))
         self.jobs = [job for job in self.jobs if not job.same(plan)]
         self.jobs.append(Job(plan, python))
@@ -125,6 +135,7 @@ class Queue:
 
     def _begin(self, job: Job) -> None:
         try:
+            _refuse_running(job.plan)
             command = [str(job.python), *job.plan.arguments()]
             job.process = Process.start(command, log_file(job.plan))
             write_record(Record(job.plan, job.process.pid, job.process.born))
@@ -155,5 +166,23 @@ class Queue:
 
     def _remember(self) -> None:
         listed = self._listed()
+        self._known.update(record_file(job.plan) for job in self.jobs)
         if listed is not None:
-            remember([record_file(job.plan) for job in self.jobs if job.state != DONE], listed)
+            unfinished = [record_file(job.plan) for job in self.jobs if job.state != DONE]
+            # What another Blender has put there stays.
+            others = [file for file in remembered(listed) if file not in self._known]
+            remember([*others, *unfinished], listed)
+
+
+def _refuse_running(plan: Plan) -> None:
+    """Refuses a job whose process, started by another Blender, is still at work.
+
+    Raises:
+        AddonError: It is.
+    """
+    try:
+        record = read_record(record_file(plan))
+    except AddonError:
+        return
+    if Process(record.pid, record.born).running():
+        raise AddonError(f"{plan.out}: another Blender's job is running there; stop it first")

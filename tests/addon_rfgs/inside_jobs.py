@@ -16,10 +16,17 @@ import pytest
 import addon_rfgs
 from addon_rfgs.errors import AddonError
 from addon_rfgs.jobs import environment, following, queue
-from addon_rfgs.jobs.plans import GeneratePlan, TrainPlan, plan_of_json, plan_to_json
+from addon_rfgs.jobs.plans import EvaluatePlan, GeneratePlan, TrainPlan, plan_of_json, plan_to_json
 from addon_rfgs.jobs.process import Process, birth
 from addon_rfgs.jobs.progress import Progress, read_log
-from addon_rfgs.jobs.record import log_file, read_record, record_file, remembered
+from addon_rfgs.jobs.record import (
+    Record,
+    log_file,
+    read_record,
+    record_file,
+    remembered,
+    write_record,
+)
 
 #: Programs that stand where the environment's Python would: they are given a job's arguments.
 PROGRAMS = {
@@ -129,6 +136,31 @@ def test_the_next_blender_finds_a_job_and_its_end(
     step_until(jobs, job, queue.STOPPED)
     later.step()
     assert later.jobs[0].state == (queue.DONE if done else queue.STOPPED)
+
+
+def test_one_folder_is_worked_on_by_one_job(jobs, program, tmp_path: Path) -> None:
+    job = jobs.add(plan(tmp_path, "a"), program("polite"))
+    step_until_said(jobs, job, "begun")
+    other = queue.Queue(lambda: tmp_path / "jobs.json")
+    with pytest.raises(AddonError, match="another Blender's job is running"):
+        other.add(plan(tmp_path, "a"), program("quick"))
+    second = other.add(plan(tmp_path, "b"), program("quick"))
+    assert remembered(tmp_path / "jobs.json") == [record_file(row.plan) for row in (job, second)]
+    step_until(other, second, queue.DONE)
+    assert remembered(tmp_path / "jobs.json") == [record_file(job.plan)]
+    jobs.stop(job)
+    step_until(jobs, job, queue.STOPPED)
+    step_until(other, other.add(plan(tmp_path, "a"), program("quick")), queue.DONE)
+
+
+def test_an_old_evaluation_is_not_taken_for_a_new_one(tmp_path: Path) -> None:
+    made = EvaluatePlan(str(tmp_path))
+    (tmp_path / "metrics.json").touch()
+    write_record(Record(made, 0, ""))
+    os.utime(tmp_path / "metrics.json", (1, 1))
+    assert not made.complete()
+    os.utime(tmp_path / "metrics.json")
+    assert made.complete()
 
 
 def test_another_process_of_that_number_is_left_alone(jobs, tmp_path: Path) -> None:
@@ -248,6 +280,13 @@ def test_this_environment_is_ready() -> None:
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     versions, problems = environment.read_check(done.returncode, done.stdout)
     assert not problems and any(line.startswith("torch 2") for line in versions)
+
+
+def test_a_blender_that_does_not_start_is_a_problem() -> None:
+    command = environment.check_arguments(Path(sys.executable), "/nowhere/blender")
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    _, problems = environment.read_check(done.returncode, done.stdout)
+    assert len(problems) == 1 and "/nowhere/blender does not start" in problems[0]
 
 
 def test_operators_refuse_in_one_line_what_they_cannot_do() -> None:

@@ -20,6 +20,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "compare": ("compare", "CompareArgs"),
     "study": ("study", "StudyArgs"),
     "predict": ("predict", "PredictArgs"),
+    "csi": ("csi", "CsiArgs"),
     "bench": ("bench", "BenchArgs"),
 }
 

@@ -41,6 +41,7 @@ COMMANDS = {
     "remove_device": "devices remove",
     "render_groundtruth": "groundtruth",
     "resume_job": "resume",
+    "show_csi": "- fills an Image Editor",
     "show_paths": "paths",
     "stop_job": "stop",
     "test_environment": "environment",

@@ -182,6 +182,9 @@ def test_import_saves_a_file_that_shows_each_frame_without_the_add_on(
         (("export", "--out", "{tmp}/b", "--cameras", "9"), "cameras"),
         (("import", "{tmp}/nothing", "--out", "{tmp}/x.blend"), "no such run"),
         (("import", "{tmp}", "--picture", "{tmp}/x.png", "--camera", "nope"), "no camera 'nope'"),
+        (("import", "{tmp}", "--out", "{tmp}/x.blend", "--crop-box", "crate"), "an Empty"),
+        (("import", "{tmp}", "--out", "{tmp}/x.blend", "--opacity-threshold", "2"), "opacity"),
+        (("export-gaussians", "{tmp}/x.ply"), "no imported Gaussians"),
     ],
 )
 def test_mistakes_get_one_line_and_exit_code_2(

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
@@ -113,6 +114,34 @@ def test_gaussians_are_imported(blender, blend: Path, bundle: Path, tmp_path: Pa
     half = pixels.shape[1] // 2
     change = np.abs(pixels[:, :half] - pixels[:, half:]).max(axis=2) > 24
     assert change.sum() > 20, "Gaussians stand in for the person"
+
+
+def test_gaussians_are_compared_and_come_back_bit_for_bit(
+    blender, blend: Path, bundle: Path, tmp_path: Path
+) -> None:
+    vertices = read_bundle(bundle).frame(9).vertices[::10]
+    names = [*"xyz", "opacity", *(f"scale_{i}" for i in range(3))]
+    names += [*(f"rot_{i}" for i in range(4)), *(f"f_rest_{i}" for i in range(9)), "custom"]
+    rng = np.random.default_rng(0)
+    rows = np.zeros(len(vertices), [(name, "<f4") for name in names])
+    for name in names:
+        rows[name] = rng.normal(size=len(rows))
+    rows["x"], rows["y"], rows["z"] = (vertices + np.float32([0, 0, 0.05])).T
+    folder = tmp_path / "run"
+    folder.mkdir()
+    PlyData([PlyElement.describe(rows, "vertex")], byte_order=">").write(str(folder / "000009.ply"))
+    saved, back = tmp_path / "inspect.blend", tmp_path / "back.ply"
+    look = ("--size", "2", "--solid-view", "--interpolation", "nearest", "--opacity-threshold", "0")
+    done = blender.rfgs(blend, "import", folder, "--out", saved, "--compare", *look)
+    assert done.returncode == 0, done.stdout + done.stderr
+    told = re.search(r"mean ([\d.]+) cm, median ([\d.]+) cm over (\d+)", done.stdout)
+    assert told and int(told[3]) == len(rows)
+    assert 0 < float(told[2]) <= 5.1, "no point is farther than it was shifted"
+    done = blender.rfgs(saved, "export-gaussians", back)
+    assert done.returncode == 0, done.stdout + done.stderr
+    stored = PlyData.read(str(back))["vertex"].data
+    for name in names:
+        assert stored[name].tobytes() == rows[name].tobytes(), name
 
 
 def test_mistakes_get_one_line_and_a_code(blender, blend: Path, tmp_path: Path) -> None:

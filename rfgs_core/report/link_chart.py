@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A picture of one link: what was measured and what a run predicts, over its frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Complex64
+
+from rfgs_core.errors import RfgsError
+from rfgs_core.files import replacing
+from rfgs_core.radio import Radio
+from rfgs_core.radio.levels import decibels
+from rfgs_core.report.charts import new_figure
+from rfgs_core.report.radio_charts import RANGE_DB, delay_profile, path_lengths_m
+from rfgs_core.run import Run
+
+
+@dataclass(frozen=True)
+class LinkChannels:
+    """csi − csi_static between two devices, all antenna pairs and tones, held-out ones too."""
+
+    radio: Radio
+    """The radio."""
+    frames: list[int]
+    """Frames of the run."""
+    measured: Complex64[np.ndarray, "frame link subcarrier"]
+    """True channel of the dataset."""
+    predicted: Complex64[np.ndarray, "frame link subcarrier"]
+    """What the run's Gaussians give."""
+    longest_m: float
+    """Longer paths are not drawn [m]: twice the diagonal of the scene."""
+
+    @property
+    def error_db(self) -> float:
+        """Energy of the difference over that of the measured channel [dB]; 0 explains nothing."""
+        left = np.sum(np.abs(self.measured - self.predicted).astype(np.float64) ** 2)
+        whole = np.sum(np.abs(self.measured).astype(np.float64) ** 2)
+        return float(10 * np.log10(max(left, 1e-300) / max(whole, 1e-300)))
+
+
+def link_channels(run: Run, tx_device: int, rx_device: int) -> LinkChannels:
+    """Reads a link of a run's dataset and predicts it.
+
+    Raises:
+        RfgsError: The radio does not measure this link.
+    """
+    sequence, name = run.sequence, run.config["radio"]
+    layout, radio = sequence.layout(name), sequence.radio_spec(name)
+    pairs = layout.device_pairs
+    if (tx_device, rx_device) not in pairs:
+        known = ", ".join(f"{a}→{b}" for a, b in pairs)
+        raise RfgsError(f"{name} measures no link {tx_device}→{rx_device}; it has {known}")
+    tx, rx = np.nonzero(
+        layout.measured & (layout.tx_device[:, None] == tx_device) & (layout.rx_device == rx_device)
+    )
+    static = sequence.csi_static(name)
+    measured = [(sequence.csi(name, frame) - static)[tx, rx] for frame in run.frames]
+    predicted = [run.predict(frame)[tx, rx] for frame in run.frames]
+    low, high = sequence.bounds_m
+    longest_m = min(2.0 * float(np.linalg.norm(high - low)), radio.unambiguous_path_m)
+    return LinkChannels(radio, run.frames, np.stack(measured), np.stack(predicted), longest_m)
+
+
+def write_link_chart(path: Path, link: LinkChannels) -> None:
+    """Draws |ΔH| over tones and delay profiles over frames, measured above predicted, as a PNG.
+
+    Powers are means over the antenna pairs; each column shares one scale.
+    """
+    mhz, length_m = link.radio.freq_hz / 1e6, path_lengths_m(link.radio)
+    shown = length_m <= link.longest_m
+    with new_figure(10.0, 6.0) as figure:
+        figure.set_facecolor("white")
+        axes = figure.subplots(2, 2)
+        for column, (values, ends, label) in enumerate(
+            (
+                ([link.measured, link.predicted], (mhz[0], mhz[-1]), "frequency [MHz]"),
+                (
+                    [delay_profile(csi)[..., shown] for csi in (link.measured, link.predicted)],
+                    (0.0, float(length_m[shown][-1])),
+                    "path length [m]",
+                ),
+            )
+        ):
+            levels = [decibels(np.mean(np.abs(csi) ** 2, axis=1)).T for csi in values]
+            top = float(levels[0].max())
+            for axis, level, who in zip(
+                axes[:, column], levels, ("measured", "predicted"), strict=True
+            ):
+                image = axis.imshow(
+                    level,
+                    aspect="auto",
+                    origin="lower",
+                    cmap="magma",
+                    vmin=top - RANGE_DB,
+                    vmax=top,
+                    extent=(-0.5, len(link.frames) - 0.5, *ends),
+                    interpolation="nearest",
+                )
+                step = max(1, len(link.frames) // 6)
+                axis.set_xticks(range(0, len(link.frames), step), link.frames[::step])
+                axis.set(title=f"{who}, H − H static [dB]", xlabel="frame", ylabel=label)
+                figure.colorbar(image, ax=axis, shrink=0.8).outline.set_visible(False)  # type: ignore[operator]
+        with replacing(path) as temporary:
+            # Without this entry the version of matplotlib would change the bytes.
+            figure.savefig(temporary, format="png", dpi=110, metadata={"Software": None})

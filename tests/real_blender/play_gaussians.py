@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Played inside Blender: Gaussians are imported, coloured in the Solid view, undone and redone."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import bpy
+
+
+def play(stage: Any) -> Iterator[float]:
+    """Clicks the buttons and notes what the file holds after each."""
+    (run,) = stage.arguments
+    seen: dict[str, Any] = {}
+    yield from stage.open_tab()
+    shading = stage.view.spaces.active.shading
+    other = bpy.data.screens["Shading"]
+    before = [area.spaces[0].shading.color_type for area in views(other)]
+    bpy.context.scene.frame_set(1)
+    settings().path = run
+    settings().color_by, settings().size = "TRACK", 5.0
+    bpy.ops.ed.undo_push(message="before")
+    yield from stage.click("rfgs.import_gaussians")
+    yield 1.0
+    seen["imported"] = clouds()
+    frame_clouds(stage)
+    yield from stage.shoot("points", "VIEW")
+    yield from stage.click("rfgs.color_solid_view")
+    yield 1.0
+    seen["shading"] = [shading.type, shading.color_type]
+    seen["others"] = before == [area.spaces[0].shading.color_type for area in views(other)]
+    yield from stage.shoot("solid", "VIEW")
+    yield from stage.click("rfgs.add_crop_box")
+    yield 0.5
+    seen["boxes"] = len([item for item in bpy.data.objects if "crop" in item.name])
+    for name in ("undo", "undo", "undo", "redo"):
+        with stage.override():
+            getattr(bpy.ops.ed, name)()
+        yield 0.5
+        boxes = len([item for item in bpy.data.objects if "crop" in item.name])
+        solid = settings().solid_view
+        seen.setdefault("history", []).append([name, clouds(), boxes, solid])
+    (stage.out / "seen.json").write_text(json.dumps(seen))
+
+
+def settings() -> Any:
+    return bpy.context.scene.rfgs.gaussians
+
+
+def clouds() -> int:
+    return len([item for item in bpy.data.objects if item.name.startswith("Gaussians")])
+
+
+def views(screen: bpy.types.Screen) -> list[bpy.types.Area]:
+    return [area for area in screen.areas if area.type == "VIEW_3D"]
+
+
+def frame_clouds(stage: Any) -> None:
+    """Looks at the visible cloud from the front, and at nothing else."""
+    for item in bpy.data.objects:
+        item.select_set(item.name.startswith("Gaussians 000001"))
+        if item.type == "MESH" and not item.name.startswith("Gaussians"):
+            item.hide_set(True)
+    with stage.override():
+        bpy.ops.view3d.view_axis(type="FRONT")
+        bpy.ops.view3d.view_selected()
+    for item in bpy.data.objects:
+        item.select_set(False)

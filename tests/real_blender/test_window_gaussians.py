@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Gaussians in a real window: buttons, colours in the Solid view, undo and redo."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from window import play
+
+pytestmark = [pytest.mark.blender, pytest.mark.slow]
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE.parent / "addon_rfgs"))
+
+
+def saturated(path: Path) -> float:
+    """Share of the picture's pixels that are no grey."""
+    with Image.open(path) as image:
+        pixels = np.asarray(image.convert("RGB"), int)
+    left = pixels[:, : int(0.7 * pixels.shape[1])]  # the sidebar covers the right
+    return float((np.ptp(left, axis=2) > 60).mean())
+
+
+def test_buttons_colour_and_undo(blender, python, tmp_path: Path) -> None:
+    from splat_files import write_run
+
+    blend, run = tmp_path / "tiny.blend", write_run(tmp_path / "run", (1, 2), 3000)
+    builder = HERE.parent / "dataset_factory" / "build_tiny_scene.py"
+    python(builder, blend, "moving", "concrete", "1.0", must_work=True)
+    out = tmp_path / "out"
+    done = play(blender, HERE / "play_gaussians.py", blend, out, run, size=(1400, 2400))
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
+    assert "Traceback" not in done.stdout + done.stderr
+    seen = json.loads((out / "seen.json").read_text())
+    assert seen["imported"] == 3 and seen["boxes"] == 1
+    assert seen["shading"] == ["SOLID", "VERTEX"] and seen["others"]
+    assert seen["history"] == [
+        ["undo", 3, 0, True],
+        ["undo", 3, 0, False],
+        ["undo", 0, 0, False],
+        ["redo", 3, 0, False],
+    ]
+    assert saturated(out / "solid.png") > saturated(out / "points.png") + 0.02

@@ -17,6 +17,7 @@ from rfgs_core.train.config import (
     Density,
     Objective,
     Observe,
+    Part,
     Recipe,
     TrainConfig,
 )
@@ -69,6 +70,11 @@ class TrainArgs:
     """Adam steps per frame; the recipe's own number when left out."""
     gaussians: int | None = None
     """Moving Gaussians at the start; the recipe's own number when left out."""
+    without: tuple[Part, ...] = ()
+    """Leave out parts of the paper's recipe, as its table 2 does: rf_weights (in eq. 5), densify,
+    feature_gradients (their condition for new Gaussians), prune; see `rfgs ablate`."""
+    settle: float = 0.0
+    """Share of the steps at the end, 0 to 1, in which the rates fall to nothing."""
     coarse: float = 0.0
     """Share of the steps, 0 to 1, in which the channel loss widens from a quarter of the band to
     all of it; not with --observe delay_power, which has no tones."""
@@ -99,7 +105,15 @@ def run(args: TrainArgs) -> int:
         calibrate=args.calibrate,
         density=args.density,
         coarse_share=args.coarse,
+        settle_share=args.settle,
+        without=args.without,
     )
+    if args.without and args.objective == "csi":
+        raise RfgsError(
+            "--without leaves out parts of the paper's losses; expected --objective paper or both"
+        )
+    if not 0.0 <= args.settle <= 1.0:
+        raise RfgsError(f"--settle {args.settle}: expected a share from 0 to 1")
     if not 0.0 <= args.coarse <= 1.0:
         raise RfgsError(f"--coarse {args.coarse}: expected a share from 0 to 1")
     if args.coarse and args.observe == "delay_power":

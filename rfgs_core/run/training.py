@@ -99,6 +99,8 @@ def train_sequence(
         "radio": radio,
         "frames": frames,
         **asdict(config),
+        # As it is read back.
+        "without": list(config.without),
     }
     run = _open_or_create(out, settings)
     if encoder_file is not None and not (out / ENCODER_FILE).exists():

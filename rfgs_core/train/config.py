@@ -18,6 +18,9 @@ Observe = Literal["complex", "power", "delay_power"]
 Background = Literal["empty_room", "learned"]
 #: Offsets of devices that are estimated: none, of oscillators, of clocks, or of both.
 Calibrate = Literal["none", "phase", "timing", "both"]
+#: Parts of the paper's recipe that an ablation leaves out (its table 2): the weight ‖φ‖ in eq. 5,
+#: new Gaussians, the frequency gradient as their condition, and pruning.
+Part = Literal["rf_weights", "densify", "feature_gradients", "prune"]
 #: none; paper: section 3.5; 3dgs: clone, split, prune, reset; residual: at peaks of the
 #: back-projected residual.
 Density = Literal["none", "paper", "3dgs", "residual"]
@@ -52,6 +55,10 @@ class TrainConfig:
     """Adam steps per frame (the paper: 10,000)."""
     coarse_share: float = 0.0
     """Share of the steps in which the channel loss widens from a quarter of the band to all."""
+    without: tuple[Part, ...] = ()
+    """Parts of the paper's recipe that are left out."""
+    settle_share: float = 0.0
+    """Share of the steps, at the end, in which the rates fall to nothing."""
     density: Density | None = None
     """How Gaussians come and go while they are refined; None: as the objective does, the
     paper's rule with the paper's losses and none without."""

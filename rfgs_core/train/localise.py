@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float, Float64
 from scipy.ndimage import gaussian_filter, map_coordinates
 from scipy.optimize import linear_sum_assignment
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from rfgs_core.encode.matched_filter import matched_filter_map
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
@@ -148,7 +148,7 @@ def _separate_peaks(
 
     The slope of a strong body's peak may be higher than the peak of a weak body.
     """
-    tree = cKDTree(ground)
+    tree = KDTree(ground)
     neighbours = tree.query_ball_point(ground, PEAK_RADIUS_M)
     is_peak = np.array([score[i] >= score[near].max() for i, near in enumerate(neighbours)])
     taken: list[int] = []

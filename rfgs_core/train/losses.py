@@ -40,12 +40,19 @@ def nearest_gaussian(
 
 
 def position_loss(
-    gaussians: Gaussians, points: SamplePoints, nearest: Int64[Tensor, "N"]
+    gaussians: Gaussians,
+    points: SamplePoints,
+    nearest: Int64[Tensor, "N"],
+    weighted: bool = True,
 ) -> Float[Tensor, ""]:
-    """Eq. 5: Σ_k ‖φ(p_k)‖ ‖μ_nn(k) − p_k‖²."""
-    weight = torch.linalg.norm(points.features.detach(), dim=1)
-    offset = gaussians.means[nearest] - points.xyz
-    return torch.sum(weight * torch.sum(offset**2, dim=1))
+    """Eq. 5: Σ_k ‖φ(p_k)‖ ‖μ_nn(k) − p_k‖², or all points alike for the ablation without weights.
+
+    Sample points have RMS ‖φ‖ = 1, so that neither form is louder than the other.
+    """
+    square = torch.sum((gaussians.means[nearest] - points.xyz) ** 2, dim=1)
+    if not weighted:
+        return torch.sum(square)
+    return torch.sum(torch.linalg.norm(points.features.detach(), dim=1) * square)
 
 
 def feature_loss(
@@ -64,11 +71,13 @@ def regularisation_loss(gaussians: Gaussians) -> Float[Tensor, ""]:
     return torch.sum(gaussians.scales**2) + torch.sum(opacity.abs())
 
 
-def paper_loss(gaussians: Gaussians, points: SamplePoints) -> Float[Tensor, ""]:
+def paper_loss(
+    gaussians: Gaussians, points: SamplePoints, weighted: bool = True
+) -> Float[Tensor, ""]:
     """Eq. 4: λ1 L_pos + λ2 L_feat + λ3 L_reg over one batch of sample points."""
     nearest, _ = nearest_gaussian(points.xyz, gaussians.means)
     return (
-        POSITION_WEIGHT * position_loss(gaussians, points, nearest)
+        POSITION_WEIGHT * position_loss(gaussians, points, nearest, weighted)
         + FEATURE_WEIGHT * feature_loss(gaussians, points, nearest)
         + REGULARISATION_WEIGHT * regularisation_loss(gaussians)
     )

@@ -69,6 +69,11 @@ class TrainableGaussians:
         """The Gaussians; gradients flow into the leaves."""
         return Gaussians(**self.leaves)
 
+    def slow_to(self, factor: float) -> None:
+        """Takes the rates times `factor` from here on."""
+        for group in self.optimiser.param_groups:
+            group["lr"] = factor * getattr(self.rates, group["name"])
+
     def edit_rows(
         self,
         keep: Bool[Tensor, "M"],

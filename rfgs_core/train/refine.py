@@ -103,6 +103,16 @@ def band_of_step(step: int, config: TrainConfig, entries: int) -> slice:
     return slice(start, start + count)
 
 
+def rate_of_step(step: int, config: TrainConfig) -> float:
+    """Factor on the learning rates at a step: one, and at the end a straight line to nothing.
+
+    Adam's steps do not shrink by themselves: at a constant rate parameters keep trembling.
+    """
+    settling = config.settle_share * config.iterations
+    left = config.iterations - step + 1
+    return min(1.0, left / settling) if settling > 0 else 1.0
+
+
 def _loss(
     task: Task,
     state: FrameState,
@@ -110,10 +120,11 @@ def _loss(
     links: np.ndarray,
     points: SamplePoints | None,
     band: slice,
+    weighted: bool,
 ) -> Float[Tensor, ""]:
     loss = torch.zeros(())
     if points is not None:
-        loss = loss + paper_loss(gaussians, points)
+        loss = loss + paper_loss(gaussians, points, weighted)
     if len(links):
         part = task.channel.rows(links)
         predicted = task.comparison.predicted(part.change(state.head, gaussians), links)
@@ -152,16 +163,17 @@ def refine(
     trained, first, memory = _resume(checkpoint, state.gaussians, rates)
     density = density_control(observations, state, config, seed, task)
     density.resume(memory)
-    last_good = LastGood(checkpoint)
+    last_good, weighted = LastGood(checkpoint), "rf_weights" not in config.without
     for step in range(first + 1, config.iterations + 1):
         links, chosen = _batch(task, config, seed, step)
         links = links if config.objective != "paper" else links[:0]
         points = None if task.points is None else task.points.rows(chosen)
         band = band_of_step(step, config, task.target.shape[1])
-        loss = _loss(task, state, trained.gaussians, links, points, band)
+        loss = _loss(task, state, trained.gaussians, links, points, band, weighted)
         if not torch.isfinite(loss):
             last_good.stop(step, loss, task.target, trained)
         last_good.remember(_arrays(step - 1, trained, density))
+        trained.slow_to(rate_of_step(step, config))
         trained.optimiser.zero_grad()
         loss.backward()
         trained.optimiser.step()
@@ -190,7 +202,7 @@ def density_control(
                 "--density paper reads the sample points of the paper's losses; expected "
                 "--objective paper or both, or another --density"
             )
-        return PaperDensity(DensityRule())
+        return PaperDensity(DensityRule.without(config.without))
     if kind == "3dgs":
         layout = observations.layout
         antennas = np.concatenate([layout.tx_xyz, layout.rx_xyz])

@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+import sys
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import torch
@@ -44,6 +45,21 @@ class DensityRule:
     """Of two Gaussians closer than this, the more transparent one goes [m]."""
     cap: int = 1_500_000
     """Most Gaussians."""
+
+    @staticmethod
+    def without(parts: Collection[str]) -> DensityRule:
+        """The rule less what an ablation leaves out: densify, feature_gradients, prune.
+
+        What is left out never comes due, or asks for nothing.
+        """
+        never = sys.maxsize
+        kept = DensityRule()
+        return replace(
+            kept,
+            densify_every=never if "densify" in parts else kept.densify_every,
+            gradient_threshold=0.0 if "feature_gradients" in parts else kept.gradient_threshold,
+            prune_every=never if "prune" in parts else kept.prune_every,
+        )
 
 
 def frequency_gradient(features: Float[Tensor, "N 32"]) -> Float[Tensor, "N"]:
@@ -111,7 +127,7 @@ class PaperDensity:
     def _densify(self, trained: TrainableGaussians, points: SamplePoints) -> None:
         _, distance = nearest_gaussian(points.xyz, trained.gaussians.means)
         add = distance > self.rule.distance_factor * distance.median()
-        add &= frequency_gradient(points.features) > self.rule.gradient_threshold
+        add &= frequency_gradient(points.features) >= self.rule.gradient_threshold
         room = self.rule.cap - len(trained.gaussians)
         chosen = torch.nonzero(add)[:room, 0]
         if len(chosen) == 0:

@@ -59,6 +59,8 @@ class Task:
     """Variance per link that need not be explained."""
     points: SamplePoints | None
     """Sample points of the paper's losses; None without them."""
+    weighted: bool
+    """Whether eq. 5 weighs its points by ‖φ‖."""
 
     @staticmethod
     def of(observations: Observations, config: TrainConfig, seed: int, encoder: Encoder) -> Task:
@@ -77,6 +79,7 @@ class Task:
             target,
             noise_per_link(observations, target, config.unexplained),
             points,
+            "rf_weights" not in config.without,
         )
 
 
@@ -120,11 +123,10 @@ def _loss(
     links: np.ndarray,
     points: SamplePoints | None,
     band: slice,
-    weighted: bool,
 ) -> Float[Tensor, ""]:
     loss = torch.zeros(())
     if points is not None:
-        loss = loss + paper_loss(gaussians, points, weighted)
+        loss = loss + paper_loss(gaussians, points, task.weighted)
     if len(links):
         part = task.channel.rows(links)
         predicted = task.comparison.predicted(part.change(state.head, gaussians), links)
@@ -163,13 +165,13 @@ def refine(
     trained, first, memory = _resume(checkpoint, state.gaussians, rates)
     density = density_control(observations, state, config, seed, task)
     density.resume(memory)
-    last_good, weighted = LastGood(checkpoint), "rf_weights" not in config.without
+    last_good = LastGood(checkpoint)
     for step in range(first + 1, config.iterations + 1):
         links, chosen = _batch(task, config, seed, step)
         links = links if config.objective != "paper" else links[:0]
         points = None if task.points is None else task.points.rows(chosen)
         band = band_of_step(step, config, task.target.shape[1])
-        loss = _loss(task, state, trained.gaussians, links, points, band, weighted)
+        loss = _loss(task, state, trained.gaussians, links, points, band)
         if not torch.isfinite(loss):
             last_good.stop(step, loss, task.target, trained)
         last_good.remember(_arrays(step - 1, trained, density))

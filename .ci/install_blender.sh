@@ -113,6 +113,8 @@ cat >"$dir/blender" <<'WRAPPER'
 #!/bin/sh
 # Runs the Blender below this folder.
 here=$(cd "$(dirname "$(readlink -f "$0")")" && pwd)
+# For add-ons that start a second one.
+export BLENDER="${BLENDER:-$here/blender}"
 resources=$(ls -d "$here"/root/usr/share/blender/[0-9]* 2>/dev/null | head -n 1)
 [ -n "$resources" ] || resources=$here/root/usr/share/blender
 export BLENDER_SYSTEM_RESOURCES="$resources"

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import textwrap
 
 import bpy
@@ -101,8 +102,11 @@ def environment_path() -> str:
 
 
 def blender_program() -> str:
-    """The Blender that jobs open files with; empty for the environment's own bpy."""
+    """The Blender that jobs open files with; empty for the environment's own bpy.
+
+    A wrapper around Blender names itself in $BLENDER, as Blender knows only the program inside.
+    """
     chosen = preferences()
     if chosen and chosen.blender:
         return bpy.path.abspath(chosen.blender)
-    return bpy.app.binary_path
+    return os.environ.get("BLENDER") or bpy.app.binary_path

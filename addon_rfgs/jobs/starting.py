@@ -3,8 +3,11 @@
 
 from __future__ import annotations
 
+import signal
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
@@ -15,7 +18,7 @@ from .environment import interpreter
 from .following import QUEUE, follow
 from .plans import EvaluatePlan, GeneratePlan, Plan, TrainPlan
 from .preferences import blender_program, environment_path
-from .queue import ACTIVE, DONE, Job
+from .queue import ACTIVE, DONE, RUNNING, STOPPING, Job
 from .record import log_file
 
 _EVERY_S = 0.2
@@ -94,15 +97,17 @@ def carry_out(job: Job, report: Callable[[int, int], None] | None = None) -> str
     """
     seen = None
     try:
-        while job.state in ACTIVE:
-            QUEUE.step()
-            if report and job.progress and job.progress != seen:
-                seen = job.progress
-                report(int(seen.done), int(seen.total))
-            time.sleep(_EVERY_S)
+        with _ctrl_c():
+            while job.state in ACTIVE:
+                QUEUE.step()
+                if report and job.progress and job.progress != seen:
+                    seen = job.progress
+                    report(int(seen.done), int(seen.total))
+                time.sleep(_EVERY_S)
+    except KeyboardInterrupt:
+        _stop(job)
     except BaseException:
-        if job.process:
-            job.process.interrupt()
+        _stop(job)
         raise
     if job.state != DONE:
         reason = job.message.removeprefix("error: ")
@@ -112,3 +117,25 @@ def carry_out(job: Job, report: Callable[[int, int], None] | None = None) -> str
 
 def _absolute(folder: str) -> str:
     return str(Path(chosen_path(folder)).absolute())
+
+
+def _stop(job: Job) -> None:
+    """Asks a job to stop and waits until it has."""
+    QUEUE.stop(job)
+    while job.state in (RUNNING, STOPPING):
+        QUEUE.step()
+        time.sleep(_EVERY_S)
+
+
+@contextmanager
+def _ctrl_c() -> Iterator[None]:
+    """Lets Ctrl-C raise `KeyboardInterrupt`: without a window Blender takes it and does nothing."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        # Blender's own handler, set in C, is None here and cannot be put back from Python.
+        signal.signal(signal.SIGINT, before if before is not None else signal.SIG_DFL)

@@ -21,6 +21,7 @@ def play(stage: Any) -> Iterator[float]:
     yield from tab(stage, "RFGS_PT_devices")
     look_from_above(stage)
     yield from stage.shoot("overview", "VIEW")
+    yield from materials(stage)
     yield from jobs(stage)
     yield from gaussians(stage)
     yield from paths(stage)
@@ -47,6 +48,18 @@ def look_from_above(stage: Any) -> None:
     view.view_location = (0.6, 0.0, 0.6)
     view.view_rotation = mathutils.Euler((0.75, 0.0, 0.5)).to_quaternion()
     view.view_distance = 8.5
+
+
+def materials(stage: Any) -> Iterator[float]:
+    """What radio sees of the room."""
+    yield from tab(stage, "RFGS_PT_material", "RFGS_PT_guesses")
+    bpy.context.view_layer.objects.active = bpy.data.objects["wall_north"]
+    bpy.context.scene.rfgs.devices.overlay = False
+    with stage.override():
+        bpy.ops.rfgs.color_materials()
+        yield from stage.shoot("materials", "VIEW")
+        bpy.ops.rfgs.color_materials()
+    bpy.context.scene.rfgs.devices.overlay = True
 
 
 def jobs(stage: Any) -> Iterator[float]:

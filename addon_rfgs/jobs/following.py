@@ -83,7 +83,8 @@ def register() -> None:
         preferences().jobs.clear()
     listed = _listed()
     if not bpy.app.background and listed and remembered(listed):
-        bpy.app.timers.register(_restore, first_interval=0.0)
+        # Persistent, as Blender opens the file of its command line only after this.
+        bpy.app.timers.register(_restore, first_interval=0.0, persistent=True)
 
 
 def unregister() -> None:

@@ -14,10 +14,11 @@ import bpy
 
 def play(stage: Any) -> Iterator[float]:
     """Stops the job that is still running, then resumes it to its end."""
+    jobs = stage.part("jobs.following").QUEUE
+    assert [job.state for job in jobs.jobs] == ["Running"], "found before anything is pressed"
     yield from stage.open_tab("RFGS_PT_jobs")
     stored = stage.part("jobs.preferences").preferences()
     stored.python, stored.blender = stage.arguments
-    jobs = stage.part("jobs.following").QUEUE
     yield from stage.wait(lambda: bool(jobs.jobs), "what was left", 20.0)
     assert [job.state for job in jobs.jobs] == ["Running"], [job.state for job in jobs.jobs]
     bpy.ops.rfgs.stop_job()  # at once: it would be done before its button is found

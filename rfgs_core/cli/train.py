@@ -73,6 +73,8 @@ class TrainArgs:
     without: tuple[Part, ...] = ()
     """Leave out parts of the paper's recipe, as its table 2 does: rf_weights (in eq. 5), densify,
     feature_gradients (their condition for new Gaussians), prune; see `rfgs ablate`."""
+    temporal: float = 0.0
+    """Weight with which Gaussians are held to their place on the body from frame to frame."""
     settle: float = 0.0
     """Share of the steps at the end, 0 to 1, in which the rates fall to nothing."""
     coarse: float = 0.0
@@ -106,12 +108,15 @@ def run(args: TrainArgs) -> int:
         density=args.density,
         coarse_share=args.coarse,
         settle_share=args.settle,
+        temporal=args.temporal,
         without=args.without,
     )
     if args.without and args.objective == "csi":
         raise RfgsError(
             "--without leaves out parts of the paper's losses; expected --objective paper or both"
         )
+    if not args.temporal >= 0.0:
+        raise RfgsError(f"--temporal {args.temporal}: expected at least 0")
     if not 0.0 <= args.settle <= 1.0:
         raise RfgsError(f"--settle {args.settle}: expected a share from 0 to 1")
     if not 0.0 <= args.coarse <= 1.0:

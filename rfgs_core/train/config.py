@@ -57,6 +57,8 @@ class TrainConfig:
     """Share of the steps in which the channel loss widens from a quarter of the band to all."""
     without: tuple[Part, ...] = ()
     """Parts of the paper's recipe that are left out."""
+    temporal: float = 0.0
+    """Weight of the pull of each Gaussian to its place on the body in the frame before."""
     settle_share: float = 0.0
     """Share of the steps, at the end, in which the rates fall to nothing."""
     density: Density | None = None

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
-from jaxtyping import Complex, Float, Float64, Int64
+from jaxtyping import Bool, Complex, Float, Float64, Int64
 from torch import Tensor
 
 from rfgs_core.encode import MATCHED_FILTER, Encoder
@@ -54,6 +54,9 @@ class FrameState:
     """Where the bodies are and how they move."""
     track_id: Int64[np.ndarray, "M"]
     """Number that a Gaussian keeps from frame to frame."""
+
+    goes_on: Bool[np.ndarray, "M"] | None = None
+    """Which Gaussians were there in the frame before; None in a first frame."""
 
     @property
     def body(self) -> Int64[np.ndarray, "M"]:
@@ -161,15 +164,16 @@ def start_frame(
     tracks = _followed(before, maps, observations, config.bodies)
     axes_xy = tracks.axes_xy
     points = draw_points(maps, axes_xy, observations.bounds_m, config.num_gaussians, rng)
-    track_id = np.arange(len(points), dtype=np.int64)
+    track_id, goes_on = np.arange(len(points), dtype=np.int64), None
     if before is not None:
         points, track_id = _carry_over(before, maps, axes_xy, points)
+        goes_on = np.isin(track_id, before.track_id)
     gaussians = gaussians_at(points, outward_normals(points, axes_xy))
     power = fit_power(observations, gaussians, config)
     head = before.head if before is not None else new_head(observations, config, power)
     features = head.without_readings(encode(observations, points, encoder).features)
     gaussians = replace(gaussians, features=features)
-    return FrameState(gaussians, power, head, tracks, track_id)
+    return FrameState(gaussians, power, head, tracks, track_id, goes_on)
 
 
 def _followed(

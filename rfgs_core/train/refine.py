@@ -36,6 +36,7 @@ from rfgs_core.train.losses import SamplePoints, channel_loss, paper_loss
 from rfgs_core.train.observations import Observations
 from rfgs_core.train.parameters import GAUSSIAN_SHAPES, LearningRates, TrainableGaussians
 from rfgs_core.train.sampling import sample_points
+from rfgs_core.train.temporal import Continuity
 
 #: Our rates for the channel loss: positions move by fractions of a wavelength.
 CHANNEL_RATES = LearningRates(
@@ -165,13 +166,15 @@ def refine(
     trained, first, memory = _resume(checkpoint, state.gaussians, rates)
     density = density_control(observations, state, config, seed, task)
     density.resume(memory)
-    last_good = LastGood(checkpoint)
+    last_good, continuity = LastGood(checkpoint), _continuity(state, config)
     for step in range(first + 1, config.iterations + 1):
         links, chosen = _batch(task, config, seed, step)
         links = links if config.objective != "paper" else links[:0]
         points = None if task.points is None else task.points.rows(chosen)
         band = band_of_step(step, config, task.target.shape[1])
         loss = _loss(task, state, trained.gaussians, links, points, band)
+        if continuity is not None:
+            loss = loss + continuity.loss(trained.gaussians, trained.origin)
         if not torch.isfinite(loss):
             last_good.stop(step, loss, task.target, trained)
         last_good.remember(_arrays(step - 1, trained, density))
@@ -187,6 +190,13 @@ def refine(
         if on_step is not None:
             on_step(float(loss.detach()), len(trained.gaussians))
     return _with_gaussians(state, trained, config)
+
+
+def _continuity(state: FrameState, config: TrainConfig) -> Continuity | None:
+    if state.goes_on is None or config.temporal == 0.0:
+        return None
+    means = state.gaussians.means.detach().clone()
+    return Continuity(means, torch.from_numpy(state.goes_on), config.temporal)
 
 
 def density_control(

@@ -105,6 +105,19 @@ def test_the_papers_loss_falls_and_knows_no_links(observations, state, quick_con
     assert not same(refine(louder, state, config, 0), both)
 
 
+def test_a_heavy_temporal_weight_holds_those_that_go_on(observations, state, quick_config) -> None:
+    going_on = np.arange(12) < 6
+    state = replace(state, goes_on=going_on)
+    step_m = {}
+    for weight in (0.0, 1e3):
+        config = replace(quick_config, iterations=30, temporal=weight)
+        after = refine(observations, state, config, 0)
+        step = torch.linalg.norm(after.gaussians.means - state.gaussians.means, dim=1).numpy()
+        step_m[weight] = step[going_on].mean(), step[~going_on].mean()
+    assert step_m[1e3][0] < 0.2 * step_m[0.0][0]
+    assert step_m[1e3][1] > 0.5 * step_m[0.0][1]
+
+
 def test_no_steps_change_nothing(observations, state, quick_config) -> None:
     assert same(refine(observations, state, replace(quick_config, iterations=0), 0), state)
 

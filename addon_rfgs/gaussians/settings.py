@@ -90,6 +90,7 @@ class RFGS_PG_gaussians(bpy.types.PropertyGroup):
         default=0.005,
         min=0.0,
         max=1.0,
+        precision=3,
         subtype="FACTOR",
         update=_show,
     )

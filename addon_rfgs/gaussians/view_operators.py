@@ -7,7 +7,7 @@ import numpy as np
 from ..errors import AddonError
 from ..reporting import Progress
 from .attributes import positions
-from .clouds import clouds_in_file
+from .clouds import COLLECTION, clouds_in_file
 from .coloring import color_clouds
 from .display import set_display, shown
 from .timing import key_visibility
@@ -74,10 +74,20 @@ class RFGS_OT_add_crop_box(WithClouds, bpy.types.Operator):
         if not low:
             raise AddonError("no Gaussian is visible at this frame; lower the thresholds")
         bounds = np.array([np.min(low, axis=0), np.max(high, axis=0)])
-        box = bpy.data.objects.new("RFGS crop box", None)
-        box.empty_display_type = "CUBE"
+        box = _own_box(settings.crop_box)
+        box.rotation_euler = (0, 0, 0)
         box.location = bounds.mean(axis=0)
         box.scale = np.maximum(0.5 * np.ptp(bounds, axis=0) * (1 + _MARGIN), 1e-3)
-        context.scene.collection.objects.link(box)
         settings.crop_box, settings.use_crop = box, True
         return f"Cropping to {box.name}; move and scale it"
+
+
+def _own_box(chosen: bpy.types.Object | None) -> bpy.types.Object:
+    """The box that was added before, to be fitted again; a user's own Empty stays as it is."""
+    collection = bpy.data.collections[COLLECTION]
+    if chosen is not None and chosen.name in collection.objects:
+        return chosen
+    box = bpy.data.objects.new("RFGS crop box", None)
+    box.empty_display_type = "CUBE"
+    collection.objects.link(box)
+    return box

@@ -84,6 +84,10 @@ def test_crop_box_is_an_empty_that_acts_live(settings) -> None:
     assert points_shown(item) == inside == shown(item, settings.display()).sum()
     settings.use_crop = False
     assert points_shown(item) == 40
+    assert bpy.ops.rfgs.add_crop_box() == {"FINISHED"}
+    assert settings.crop_box == box, "fitted again"
+    bpy.context.view_layer.update()
+    assert points_shown(item) == 40
 
 
 def test_solid_view_gets_real_meshes_with_an_active_colour(settings) -> None:

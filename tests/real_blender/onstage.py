@@ -33,7 +33,7 @@ class Stage:
     def __init__(self, framebuffer: Path, out: Path, arguments: list[str]) -> None:
         self._framebuffer, self.out = framebuffer, out
         self.arguments = arguments
-        self.longest_s = 0.0
+        self.gaps_s: list[float] = []
         self._places: dict[str, tuple[int, int]] = {}
 
     @property
@@ -94,13 +94,13 @@ class Stage:
         return importlib.import_module(f"{EXTENSION}.{name}")
 
     def wait(self, until: Callable[[], bool], what: str, seconds: float = 400.0) -> Iterator[float]:
-        """Lets Blender go on until something is so; notes the longest time it did not answer."""
+        """Lets Blender go on until something is so; notes how long it took to come back."""
         begin_s = last_s = time.monotonic()
         while not until():
             if time.monotonic() - begin_s > seconds:
                 raise TimeoutError(f"not within {seconds:g} s: {what}")
             yield 0.1
-            self.longest_s = max(self.longest_s, time.monotonic() - last_s)
+            self.gaps_s.append(time.monotonic() - last_s)
             last_s = time.monotonic()
 
     def click(self, operator: str) -> Iterator[float]:

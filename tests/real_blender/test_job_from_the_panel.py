@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from window import play
 
@@ -38,8 +39,8 @@ def test_a_job_runs_from_the_button_to_the_import(
     told = json.loads((pictures / "told.json").read_text())
     assert told["clouds"][1:] == [60] * 4, "a cloud per frame, beside the static one"
     assert told["undone"] == [] and told["redone"] == told["clouds"]
-    # A frame of this window takes most of a second to draw without a GPU; jobs take minutes.
-    assert told["longest_s"] < 5.0
+    # A job takes every core, and without a GPU drawing needs one: most waits are short still.
+    assert len(told["gaps_s"]) > 20 and np.median(told["gaps_s"]) < 1.0, told["gaps_s"]
 
     second = play(
         *(blender, HERE / "play_restart.py", tiny_blend, pictures, *programs),

@@ -14,6 +14,7 @@ from typing import NoReturn, TextIO
 
 import bpy
 
+from .check.commands import add_fix
 from .devices.commands import add_devices
 from .errors import AddonError
 from .export.commands import add_export
@@ -33,6 +34,7 @@ from .scene.commands import add_check
 
 _COMMANDS = (
     add_check,
+    add_fix,
     add_devices,
     add_materials,
     add_export,

@@ -2,7 +2,9 @@
 """What the add-on stores: one property group each on objects, materials, scenes, windows."""
 
 import bpy
+from bpy.app.handlers import persistent
 
+from .check.settings import RFGS_PG_check, RFGS_PG_finding
 from .devices.properties import RFGS_PG_radio, search_radios
 from .devices.settings import RFGS_PG_devices
 from .export.settings import RFGS_PG_export
@@ -83,6 +85,7 @@ class RFGS_PG_scene(bpy.types.PropertyGroup):
 class RFGS_PG_window(bpy.types.PropertyGroup):
     """What lasts as long as the file is open, and is not saved in it."""
 
+    check: bpy.props.PointerProperty(type=RFGS_PG_check)  # type: ignore[valid-type]
     guesses: bpy.props.PointerProperty(type=RFGS_PG_guesses)  # type: ignore[valid-type]
 
 
@@ -99,8 +102,18 @@ CLASSES_TO_REGISTER = (
     RFGS_PG_scene,
     RFGS_PG_guess,
     RFGS_PG_guesses,
+    RFGS_PG_finding,
+    RFGS_PG_check,
     RFGS_PG_window,
 )
+
+
+@persistent
+def _forget(_path: object) -> None:
+    """Empties the lists about a file that is open no more."""
+    window = bpy.context.window_manager.rfgs
+    for name in ("check", "guesses"):
+        window.property_unset(name)
 
 
 def register() -> None:
@@ -111,11 +124,13 @@ def register() -> None:
     bpy.types.Material.rfgs = bpy.props.PointerProperty(type=RFGS_PG_material)
     bpy.types.Scene.rfgs = bpy.props.PointerProperty(type=RFGS_PG_scene)
     bpy.types.WindowManager.rfgs = bpy.props.PointerProperty(type=RFGS_PG_window)
+    bpy.app.handlers.load_post.append(_forget)
 
 
 def unregister() -> None:
     """Takes everything back that `register` added."""
     restore()
+    bpy.app.handlers.load_post.remove(_forget)
     del bpy.types.WindowManager.rfgs
     del bpy.types.Scene.rfgs
     del bpy.types.Material.rfgs

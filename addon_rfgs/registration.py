@@ -5,6 +5,7 @@ import inspect
 
 import bpy
 
+from .check.interface import CLASSES as CHECK
 from .devices.interface import CLASSES as DEVICES
 from .export.interface import CLASSES as EXPORT
 from .gaussians.interface import CLASSES as GAUSSIANS
@@ -14,7 +15,7 @@ from .paths.interface import CLASSES as PATHS
 from .removal.interface import CLASSES as REMOVAL
 
 #: Panels appear in this order.
-_CLASSES = (*DEVICES, *MATERIALS, *EXPORT, *JOBS, *GAUSSIANS, *PATHS, *REMOVAL)
+_CLASSES = (*DEVICES, *MATERIALS, *CHECK, *EXPORT, *JOBS, *GAUSSIANS, *PATHS, *REMOVAL)
 
 
 def register() -> None:

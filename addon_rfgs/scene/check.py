@@ -9,6 +9,7 @@ from typing import Any
 import bpy
 import numpy as np
 
+from .bodies import body_findings
 from .cameras import View, find_devices, find_views, perspective_cameras
 from .content import Content, content_ready
 from .findings import SEVERITIES
@@ -16,7 +17,9 @@ from .frames import file_label, unit_scale
 from .lights import is_dark
 from .materials import SAID, MaterialTable
 from .overrides import Overrides
+from .radio_check import device_findings, material_findings
 from .survey import Surface
+from .weight import weight_findings
 
 SCHEMA = "rfgs-check/1"
 
@@ -49,6 +52,10 @@ def check_scene(
             for slot in np.unique(surface.slots):
                 table.index(surface, int(slot))
         content.guesses += table.guesses
+        content.findings += body_findings(content.instances)
+        content.findings += weight_findings(content.surfaces)
+        content.findings += material_findings(scene, content, table)
+        content.findings += device_findings(content, devices)
         return report(scene, content, views, devices)
 
 
@@ -65,7 +72,8 @@ def report(
 
     Returns:
         `scene`, `objects`, `instances`, `cameras`, `devices`, `lights`, `guesses` and
-        `findings`, each finding with severity, object, message and remedy, the worst first.
+        `findings`, each finding with severity, object, message, remedy, kind and material, the
+        worst first.
     """
     space = content.space
     ordered = sorted(content.findings, key=lambda row: SEVERITIES.index(row.severity))

@@ -125,7 +125,7 @@ def _emptiness(scene: bpy.types.Scene, surfaces: list[Surface]) -> list[Finding]
     if not any(surface.moving for surface in surfaces):
         message = f"no moving mesh in frames {scene.frame_start}:{scene.frame_end}"
         remedy = "RF-GS needs one that moves by more than 1 mm"
-        return [Finding("error", "the scene", message, remedy)]
+        return [Finding("error", "the scene", message, remedy, "no_motion")]
     return []
 
 

@@ -24,6 +24,10 @@ class Finding:
     """What is so."""
     remedy: str = ""
     """What to do about it."""
+    kind: str = ""
+    """Which finding it is where something can be done by a button; see `check.fixes`."""
+    material: str = ""
+    """Name of the Blender material it is about."""
 
     @property
     def sentence(self) -> str:

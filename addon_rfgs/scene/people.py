@@ -74,6 +74,7 @@ def find_instances(
                 "the scene",
                 f"everything that moves is smaller than {_SIZE_M[0]:g} m",
                 "check the unit scale",
+                "unit_scale",
             )
         )
     return list(instances.values()), guesses, findings
@@ -214,10 +215,11 @@ def _size_findings(instance: Instance) -> list[Finding]:
     name, remedy = instance.name, "check the unit scale"
     if instance.kind == "person" and not smallest <= size_m <= largest:
         message = f"is a person of {size_m:.3g} m, expected {smallest:g} to {largest:g} m"
-        return [Finding("error", name, message, remedy)]
+        return [Finding("error", name, message, remedy, "unit_scale")]
     if height_m > largest:
         message = f"moves and is {height_m:.3g} m tall, expected at most {largest:g} m"
-        return [Finding("error", name, message, f"{remedy} or drop it (class Ignore)")]
+        remedy = f"{remedy} or drop it (class Ignore)"
+        return [Finding("error", name, message, remedy, "unit_scale")]
     return []
 
 

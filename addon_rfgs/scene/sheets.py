@@ -36,6 +36,7 @@ def double_sheets(surfaces: list[Surface]) -> list[Finding]:
                     f"has {area_m2:.2g} m² of double sheet, under {CLOSEST_M * 100:g} cm thick",
                     "make it a single sheet (its material holds the thickness), make it thicker "
                     "than 1 cm, or drop it (class Ignore)",
+                    "double_sheet",
                 )
             )
     return findings

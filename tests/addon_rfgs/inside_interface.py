@@ -21,6 +21,7 @@ COMMANDS = {
     "add_device": "devices add",
     "apply_guesses": "materials guess",
     "assign_material": "materials apply",
+    "check_scene": "check",
     "clear_paths": "paths",
     "color_materials": "materials color",
     "color_solid_view": "- changes a 3D view",
@@ -40,7 +41,9 @@ COMMANDS = {
     "remove_data": "remove-data",
     "remove_device": "devices remove",
     "render_groundtruth": "groundtruth",
+    "repair_finding": "fix",
     "resume_job": "resume",
+    "select_finding": "- the selection lives in the window",
     "show_csi": "- fills an Image Editor",
     "show_paths": "paths",
     "stop_job": "stop",
@@ -51,7 +54,7 @@ COMMANDS = {
 #: Operators that leave the file as it is; all others can be undone.
 LEAVE_THE_FILE = {
     *("evaluate_run", "export_bundle", "export_gaussians", "forget_job", "generate_dataset"),
-    *("guess_materials",),
+    *("check_scene", "guess_materials"),
     *("render_groundtruth", "resume_job", "stop_job", "test_environment", "train_gaussians"),
 }
 

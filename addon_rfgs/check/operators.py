@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Buttons of the scene check."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..errors import AddonError
+from ..reporting import Progress, Reporting
+from ..scene.findings import SEVERITIES
+from . import repairs, scene_repairs
+from .settings import RFGS_PG_finding
+
+
+def fill(context: bpy.types.Context) -> str:
+    """Checks the scene into the list of the window; returns what it comes to."""
+    check = context.window_manager.rfgs.check
+    found = repairs.findings(context.scene)
+    check.rows.clear()
+    for finding in found:
+        row = check.rows.add()
+        row.severity = finding.severity.upper()
+        for name in ("object", "message", "remedy", "kind", "material"):
+            setattr(row, name, getattr(finding, name))
+        row.repairable = repairs.repairable(context.scene, finding)
+    check.active = min(check.active, max(len(found) - 1, 0))
+    counts = [(sum(row.severity == name for row in found), name) for name in SEVERITIES]
+    said = [f"{count} {name}{'s' * (count > 1)}" for count, name in counts if count]
+    check.summary = ", ".join(said) or "Nothing to say"
+    return check.summary
+
+
+def _row(context: bpy.types.Context, index: int) -> RFGS_PG_finding:
+    """A row of the list, the active one for -1.
+
+    Raises:
+        AddonError: There is none.
+    """
+    check = context.window_manager.rfgs.check
+    index = check.active if index < 0 else index
+    if index >= len(check.rows):
+        raise AddonError("no such finding; check the scene first")
+    return check.rows[index]
+
+
+class _OnFinding(Reporting):
+    """Acts on a row of the list."""
+
+    index: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Finding",
+        description="Row of the list; -1 for the active one",
+        default=-1,
+        min=-1,
+        options={"SKIP_SAVE"},
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """There is a list."""
+        return len(context.window_manager.rfgs.check.rows) > 0
+
+
+class RFGS_OT_check_scene(Reporting, bpy.types.Operator):
+    """List what would go wrong with this scene: units, walls, people, materials, devices."""
+
+    bl_idname = "rfgs.check_scene"
+    bl_label = "Check Scene"
+
+    def work(self, context: bpy.types.Context, _progress: Progress) -> str:
+        """Fills the list."""
+        return fill(context)
+
+
+class RFGS_OT_select_finding(_OnFinding, bpy.types.Operator):
+    """Select the object that a finding is about, and show it."""
+
+    bl_idname = "rfgs.select_finding"
+    bl_label = "Select"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    def work(self, context: bpy.types.Context, _progress: Progress) -> str:
+        """Selects and frames."""
+        item = repairs.meant(context.scene, _row(context, self.index).finding())
+        if item.name not in context.view_layer.objects:
+            raise AddonError(f"object {item.name!r} is excluded from the view layer")
+        for other in context.selected_objects:
+            other.select_set(False)
+        item.hide_set(False)
+        item.select_set(True)
+        context.view_layer.objects.active = item
+        _frame(context)
+        return f"Selected {item.name}"
+
+
+class RFGS_OT_repair_finding(_OnFinding, bpy.types.Operator):
+    """Do what is safe about a finding, and check the scene again."""
+
+    bl_idname = "rfgs.repair_finding"
+    bl_label = "Fix"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Asks before everything changes its size."""
+        try:
+            finding = _row(context, self.index).finding()
+            if finding.kind not in repairs.ASK_FIRST:
+                return self.execute(context)
+            unit = scene_repairs.likely_unit(context.scene)
+        except AddonError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return context.window_manager.invoke_confirm(
+            self,
+            event,
+            title="Change the Unit Scale",
+            message=f"One unit becomes {unit:g} m, for everything in the scene",
+            confirm_text="Change",
+        )
+
+    def work(self, context: bpy.types.Context, _progress: Progress) -> str:
+        """Repairs."""
+        done = repairs.repair(context.scene, _row(context, self.index).finding())
+        context.view_layer.update()
+        return f"{done[0].upper()}{done[1:]}; left: {fill(context)}"
+
+
+def _frame(context: bpy.types.Context) -> None:
+    """Brings the selection into the view that the button stands in."""
+    area = context.area
+    if bpy.app.background or area is None or area.type != "VIEW_3D":
+        return
+    region = next(item for item in area.regions if item.type == "WINDOW")
+    with context.temp_override(area=area, region=region):
+        bpy.ops.view3d.view_selected()

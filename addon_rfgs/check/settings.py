@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The findings of the last scene check; they are not saved in the file."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..scene.findings import SEVERITIES, Finding
+
+
+class RFGS_PG_finding(bpy.types.PropertyGroup):
+    """One thing that a user should know about the scene."""
+
+    severity: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Severity",
+        description="How bad it is",
+        items=[(name.upper(), name.capitalize(), "") for name in SEVERITIES],
+    )
+    object: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Object", description="What it is about"
+    )
+    message: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Finding", description="What was found"
+    )
+    remedy: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Remedy", description="What to do about it"
+    )
+    kind: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Kind", description="Which kind of finding it is"
+    )
+    material: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Material", description="The material it is about"
+    )
+    repairable: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Repairable", description="Whether there is a safe repair"
+    )
+
+    def finding(self) -> Finding:
+        """The same as plain data."""
+        texts = (self.object, self.message, self.remedy, self.kind, self.material)
+        return Finding(self.severity.lower(), *texts)
+
+
+class RFGS_PG_check(bpy.types.PropertyGroup):
+    """The last scene check."""
+
+    rows: bpy.props.CollectionProperty(  # type: ignore[valid-type]
+        type=RFGS_PG_finding, name="Findings", description="What was found, the worst first"
+    )
+    active: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Finding", description="The active row of the list", default=0, min=0
+    )
+    summary: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Summary", description="How many findings of each kind there are"
+    )

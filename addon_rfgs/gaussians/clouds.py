@@ -87,12 +87,17 @@ def clouds_in_file() -> list[bpy.types.Object]:
     Raises:
         AddonError: There are none.
     """
-    collection = bpy.data.collections.get(COLLECTION)
-    items = collection.objects if collection else []
-    found = [item for item in items if item.type == "MESH" and GROUP in item.modifiers]
+    found = clouds_here()
     if not found:
         raise AddonError("no imported Gaussians in this file")
     return found
+
+
+def clouds_here() -> list[bpy.types.Object]:
+    """Clouds imported earlier, if any."""
+    collection = bpy.data.collections.get(COLLECTION)
+    items = collection.objects if collection else []
+    return [item for item in items if item.type == "MESH" and GROUP in item.modifiers]
 
 
 def chosen_clouds(context: bpy.types.Context) -> list[bpy.types.Object]:

@@ -72,6 +72,21 @@ def color_clouds(
     return limits
 
 
+def missing(meshes: Sequence[bpy.types.Mesh], coloring: Coloring) -> str | None:
+    """The attribute that no cloud has and the mode needs, None if there is nothing to say."""
+    needed = {
+        "PHASE": "rf_phase",
+        "FEATURES": FEATURE_NAME.format(0),
+        "ERROR": "error_m",
+        "ATTRIBUTE": coloring.attribute,
+    }.get(coloring.mode)
+    if needed is None or any(
+        name in mesh.attributes for mesh in meshes for name in (needed, f"ply_{needed}")
+    ):
+        return None
+    return needed or "(no name given)"
+
+
 def encoded_colors(mesh: bpy.types.Mesh) -> np.ndarray:
     """Display colours as the PLY says, sRGB-encoded in [0, 1], [M, 3]; grey if it does not."""
     f_dc = [attributes.get(mesh, f"ply_{name}") for name in COLOR]

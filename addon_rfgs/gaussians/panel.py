@@ -5,7 +5,8 @@ import bpy
 
 from ..tab import Tab
 from .cloud_mesh import FRAME
-from .coloring import RAMPED
+from .clouds import clouds_here
+from .coloring import RAMPED, missing
 
 
 class RFGS_PT_gaussians(Tab, bpy.types.Panel):
@@ -71,6 +72,9 @@ class RFGS_PT_gaussians_color(_Part, bpy.types.Panel):
         settings = context.scene.rfgs.gaussians
         if settings.color_by == "ATTRIBUTE":
             self.layout.prop(settings, "color_attribute")
+        lacking = missing([item.data for item in clouds_here()], settings.coloring())
+        if lacking and clouds_here():
+            self.layout.label(text=f"No cloud has {lacking}", icon="ERROR")
         if settings.color_by in {*RAMPED, "ATTRIBUTE", "AUTO"}:
             self.layout.prop(settings, "use_range")
             if settings.use_range:

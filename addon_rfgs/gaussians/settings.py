@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import bpy
@@ -49,6 +50,20 @@ def _show(settings: RFGS_PG_gaussians, _context: Any) -> None:
 
 def _color(settings: RFGS_PG_gaussians, _context: Any) -> None:
     _each(lambda items: color_clouds([item.data for item in items], settings.coloring()))
+
+
+def _fix_range(settings: RFGS_PG_gaussians, context: Any) -> None:
+    """A range that was never given starts as the one that was found."""
+
+    def fill(items: list[bpy.types.Object]) -> None:
+        found = replace(settings.coloring(), limits=None)
+        limits = color_clouds([item.data for item in items], found)
+        if limits:
+            settings.range_low, settings.range_high = limits
+
+    if settings.use_range and not settings.is_property_set("range_low"):
+        _each(fill)
+    _color(settings, context)
 
 
 def _time(settings: RFGS_PG_gaussians, _context: Any) -> None:
@@ -150,7 +165,7 @@ class RFGS_PG_gaussians(bpy.types.PropertyGroup):
         name="Fixed range",
         description="Give the ends of the colour ramp instead of finding them from the values",
         default=False,
-        update=_color,
+        update=_fix_range,
     )
     range_low: bpy.props.FloatProperty(  # type: ignore[valid-type]
         name="From",

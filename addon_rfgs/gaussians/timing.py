@@ -23,6 +23,7 @@ def key_visibility(items: Sequence[bpy.types.Object], offset: int, interpolation
             recorded frame is nearer, `HOLD` until the next recorded frame.
     """
     framed = {int(item.data[FRAME]): item for item in items if FRAME in item.data}
+    now = bpy.context.scene.frame_current
     shown = _spans(sorted(framed), interpolation)
     for (frame, item), (first, last) in zip(sorted(framed.items()), shown, strict=True):
         _drop_keys(item)
@@ -33,6 +34,10 @@ def key_visibility(items: Sequence[bpy.types.Object], offset: int, interpolation
             for at, hidden in keys:
                 setattr(item, name, hidden)
                 item.keyframe_insert(name, frame=at)
+            # Blender looks at keys of what is hidden only when the frame changes.
+            early = first is not None and now < first + offset
+            late = last is not None and now > last + offset
+            setattr(item, name, early or late)
 
 
 def _spans(frames: list[int], interpolation: str) -> list[tuple[int | None, int | None]]:

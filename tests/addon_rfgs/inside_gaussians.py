@@ -13,6 +13,7 @@ from splat_files import BARE, COLUMNS, rows_of, write
 from splat_scene import FRAMES, cloud
 
 from addon_rfgs.gaussians import attributes, color_maps
+from addon_rfgs.gaussians.coloring import missing
 from addon_rfgs.gaussians.display import shown
 
 pytestmark = pytest.mark.usefixtures("registered")
@@ -109,6 +110,10 @@ def test_colours_are_what_numpy_says(settings) -> None:
     run = Path(settings.path) / "gaussians"
     stored = {frame: dict(np.load(run / f"{frame:06d}.features.npz")) for frame in FRAMES}
     settings.color_by = "POWER"
+    found = colors(5)
+    settings.use_range = True
+    np.testing.assert_allclose(colors(5), found, atol=1e-5)  # starts as what was found
+    settings.use_range = False
     low, high = np.percentile(np.concatenate([s["rf_power_db"] for s in stored.values()]), [5, 99])
     share = np.clip((stored[5]["rf_power_db"] - low) / (high - low), 0, 1) * 4
     expected = np.interp(share, range(5), color_maps.RAMP[:, 1])
@@ -159,8 +164,11 @@ def test_modes_without_their_numbers_say_so(tmp_path: Path) -> None:
     assert bpy.ops.rfgs.import_gaussians() == {"FINISHED"}
     grey = attributes.get(bpy.data.objects["Gaussians static"].data, "rfgs_color")
     np.testing.assert_allclose(grey[:, :3], color_maps.linear(np.array(0.5)), rtol=1e-5)
+    meshes = [bpy.data.objects["Gaussians static"].data]
+    assert missing(meshes, settings.coloring()) is None
     for mode in ("POWER", "PHASE", "FEATURES", "ERROR", "ATTRIBUTE"):
         settings.color_by = mode
+        assert mode == "POWER" or missing(meshes, settings.coloring())
         with pytest.raises(RuntimeError, match="no Gaussian here"):
             bpy.ops.rfgs.update_display()
 
@@ -182,6 +190,9 @@ def test_clouds_are_keyed_on_the_timeline(settings, interpolation: str, expected
         settings.frame_offset = offset
         for frame, clouds in expected.items():
             assert visible(frame + offset) == clouds, (offset, frame)
+            settings.frame_offset = offset  # keyed again at this frame
+            seen = [other for other in FRAMES if not cloud(other).hide_viewport]
+            assert seen == clouds, "without going to another frame"
             assert not bpy.data.objects["Gaussians static"].hide_render
     assert item.location.x == 3.0 and item.animation_data.action, "other keys stay"
 
@@ -209,6 +220,14 @@ def test_settings_can_be_made_before_there_are_gaussians_and_in_edit_mode(settin
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.context.scene.rfgs.gaussians.size = 2.0
     assert not bpy.ops.rfgs.update_display.poll()
+
+
+def test_an_import_while_a_cloud_is_edited(settings) -> None:
+    bpy.context.scene.frame_set(2)
+    bpy.context.view_layer.objects.active = cloud(2)
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert bpy.ops.rfgs.import_gaussians() == {"FINISHED"}
+    assert points_shown(cloud(2)) == 40
 
 
 def test_units_of_the_scene_are_kept(tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ def play(stage: Any) -> Iterator[float]:
     look_from_above(stage)
     yield from stage.shoot("overview", "VIEW")
     yield from materials(stage)
+    yield from check(stage)
     yield from jobs(stage)
     yield from gaussians(stage)
     yield from paths(stage)
@@ -60,6 +61,16 @@ def materials(stage: Any) -> Iterator[float]:
         yield from stage.shoot("materials", "VIEW")
         bpy.ops.rfgs.color_materials()
     bpy.context.scene.rfgs.devices.overlay = True
+
+
+def check(stage: Any) -> Iterator[float]:
+    """A person turned inside out, found and repaired."""
+    yield from tab(stage, "RFGS_PT_check")
+    bpy.data.objects["person_body"].data.flip_normals()
+    bpy.ops.rfgs.check_scene()
+    bpy.ops.rfgs.select_finding()
+    yield from stage.shoot("check", "VIEW")
+    bpy.ops.rfgs.repair_finding()
 
 
 def jobs(stage: Any) -> Iterator[float]:

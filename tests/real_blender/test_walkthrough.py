@@ -38,7 +38,9 @@ def test_the_walkthrough_can_be_walked(
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
     assert "Traceback" not in done.stdout + done.stderr
     pictures = sorted(made.glob("*.png"))
-    assert {file.stem for file in pictures} >= {"overview", "jobs", "gaussians", "paths"}
+    assert {file.stem for file in pictures} >= {
+        *("overview", "materials", "check", "jobs", "gaussians", "paths")
+    }
     kept = os.environ.get("PICTURES")
     for file in pictures:
         with Image.open(file) as image:

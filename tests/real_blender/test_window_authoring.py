@@ -30,3 +30,10 @@ def test_antennas_are_drawn_where_they_are_wanted(blender, tmp_path: Path) -> No
     assert "Traceback" not in done.stdout + done.stderr
     on, off = (bluish(tmp_path / f"overlay_{name}.png") for name in ("on", "off"))
     assert on > 2000 and off < 0.1 * on, (on, off)
+
+
+def test_materials_and_the_scene_check_in_a_window(blender, tmp_path: Path) -> None:
+    script = HERE / "play_authoring.py"
+    done = play(blender, script, LIVING_ROOM, tmp_path, size=(1400, 1400))
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
+    assert "Traceback" not in done.stdout + done.stderr

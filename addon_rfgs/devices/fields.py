@@ -23,7 +23,7 @@ def draw_fields(layout: bpy.types.UILayout, rf: RadioFields, role: str) -> None:
         column.prop(rf, f"{array}_rows", text="Rows")
         column.prop(rf, f"{array}_cols", text="Columns")
         column.prop(rf, f"{array}_spacing_wavelengths", text="Spacing [λ]")
-        column.prop(rf, f"{array}_spacing_m", text="or Distance")
+        column.prop(rf, f"{array}_spacing_m", text="or [m]")
     column = layout.column(align=True)
     column.prop(rf, "pattern")
     column.prop(rf, "polarization")

@@ -166,11 +166,10 @@ class RFGS_OT_place_radio(Reporting, bpy.types.Operator):
     )
     margin_m: bpy.props.FloatProperty(  # type: ignore[valid-type]
         name="Margin",
-        description="Free space on each side of the selection",
+        description="Free space on each side of the selection [m]",
         default=MARGIN_M,
         min=0.0,
         soft_max=10.0,
-        subtype="DISTANCE",
     )
     keep: bpy.props.BoolProperty(  # type: ignore[valid-type]
         name="Keep Others",

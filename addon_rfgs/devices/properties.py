@@ -44,13 +44,13 @@ def _number(name: str, label: str, text: str, **limits: float) -> Any:
 def _spacing_m(name: str, label: str) -> Any:
     return bpy.props.FloatProperty(
         name=label,
-        description="Distance of neighbouring elements; 0 takes half a wavelength of any band",
+        # No unit subtype: Blender would take it for its own units, which need not be metres.
+        description="Distance of neighbouring elements [m]; 0 takes half a wavelength of any band",
         default=RADIO_DEFAULTS[name],
         min=0.0,
         soft_max=1.0,
         precision=4,
         step=0.1,
-        subtype="DISTANCE",
     )
 
 

@@ -34,12 +34,11 @@ class RFGS_OT_assign_material(Reporting, bpy.types.Operator):
     )
     thickness_m: bpy.props.FloatProperty(  # type: ignore[valid-type]
         name="Thickness",
-        description="Of the slab behind the surface; 0 takes the material's own",
+        description="Of the slab behind the surface [m]; 0 takes the material's own",
         default=0.0,
         min=0.0,
         soft_max=1.0,
         precision=4,
-        subtype="DISTANCE",
     )
     scattering: bpy.props.FloatProperty(  # type: ignore[valid-type]
         name="Scattering",

@@ -135,6 +135,7 @@ def use(folder: Path) -> None:
     bpy.data.objects["Cube"].rfgs.object_class = "PERSON"
     bpy.data.materials["Paint"].rfgs.radio_material = "brick"
     ops.guess_materials()
+    ops.check_scene()
     ops.color_materials()
     scene.rfgs.jobs.frames = "1:9"
     scene.rfgs.gaussians.path = str(folder / "cloud.ply")

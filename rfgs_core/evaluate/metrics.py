@@ -17,6 +17,7 @@ from rfgs_core.evaluate.image import IMAGE_KEYS
 from rfgs_core.evaluate.oracle import oracle_scores
 from rfgs_core.evaluate.pictures import Values, has_pictures, mean_of, picture_metrics
 from rfgs_core.evaluate.provenance import conditions, hardware, limits, now, versions
+from rfgs_core.evaluate.residual import GAUSSIANS_ALONE, with_residual
 from rfgs_core.evaluate.rf import RF_KEYS, frame_rf, pool_rf, rf_values
 from rfgs_core.evaluate.scene import EvaluatedRun, Scene
 from rfgs_core.evaluate.verdicts import verdicts
@@ -93,7 +94,7 @@ class _Table:
     def groups(self, image: dict[str, Values]) -> dict[str, dict[str, Values]]:
         """All groups of all names, pooled over frames; what is missing is None."""
         result: dict[str, dict[str, Values]] = {}
-        for name in (METHOD, *CONTROLS, "silhouette", "oracle_init"):
+        for name in (METHOD, GAUSSIANS_ALONE, *CONTROLS, "silhouette", "oracle_init"):
             rows = list(self.rows.get(name, {}).values())
             geometry = mean_of(
                 [row["geometry"] for row in rows if "geometry" in row], GEOMETRY_KEYS
@@ -148,10 +149,13 @@ def _none(keys: tuple[str, ...]) -> Values:
 def _evaluate_frame(scene: Scene, frame: int, table: _Table, on_step: Callable[[], Any]) -> None:
     """Method and controls on one frame."""
     reference, csi = scene.reference(frame), scene.csi(frame)
-    own = ControlResult(score=scene.score(frame), delta=scene.run.predict(frame))
-    assert own.score is not None
-    evidence = scene.evidence(frame, own.score)
-    _add(scene, table, METHOD, frame, own, reference, csi)
+    score, predicted = scene.score(frame), scene.run.predict(frame)
+    evidence = scene.evidence(frame, score)
+    # Without phases there is no channel to compare with, and nothing is left to add.
+    whole = with_residual(predicted, evidence) if scene.observe == "complex" else predicted
+    _add(scene, table, METHOD, frame, ControlResult(score, whole), reference, csi)
+    model = ControlResult(delta=predicted, reason="the method's own Gaussians without the residual")
+    _add(scene, table, GAUSSIANS_ALONE, frame, model, reference, csi)
     on_step()
     for name, control in CONTROLS.items():
         result = phase_free.answer(name, control, evidence, scene.observe)

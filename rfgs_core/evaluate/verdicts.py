@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from rfgs_core.evaluate.residual import GAUSSIANS_ALONE
+
 #: Beginnings of sentences; reports colour them.
 WON, LOST, OPEN = "Won: ", "Lost: ", "Not decided: "
 #: Share of the control's error 1 − F that the method must remove on radios between devices.
@@ -102,7 +104,8 @@ def _other_geometry(metrics: dict[str, Any]) -> list[str]:
 def _rf(metrics: dict[str, Any], key: str) -> str:
     """Held-out channel entries against the best control."""
     own = _value(metrics, "rf", key)
-    values = {name: _control(metrics, name, "rf", key) for name in metrics["controls"]}
+    rivals = [name for name in metrics["controls"] if name != GAUSSIANS_ALONE]
+    values = {name: _control(metrics, name, "rf", key) for name in rivals}
     known = {name: value for name, value in values.items() if value is not None}
     what = "held-out elements" if key.startswith("element") else "held-out subcarriers"
     if own is None or not known:

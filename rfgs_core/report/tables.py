@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rfgs_core.evaluate.controls import CONTROLS
+from rfgs_core.evaluate.residual import GAUSSIANS_ALONE
 
 METHOD_LABEL = "RF-GS"
 
@@ -138,7 +139,7 @@ def _table(metrics: Mapping[str, Any], group: str) -> Table:
 
 def _place(name: str) -> tuple[int, str]:
     """Order of controls: as they are listed in the code, the ceiling last."""
-    order = [*CONTROLS, "silhouette", "oracle_init"]
+    order = [GAUSSIANS_ALONE, *CONTROLS, "silhouette", "oracle_init"]
     return (order.index(name) if name in order else len(order), name)
 
 

@@ -24,6 +24,7 @@ from rfgs_core.run.calibration import read_calibration
 from rfgs_core.train.channel import Channel
 from rfgs_core.train.head import HEAD_SHAPES, RadioHead
 from rfgs_core.train.observations import Observations, Reported, observe
+from rfgs_core.train.unseen_pairs import levelled
 
 #: Schema of `config.json`.
 SCHEMA = "rfgs-run/1"
@@ -142,15 +143,22 @@ class Run:
     def predict(self, frame: int) -> Complex64[np.ndarray, "tx rx subcarrier"]:
         """Predicted csi − csi_static on every measured link, held-out ones included.
 
-        Of a calibrated run: as devices with the offsets of the empty room's capture see it.
+        Device pairs that training did not see get the mean power of reflected powers without
+        phases. Of a calibrated run: as devices with the offsets of the empty room's capture see it.
         """
         observations = self.observations(frame)
         everything = np.ones(len(observations.freq_hz), dtype=bool)
         channel = Channel.of(observations, observations.layout.measured, everything)
+        head, gaussians = self.head, self.moving(frame)
         with torch.no_grad():
-            change = channel.change(self.head, self.moving(frame)).numpy()
+            change = channel.change(head, gaussians).numpy()
         csi = np.zeros_like(observations.delta)
         csi[channel.tx, channel.rx] = change
+        power = 10 ** (self.attributes(frame)["rf_power_db"].astype(np.float64) / 10)
+        csi = levelled(
+            *(csi, observations.links, observations.layout, observations.centre_hz),
+            *(head, gaussians, power),
+        )
         if self.calibrated:
             offsets = read_calibration(self.path, frame).capture
             turn = offsets.turn(observations.layout, observations.freq_hz)

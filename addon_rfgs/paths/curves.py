@@ -11,6 +11,7 @@ import numpy as np
 
 from ..errors import AddonError
 from ..gaussians.color_maps import ramp
+from ..scene.frames import unit_scale
 from .dataset import PathDataset, Paths
 
 COLLECTION = "RF-GS Paths"
@@ -88,6 +89,8 @@ def show_paths(
         when = "static" if choice.frame is None else f"frame {choice.frame}"
         levels = (part.power_db - (top - choice.range_db)) / max(choice.range_db, 1e-9) * _LEVELS
         item = _curve_object(f"{choice.radio}: {ends}, {when}", part, levels, materials, choice)
+        # Corners are metres; the object's scale carries them into the scene's units.
+        item.scale = (1 / unit_scale(scene),) * 3
         item["power_db"] = [float(value) for value in part.power_db]
         item["delay_s"] = [float(value) for value in part.delay_s]
         item["interactions"] = json.dumps([part.interactions(i) for i in range(len(part))])

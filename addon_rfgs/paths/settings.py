@@ -54,11 +54,10 @@ class RFGS_PG_paths(bpy.types.PropertyGroup):
     )
     radius_m: bpy.props.FloatProperty(  # type: ignore[valid-type]
         name="Radius",
-        description="Thickness of the curves",
+        # No unit subtype: Blender would take it for its own units, which need not be metres.
+        description="Thickness of the curves [m]",
         default=0.004,
         min=0.0,
         soft_max=0.1,
-        subtype="DISTANCE",
-        unit="LENGTH",
         precision=4,
     )

@@ -133,6 +133,13 @@ def test_each_path_of_a_link_is_a_curve(scene, data: Path) -> None:
         assert met == [["", "Wall", "Person"][number] for number in core.object[row, :used]]
 
 
+def test_paths_stand_in_the_scenes_own_units(scene) -> None:
+    scene.unit_settings.scale_length = 0.01
+    assert bpy.ops.rfgs.show_paths() == {"FINISHED"}
+    for item in curves():
+        assert tuple(item.scale) == pytest.approx((100.0, 100.0, 100.0))
+
+
 def test_the_strongest_within_the_range_are_taken(scene) -> None:
     settings = scene.rfgs.paths
     settings.count, settings.range_db = 2, 15.0

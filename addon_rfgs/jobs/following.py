@@ -56,8 +56,11 @@ def show() -> None:
             row.share = job.progress.share if job.progress else 0.0
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
-            if area.type in {"VIEW_3D", "PREFERENCES"}:
-                area.tag_redraw()
+            # The sidebar alone: drawing a heavy scene twice a second would make Blender slow.
+            part = {"VIEW_3D": "UI", "PREFERENCES": "WINDOW"}.get(area.type)
+            for region in area.regions:
+                if region.type == part:
+                    region.tag_redraw()
 
 
 def _tick() -> float | None:

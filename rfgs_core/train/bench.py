@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How long a frame takes to train until its validation loss stands still."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from tqdm import tqdm
+
+from rfgs_core.dataset import open_dataset
+from rfgs_core.errors import RfgsError
+from rfgs_core.frames import chosen_frames
+from rfgs_core.seeds import sub_seed
+from rfgs_core.train.channel import Channel
+from rfgs_core.train.comparison import comparison_of
+from rfgs_core.train.config import TrainConfig
+from rfgs_core.train.frame import FrameState, noise_per_link, solve_reflectivity, start_frame
+from rfgs_core.train.losses import channel_loss
+from rfgs_core.train.observations import Observations, observe
+from rfgs_core.train.refine import refine
+
+#: Gaussians of the timed frame.
+GAUSSIANS = 20_000
+#: The loss stands still when it changes by less than this …
+STILL = 0.01
+#: … over as many steps.
+WINDOW = 50
+#: Steps after which nobody waits any longer.
+LIMIT = 1000
+
+
+def bench_training(dataset: Path, radio: str, frame: int | None) -> dict[str, Any]:
+    """Trains one frame until the loss of links that training does not see stands still.
+
+    A tenth of the visible links is set aside for that, by chance. What is timed is everything
+    from the channel to the Gaussians: locating the body, the start, reflectivities and steps.
+
+    Args:
+        dataset: Folder of the dataset.
+        radio: Name of the radio.
+        frame: Frame number; None for the first.
+
+    Returns:
+        `train_s` of the training whose last window stands still, its `start_s`, `steps`,
+        `loss_start`, `loss_end`, `still`, and what was trained.
+
+    Raises:
+        RfgsError: There is no such radio or frame.
+    """
+    sequence = open_dataset(dataset).sequence()
+    if radio not in sequence.radios:
+        raise RfgsError(f"{dataset} has no radio {radio!r}; it has {', '.join(sequence.radios)}")
+    frame = chosen_frames(None if frame is None else str(frame), sequence.frames)[0]
+    whole = observe(sequence, radio, frame)
+    rng = np.random.default_rng(sub_seed(0, "bench training"))
+    aside = whole.links & (rng.random(whole.links.shape) < 0.1)
+    seen = replace(
+        whole,
+        links=whole.links & ~aside,
+        delta=np.where(aside[..., None], 0, whole.delta).astype(np.complex64),
+    )
+    config = TrainConfig(num_gaussians=GAUSSIANS)
+    seed = sub_seed(0, "bench training", "fit")
+    begin = time.perf_counter()
+    start = solve_reflectivity(seen, start_frame(seen, config, seed, None), config)
+    start_s = time.perf_counter() - begin
+    losses, train_s = [_validation(whole, aside, start, config)], start_s
+    with tqdm(total=LIMIT, desc="bench training", unit="step") as bar:
+        for steps in range(WINDOW, LIMIT + 1, WINDOW):
+            # From the start each time: what is timed is one training of so many steps.
+            begin = time.perf_counter()
+            state = refine(seen, start, replace(config, iterations=steps), seed)
+            train_s = start_s + time.perf_counter() - begin
+            losses.append(_validation(whole, aside, state, config))
+            bar.update(WINDOW)
+            bar.set_postfix_str(f"validation loss {losses[-1]:.4g}")
+            still = abs(losses[-1] - losses[-2]) < STILL * losses[-2]
+            if still:
+                break
+    return {
+        "gaussians": GAUSSIANS,
+        "links": int(seen.links.sum()),
+        "tones": int(seen.tones.sum()),
+        "train_s": train_s,
+        "start_s": start_s,
+        "steps": WINDOW * (len(losses) - 1),
+        "loss_start": losses[0],
+        "loss_end": losses[-1],
+        "still": still,
+    }
+
+
+def _validation(
+    whole: Observations, aside: np.ndarray, state: FrameState, config: TrainConfig
+) -> float:
+    """Channel loss of the links that were set aside."""
+    held = replace(whole, links=aside)
+    channel = Channel.of(held, held.links, held.tones)
+    target = comparison_of(held).measured()
+    noise = noise_per_link(held, target, config.unexplained)
+    with torch.no_grad():
+        return float(channel_loss(channel.change(state.head, state.gaussians), target, noise))

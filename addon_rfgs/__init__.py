@@ -9,10 +9,11 @@ import atexit
 import bpy
 
 from . import command, properties, registration
+from .channels import waiting
 from .devices import overlay
 from .jobs import following
 
-_MODULES = (properties, registration, overlay, command, following)
+_MODULES = (properties, registration, overlay, command, following, waiting)
 
 
 def register() -> None:

@@ -14,6 +14,7 @@ from typing import NoReturn, TextIO
 
 import bpy
 
+from .channels.commands import add_csi
 from .check.commands import add_fix
 from .devices.commands import add_devices
 from .errors import AddonError
@@ -40,6 +41,7 @@ _COMMANDS = (
     add_export,
     add_import,
     add_export_gaussians,
+    add_csi,
     add_environment,
     add_generate,
     add_train,

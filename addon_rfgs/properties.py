@@ -4,6 +4,7 @@
 import bpy
 from bpy.app.handlers import persistent
 
+from .channels.settings import RFGS_PG_channels
 from .check.settings import RFGS_PG_check, RFGS_PG_finding
 from .devices.properties import RFGS_PG_radio, search_radios
 from .devices.settings import RFGS_PG_devices
@@ -77,6 +78,7 @@ class RFGS_PG_scene(bpy.types.PropertyGroup):
     devices: bpy.props.PointerProperty(type=RFGS_PG_devices)  # type: ignore[valid-type]
     export: bpy.props.PointerProperty(type=RFGS_PG_export)  # type: ignore[valid-type]
     gaussians: bpy.props.PointerProperty(type=RFGS_PG_gaussians)  # type: ignore[valid-type]
+    channels: bpy.props.PointerProperty(type=RFGS_PG_channels)  # type: ignore[valid-type]
     jobs: bpy.props.PointerProperty(type=RFGS_PG_jobs)  # type: ignore[valid-type]
     paths: bpy.props.PointerProperty(type=RFGS_PG_paths)  # type: ignore[valid-type]
     materials: bpy.props.PointerProperty(type=RFGS_PG_materials)  # type: ignore[valid-type]
@@ -96,6 +98,7 @@ CLASSES_TO_REGISTER = (
     RFGS_PG_devices,
     RFGS_PG_export,
     RFGS_PG_gaussians,
+    RFGS_PG_channels,
     RFGS_PG_jobs,
     RFGS_PG_paths,
     RFGS_PG_materials,

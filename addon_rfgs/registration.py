@@ -5,6 +5,7 @@ import inspect
 
 import bpy
 
+from .channels.interface import CLASSES as CHANNELS
 from .check.interface import CLASSES as CHECK
 from .devices.interface import CLASSES as DEVICES
 from .export.interface import CLASSES as EXPORT
@@ -15,7 +16,7 @@ from .paths.interface import CLASSES as PATHS
 from .removal.interface import CLASSES as REMOVAL
 
 #: Panels appear in this order.
-_CLASSES = (*DEVICES, *MATERIALS, *CHECK, *EXPORT, *JOBS, *GAUSSIANS, *PATHS, *REMOVAL)
+_CLASSES = (*DEVICES, *MATERIALS, *CHECK, *EXPORT, *JOBS, *GAUSSIANS, *CHANNELS, *PATHS, *REMOVAL)
 
 
 def register() -> None:

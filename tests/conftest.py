@@ -8,9 +8,13 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from jaxtyping import install_import_hook
+
+if TYPE_CHECKING:
+    from rfgs_core.run import Run
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -47,3 +51,16 @@ def tiny_dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from tiny_dataset import write_tiny_dataset
 
     return write_tiny_dataset(tmp_path_factory.mktemp("tiny") / "dataset")
+
+
+@pytest.fixture(scope="session")
+def small_run(tiny_dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """A run of 40 Gaussians on both frames; copy it before changing anything."""
+    from rfgs_core.dataset import open_dataset
+    from rfgs_core.run.training import train_sequence
+    from rfgs_core.train.config import TrainConfig
+
+    data = open_dataset(tiny_dataset)
+    config = TrainConfig(num_gaussians=40, power_steps=0, solver_steps=2, iterations=1)
+    out = tmp_path_factory.mktemp("predicted") / "run"
+    return train_sequence(data, data.sequence(), "wifi", [1, 2], config, out)

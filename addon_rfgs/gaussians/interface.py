@@ -2,7 +2,6 @@
 """Operators and panels of this folder, in the order they are registered."""
 
 from . import panel
-from .csi_image import RFGS_OT_show_csi
 from .operators import (
     RFGS_OT_compare_gaussians,
     RFGS_OT_export_gaussians,
@@ -21,6 +20,5 @@ CLASSES = (
     RFGS_OT_update_display,
     RFGS_OT_color_solid_view,
     RFGS_OT_add_crop_box,
-    RFGS_OT_show_csi,
     *panel.CLASSES,
 )

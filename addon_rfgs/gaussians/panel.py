@@ -122,19 +122,6 @@ class RFGS_PT_gaussians_compare(_Part, bpy.types.Panel):
         row.operator("rfgs.compare_gaussians", text="All Frames").every_frame = True
 
 
-class RFGS_PT_gaussians_csi(_Part, bpy.types.Panel):
-    """Measured and predicted channels as an image."""
-
-    bl_idname = "RFGS_PT_gaussians_csi"
-    bl_label = "Channels"
-    names = ("image_path",)
-
-    def draw(self, context: bpy.types.Context) -> None:
-        """Shows the picture's path and the button."""
-        super().draw(context)
-        self.layout.operator("rfgs.show_csi", icon="IMAGE_DATA")
-
-
 CLASSES = (
     RFGS_PT_gaussians,
     RFGS_PT_gaussians_display,
@@ -142,5 +129,4 @@ CLASSES = (
     RFGS_PT_gaussians_crop,
     RFGS_PT_gaussians_timing,
     RFGS_PT_gaussians_compare,
-    RFGS_PT_gaussians_csi,
 )

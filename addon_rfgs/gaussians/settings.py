@@ -200,13 +200,6 @@ class RFGS_PG_gaussians(bpy.types.PropertyGroup):
         items=TRUE_MESHES,
         default="MOVING",
     )
-    image_path: bpy.props.StringProperty(  # type: ignore[valid-type]
-        name="CSI image",
-        description="PNG of measured and predicted channels, as `rfgs csi` writes it",
-        default="",
-        subtype="FILE_PATH",
-        options=RELATIVE_PATH,
-    )
 
     def display(self) -> Display:
         """How the panel says Gaussians are shown."""

@@ -3,13 +3,10 @@
 
 from __future__ import annotations
 
-import subprocess
-import tempfile
-import time
 from pathlib import Path
 
-from ..errors import AddonError
-from .environment import check_arguments, child_environment, read_check
+from .environment import check_arguments, read_check
+from .question import Question
 
 #: How long the environment may take to answer [s]; first imports from a slow disk take long.
 _PATIENCE_S = 120.0
@@ -21,13 +18,12 @@ class Check:
     def __init__(self) -> None:
         self.versions: list[str] = []
         self.problems: list[str] = []
-        self._child: subprocess.Popen[bytes] | None = None
-        self._end_s = 0.0
+        self._question: Question | None = None
 
     @property
     def running(self) -> bool:
         """Whether the answer is awaited."""
-        return self._child is not None
+        return self._question is not None
 
     def start(self, python: Path, blender: str) -> None:
         """Asks.
@@ -41,40 +37,23 @@ class Check:
         """
         self.cancel()
         self.versions, self.problems = [], []
-        self._output = tempfile.TemporaryFile()
-        try:
-            self._child = subprocess.Popen(
-                check_arguments(python, blender),
-                stdin=subprocess.DEVNULL,
-                stdout=self._output,
-                stderr=subprocess.STDOUT,
-                env=child_environment(),
-            )
-        except OSError as error:
-            self._output.close()
-            raise AddonError(f"{python}: cannot be started: {error.strerror}") from error
-        self._end_s = time.monotonic() + _PATIENCE_S
+        self._question = Question(check_arguments(python, blender), _PATIENCE_S)
 
     def step(self) -> bool:
         """Looks for the answer; whether it is still awaited."""
-        if self._child is None:
+        if self._question is None:
             return False
-        code = self._child.poll()
-        if code is None and time.monotonic() < self._end_s:
+        if self._question.step():
             return True
-        self._output.seek(0)
-        text = self._output.read(1 << 20).decode("utf-8", "replace")
-        self.cancel()
-        self.versions, self.problems = read_check(code, text)
+        self.versions, self.problems = read_check(self._question.code, self._question.answer)
+        self._question = None
         return False
 
     def cancel(self) -> None:
         """Stops waiting."""
-        if self._child is not None:
-            self._child.kill()
-            self._child.wait()
-            self._output.close()
-            self._child = None
+        if self._question is not None:
+            self._question.cancel()
+            self._question = None
 
 
 CHECK = Check()

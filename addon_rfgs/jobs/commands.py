@@ -12,7 +12,7 @@ from typing import Any, TextIO
 
 import bpy
 
-from ..command_options import progress_lines
+from ..command_options import add_python, progress_lines, set_number
 from ..errors import AddonError
 from .checking import CHECK
 from .environment import interpreter
@@ -33,7 +33,7 @@ def add_environment(commands: Any) -> None:
     command = commands.add_parser(
         "environment", help="say what the Python environment outside of Blender holds"
     )
-    _add_python(command)
+    add_python(command)
     command.set_defaults(run=_environment)
 
 
@@ -60,7 +60,7 @@ def add_generate(commands: Any) -> None:
     for name, text in (("images", "render pictures"), ("paths", "store ray paths")):
         command.add_argument(f"--{name}", action=argparse.BooleanOptionalAction, help=text)
     command.add_argument("--blender", type=Path, help="Blender that opens the file; default: this")
-    _add_python(command)
+    add_python(command)
     command.set_defaults(run=_generate)
 
 
@@ -78,7 +78,7 @@ def add_train(commands: Any) -> None:
     command.add_argument("--frames", dest="train_frames", metavar="A:B[:STEP]")
     command.add_argument("--iterations", type=int, metavar="N", help="steps per frame")
     command.add_argument("--gaussians", type=int, metavar="N", help="at the start")
-    _add_python(command)
+    add_python(command)
     command.set_defaults(run=lambda options, out: _run(options, out, train_plan))
 
 
@@ -86,7 +86,7 @@ def add_evaluate(commands: Any) -> None:
     """Adds `evaluate` to the commands."""
     command = commands.add_parser("evaluate", help="measure a run beside its controls with rfgs")
     command.add_argument("--run", dest="run_folder", metavar="FOLDER", help="the run")
-    _add_python(command)
+    add_python(command)
     command.set_defaults(run=lambda options, out: _run(options, out, evaluate_plan))
 
 
@@ -94,7 +94,7 @@ def add_resume(commands: Any) -> None:
     """Adds `resume` to the commands."""
     command = commands.add_parser("resume", help="continue a job that was stopped or cut off")
     _add_folder(command)
-    _add_python(command)
+    add_python(command)
     command.set_defaults(run=_resume)
 
 
@@ -103,13 +103,6 @@ def add_stop(commands: Any) -> None:
     command = commands.add_parser("stop", help="stop a job that another Blender started")
     _add_folder(command)
     command.set_defaults(run=_stop)
-
-
-def _add_python(command: argparse.ArgumentParser) -> None:
-    command.add_argument(
-        "--python", default="", metavar="PATH",
-        help="Python program or environment with rfgs; default: the preferences' one",
-    )  # fmt: skip
 
 
 def _add_folder(command: argparse.ArgumentParser) -> None:
@@ -139,10 +132,10 @@ def _run(options: argparse.Namespace, out: TextIO, plan: Any) -> str:
 
 
 def _set(settings: Any, name: str, value: Any) -> None:
-    spec = type(settings).bl_rna.properties[name]
-    if spec.type == "INT" and not spec.hard_min <= value <= spec.hard_max:
-        raise AddonError(f"--{name} {value}: expected {spec.hard_min} to {spec.hard_max}")
-    setattr(settings, name, os.path.abspath(value) if name.endswith("_folder") else value)
+    if type(settings).bl_rna.properties[name].type == "INT":
+        set_number(settings, name, value)
+    else:
+        setattr(settings, name, os.path.abspath(value) if name.endswith("_folder") else value)
 
 
 def _finish(plan: Plan, options: argparse.Namespace, out: TextIO) -> str:

@@ -41,7 +41,7 @@ def read_log(file: Path, count: int = 8) -> tuple[Progress | None, list[str]]:
     """How far a job is, and the last lines that are not about that.
 
     Args:
-        file: Its log.
+        file: Its log; there may be none.
         count: How many lines.
     """
     try:
@@ -51,6 +51,12 @@ def read_log(file: Path, count: int = 8) -> tuple[Progress | None, list[str]]:
             text = stream.read(_TAIL).decode("utf-8", "replace")
     except OSError:
         return None, []
+    progress, lines = split_output(text)
+    return progress, lines[-count:]
+
+
+def split_output(text: str) -> tuple[Progress | None, list[str]]:
+    """How far a program is, and the lines it wrote that are not about that."""
     progress, lines = None, []
     for line in re.split(r"[\r\n]+", _CONTROL.sub("", text)):
         match = _LINE.fullmatch(line.strip())
@@ -59,4 +65,10 @@ def read_log(file: Path, count: int = 8) -> tuple[Progress | None, list[str]]:
             progress = Progress(match[4].rstrip(": ") or "working", done, total, left_s)
         elif line.strip() and not line.startswith("progress "):
             lines.append(line.rstrip())
-    return progress, lines[-count:]
+    return progress, lines
+
+
+def reason(lines: list[str]) -> str:
+    """The line in which a program says why it failed; empty if it said nothing."""
+    told = [line for line in lines if line.startswith("error:")] or lines
+    return told[-1] if told else ""

@@ -10,7 +10,7 @@ from pathlib import Path
 from ..errors import AddonError
 from .plans import Plan
 from .process import Process
-from .progress import Progress, read_log
+from .progress import Progress, read_log, reason
 from .record import (
     Record,
     log_file,
@@ -52,8 +52,7 @@ class Job:
         if self.state == RUNNING:
             return str(self.progress) if self.progress else "starting"
         if self.state == FAILED:
-            told = [line for line in self.tail if line.startswith("error:")] or self.tail[-1:]
-            return told[-1] if told else "it said nothing; see the log"
+            return reason(self.tail) or "it said nothing; see the log"
         if self.state == STOPPED:
             return "finished work is kept; Resume continues"
         return self.state.lower()

@@ -7,6 +7,7 @@ from typing import Any
 
 import bpy
 
+from ..channels.image import remove_images
 from ..devices.empties import COLLECTION as DEVICES
 from ..gaussians.clouds import COLLECTION as CLOUDS
 from ..gaussians.nodes import GROUP
@@ -17,7 +18,7 @@ from .stored import remove_properties
 
 
 def remove_data() -> tuple[int, int]:
-    """Removes devices, Gaussians, paths and every property of this add-on from the file.
+    """Removes devices, Gaussians, paths, images of channels and every property of this add-on.
 
     What a user put into collections of ours stays, and so do Empties of their own that were made
     devices: they lose their radio.
@@ -27,6 +28,7 @@ def remove_data() -> tuple[int, int]:
     """
     count = clear_paths()
     restore()
+    remove_images()
     for item in _objects():
         _remove_object(item)
         count += 1

@@ -241,21 +241,3 @@ def test_units_of_the_scene_are_kept(tmp_path: Path) -> None:
     bpy.context.view_layer.update()
     item = bpy.data.objects["Gaussians static"]
     assert item.matrix_world.to_scale()[0] == pytest.approx(100)
-
-
-def test_a_picture_of_channels_becomes_an_image(settings, tmp_path: Path) -> None:
-    settings.image_path = str(tmp_path / "link.png")
-    with pytest.raises(RuntimeError, match="no such picture"):
-        bpy.ops.rfgs.show_csi()
-    (tmp_path / "link.png").write_bytes(b"\x89PNG not at all")
-    with pytest.raises(RuntimeError, match="not a picture"):
-        bpy.ops.rfgs.show_csi()
-    assert not bpy.data.images
-    for size in ((8, 4), (16, 2)):
-        made = bpy.data.images.new("made", *size)
-        made.filepath_raw, made.file_format = settings.image_path, "PNG"
-        made.save()
-        bpy.data.images.remove(made)
-        assert bpy.ops.rfgs.show_csi() == {"FINISHED"}
-        assert tuple(bpy.data.images["link.png"].size) == size, "read again"
-    assert len(bpy.data.images) == 1

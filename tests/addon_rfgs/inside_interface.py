@@ -44,7 +44,7 @@ COMMANDS = {
     "repair_finding": "fix",
     "resume_job": "resume",
     "select_finding": "- the selection lives in the window",
-    "show_csi": "- fills an Image Editor",
+    "show_csi": "csi",
     "show_paths": "paths",
     "stop_job": "stop",
     "test_environment": "environment",

@@ -1,19 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Radio Gaussians of a few points, and a run on the tiny dataset."""
+"""Radio Gaussians of a few points."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 import torch
 
-from rfgs_core.dataset import open_dataset
 from rfgs_core.propagation import RadioGaussians
-from rfgs_core.run import Run
-from rfgs_core.run.training import train_sequence
-from rfgs_core.train.config import TrainConfig
 
 
 @pytest.fixture
@@ -32,12 +27,3 @@ def make_points() -> Callable[..., RadioGaussians]:
         )
 
     return make
-
-
-@pytest.fixture(scope="session")
-def small_run(tiny_dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """A run of 40 Gaussians on both frames; copy it before changing anything."""
-    data = open_dataset(tiny_dataset)
-    config = TrainConfig(num_gaussians=40, power_steps=0, solver_steps=2, iterations=1)
-    out = tmp_path_factory.mktemp("predicted") / "run"
-    return train_sequence(data, data.sequence(), "wifi", [1, 2], config, out)

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Played inside Blender: the channels of a link, by the button, beside an open Image Editor.
+
+Arguments: Python program of the environment, run.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import bpy
+
+
+def play(stage: Any) -> Iterator[float]:
+    """Draws with no Image Editor open, then with one; gives up; leaves the add-on meanwhile."""
+    python, run = stage.arguments
+    yield from stage.open_tab("RFGS_PT_gaussians", "RFGS_PT_channels", alone=False)
+    stage.part("jobs.preferences").preferences().python = python
+    bpy.context.scene.rfgs.gaussians.path = run
+    said = bpy.context.scene.rfgs.channels
+    said.tx_device, said.rx_device = 0, 1
+    bpy.ops.ed.undo_push(message="before")
+    before = editors()
+
+    yield from draw(stage)
+    alone = [names(), editors() == before, shown()]
+
+    area = next(area for area in stage.window.screen.areas if area.type == "DOPESHEET_EDITOR")
+    area.ui_type = "IMAGE_EDITOR"
+    said.rx_device = 2
+    bpy.ops.ed.undo_push(message="an editor")
+    stage.gaps_s.clear()
+    yield from draw(stage)
+    beside = [names(), shown()]
+    yield from stage.shoot("channels")
+    gaps_s = list(stage.gaps_s)
+    with stage.override():
+        bpy.ops.ed.undo()
+    yield 0.5
+    undone = names()
+
+    yield from begin(stage)
+    child = waiting(stage)._now.drawing.question._child
+    x, y = stage.sidebar.x + 20, stage.sidebar.y + 20
+    for value in ("PRESS", "RELEASE"):
+        stage.window.event_simulate(type="ESC", value=value, x=x, y=y)
+        yield 0.3
+    given_up = [waiting(stage).waits(), child.poll() is not None]
+
+    yield from begin(stage)
+    child = waiting(stage)._now.drawing.question._child
+    stage.part("channels.waiting").unregister()
+    yield 0.5
+    left = [waiting(stage).waits(), child.poll() is not None]
+    row = {"alone": alone, "beside": beside, "undone": undone, "gaps_s": gaps_s}
+    row |= {"given_up": given_up, "left": left}
+    (stage.out / "told.json").write_text(json.dumps(row))
+
+
+def waiting(stage: Any) -> Any:
+    return stage.part("channels.waiting")
+
+
+def begin(stage: Any) -> Iterator[float]:
+    yield from stage.click("rfgs.show_csi")
+    yield from stage.wait(waiting(stage).waits, "drawing to begin", 20)
+
+
+def draw(stage: Any) -> Iterator[float]:
+    yield from begin(stage)
+    assert not bpy.ops.rfgs.show_csi.poll(), "one at a time"
+    yield from stage.wait(lambda: not waiting(stage).waits(), "drawing", 120)
+    yield 0.5
+
+
+def names() -> list[str]:
+    return sorted(image.name for image in bpy.data.images if image.name.startswith("link"))
+
+
+def editors() -> list[list[str]]:
+    return [[area.ui_type for area in screen.areas] for screen in bpy.data.screens]
+
+
+def shown() -> list[str]:
+    """Images in the editors of the window."""
+    areas = bpy.context.window_manager.windows[0].screen.areas
+    images = [area.spaces.active.image for area in areas if area.type == "IMAGE_EDITOR"]
+    return [image.name for image in images if image]

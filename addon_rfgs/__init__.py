@@ -11,9 +11,10 @@ import bpy
 from . import command, properties, registration
 from .channels import waiting
 from .devices import overlay
+from .gaussians import file_menu
 from .jobs import following
 
-_MODULES = (properties, registration, overlay, command, following, waiting)
+_MODULES = (properties, registration, overlay, command, following, waiting, file_menu)
 
 
 def register() -> None:

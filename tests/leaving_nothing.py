@@ -49,6 +49,7 @@ def compare(folder: Path) -> None:
     before = told["before"]
     used = told["used"]
     assert len(used["data"]) > len(before["data"]) + 10 and used["types"], "it was used"
+    assert len(used["import menu"]) == len(before["import menu"]) + 1
     stored = [row["properties"] | row["system"] for row in used["data"].values()]
     assert sum("rfgs" in row for row in stored) > 5
     for name in ("looked", "after"):

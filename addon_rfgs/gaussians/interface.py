@@ -2,6 +2,7 @@
 """Operators and panels of this folder, in the order they are registered."""
 
 from . import panel
+from .file_menu import RFGS_FH_gaussians, RFGS_OT_import_ply
 from .operators import (
     RFGS_OT_compare_gaussians,
     RFGS_OT_export_gaussians,
@@ -15,6 +16,8 @@ from .view_operators import (
 
 CLASSES = (
     RFGS_OT_import_gaussians,
+    RFGS_OT_import_ply,
+    RFGS_FH_gaussians,
     RFGS_OT_export_gaussians,
     RFGS_OT_compare_gaussians,
     RFGS_OT_update_display,

@@ -241,3 +241,21 @@ def test_units_of_the_scene_are_kept(tmp_path: Path) -> None:
     bpy.context.view_layer.update()
     item = bpy.data.objects["Gaussians static"]
     assert item.matrix_world.to_scale()[0] == pytest.approx(100)
+
+
+def test_a_ply_of_the_import_menu_is_shown_as_the_panel_says(settings, tmp_path: Path) -> None:
+    settings.opacity_threshold, before = 1.0, settings.path
+    clouds = sorted(item.name for item in bpy.data.collections["RF-GS Gaussians"].objects)
+    (tmp_path / "bad.ply").write_bytes(b"ply\nformat")
+    for path, words in (("", "no path is set"), (str(tmp_path / "bad.ply"), "bad.ply")):
+        with pytest.raises(RuntimeError, match=words):
+            bpy.ops.rfgs.import_ply(filepath=path)
+    assert settings.path == before
+    assert clouds == sorted(item.name for item in bpy.data.collections["RF-GS Gaussians"].objects)
+    path = write(tmp_path / "a.ply", rows_of(COLUMNS, 4))
+    assert bpy.ops.rfgs.import_ply(filepath=str(path)) == {"FINISHED"}
+    (item,) = bpy.data.collections["RF-GS Gaussians"].objects
+    assert len(item.data.vertices) == 4 and settings.path == str(path)
+    assert points_shown(item) == 0, "none is opaque"
+    settings.opacity_threshold = 0.0
+    assert points_shown(item) == 4

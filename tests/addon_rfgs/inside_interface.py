@@ -34,6 +34,7 @@ COMMANDS = {
     "generate_dataset": "generate",
     "guess_materials": "materials guess",
     "import_gaussians": "import",
+    "import_ply": "import",
     "import_result": "import",
     "match_devices": "devices match",
     "mirror_device": "devices mirror",
@@ -125,6 +126,15 @@ def test_panels_stand_in_our_tab() -> None:
         assert kind.__name__.startswith("RFGS_PT_") and kind.bl_category == "RF-GS"
     for kind in classes(bpy.types.UIList):
         assert kind.__name__.startswith("RFGS_UL_")
+
+
+def test_a_ply_can_be_chosen_in_the_import_menu_or_dropped() -> None:
+    entries = bpy.types.TOPBAR_MT_file_import.draw._draw_funcs
+    assert [entry.__module__ for entry in entries].count("addon_rfgs.gaussians.file_menu") == 1
+    (handler,) = classes(bpy.types.FileHandler)
+    assert handler.bl_import_operator == "rfgs.import_ply"
+    assert handler.bl_file_extensions == ".ply"
+    assert not handler.poll_drop(bpy.context), "there is no 3D view"
 
 
 def test_every_property_says_what_it_is() -> None:

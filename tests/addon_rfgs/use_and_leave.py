@@ -83,6 +83,12 @@ def snapshot() -> dict[str, Any]:
             for keymap in configuration.keymaps
             for item in keymap.keymap_items
         ),
+        # Blender keeps the list once a function was added; emptied, it is as good as none.
+        "import menu": [
+            function.__name__
+            for function in getattr(bpy.types.TOPBAR_MT_file_import.draw, "_draw_funcs", [])
+            if function.__module__ != "bl_ui.space_topbar"
+        ],
         "types": sorted(name for name in dir(bpy.types) if "rfgs" in name.lower()),
         "operators": sorted(dir(bpy.ops.rfgs)),
         "attributes": sorted(
@@ -140,6 +146,7 @@ def use(folder: Path) -> None:
     scene.rfgs.jobs.frames = "1:9"
     scene.rfgs.gaussians.path = str(folder / "cloud.ply")
     ops.import_gaussians()
+    ops.import_ply(filepath=str(folder / "cloud.ply"))
     ops.add_crop_box()
     ops.update_display()
     scene.rfgs.paths.dataset = str(folder / "dataset")

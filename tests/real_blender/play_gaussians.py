@@ -42,7 +42,25 @@ def play(stage: Any) -> Iterator[float]:
         boxes = len([item for item in bpy.data.objects if "crop" in item.name])
         solid = settings().solid_view
         seen.setdefault("history", []).append([name, clouds(), boxes, solid])
+    yield from import_menu(stage, f"{run}/gaussians/000001.ply", seen)
     (stage.out / "seen.json").write_text(json.dumps(seen))
+
+
+def import_menu(stage: Any, ply: str, seen: dict[str, Any]) -> Iterator[float]:
+    """The menu's entry asks for a file; one that is dropped is taken at once."""
+    with stage.override():
+        bpy.ops.wm.call_menu(name="TOPBAR_MT_file_import")
+    yield from stage.shoot("menu")
+    for value in ("PRESS", "RELEASE"):
+        stage.window.event_simulate(type="ESC", value=value, x=700, y=900)
+        yield 0.2
+    for dropped in (ply, ""):
+        with stage.override():
+            done = bpy.ops.rfgs.import_ply("INVOKE_DEFAULT", True, filepath=dropped)
+        yield 1.0
+        windows = bpy.context.window_manager.windows
+        kinds = [area.type for window in windows for area in window.screen.areas]
+        seen.setdefault("ply", []).append([*done, clouds(), "FILE_BROWSER" in kinds])
 
 
 def settings() -> Any:

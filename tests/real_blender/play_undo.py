@@ -27,6 +27,7 @@ STEPS: list[tuple[str, dict[str, Any]]] = [
     ("show_paths", {}),
     ("clear_paths", {}),
     ("remove_data", {}),
+    ("import_ply", {"filepath": "{folder}/cloud.ply"}),
 ]
 
 
@@ -41,7 +42,11 @@ def play(stage: Any) -> Iterator[float]:
     for name, properties in STEPS:
         before = contents()
         with stage.override():
-            getattr(bpy.ops.rfgs, name)("EXEC_DEFAULT", True, **properties)
+            given = {
+                key: value.format(folder=folder) if isinstance(value, str) else value
+                for key, value in properties.items()
+            }
+            getattr(bpy.ops.rfgs, name)("EXEC_DEFAULT", True, **given)
         yield 0.3
         after = contents()
         undone = yield from step(stage, bpy.ops.ed.undo)

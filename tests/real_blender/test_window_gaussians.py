@@ -45,4 +45,5 @@ def test_buttons_colour_and_undo(blender, python, tmp_path: Path) -> None:
         ["undo", 0, 0, False],
         ["redo", 3, 0, False],
     ]
+    assert seen["ply"] == [["FINISHED", 1, False], ["RUNNING_MODAL", 1, True]]
     assert saturated(out / "solid.png") > saturated(out / "points.png") + 0.02

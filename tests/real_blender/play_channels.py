@@ -14,9 +14,9 @@ import bpy
 
 
 def play(stage: Any) -> Iterator[float]:
-    """Draws with no Image Editor open, then with one; gives up; leaves the add-on meanwhile."""
+    """Draws without and with an Image Editor; gives up by Esc, without the add-on or the file."""
     python, run = stage.arguments
-    yield from stage.open_tab("RFGS_PT_gaussians", "RFGS_PT_channels", alone=False)
+    yield from show_panel(stage)
     stage.part("jobs.preferences").preferences().python = python
     bpy.context.scene.rfgs.gaussians.path = run
     said = bpy.context.scene.rfgs.channels
@@ -43,20 +43,28 @@ def play(stage: Any) -> Iterator[float]:
 
     yield from begin(stage)
     child = waiting(stage)._now.drawing.question._child
-    x, y = stage.sidebar.x + 20, stage.sidebar.y + 20
-    for value in ("PRESS", "RELEASE"):
-        stage.window.event_simulate(type="ESC", value=value, x=x, y=y)
+    x, y = stage.view.x + stage.view.width // 3, stage.view.y + stage.view.height // 2
+    for kind, value in (("MOUSEMOVE", "NOTHING"), ("ESC", "PRESS"), ("ESC", "RELEASE")):
+        stage.window.event_simulate(type=kind, value=value, x=x, y=y)
         yield 0.3
     given_up = [waiting(stage).waits(), child.poll() is not None]
 
     yield from begin(stage)
     child = waiting(stage)._now.drawing.question._child
-    stage.part("channels.waiting").unregister()
-    yield 0.5
+    yield from show_panel(stage)  # registers the add-on again
     left = [waiting(stage).waits(), child.poll() is not None]
     row = {"alone": alone, "beside": beside, "undone": undone, "gaps_s": gaps_s}
     row |= {"given_up": given_up, "left": left}
+
+    yield from begin(stage)
+    child = waiting(stage)._now.drawing.question._child
+    bpy.ops.wm.read_homefile()
+    row["opened"] = [waiting(stage).waits(), child.poll() is not None]
     (stage.out / "told.json").write_text(json.dumps(row))
+
+
+def show_panel(stage: Any) -> Iterator[float]:
+    yield from stage.open_tab("RFGS_PT_gaussians", "RFGS_PT_channels", alone=False)
 
 
 def waiting(stage: Any) -> Any:

@@ -41,7 +41,7 @@ def expected_power(
     with torch.no_grad():
         radio = head.radio_gaussians(gaussians)
         axes = gaussians.rotations.numpy().astype(np.float64)
-    means, normals = radio.means.numpy(), radio.normals.numpy()
+    means, normals = radio.means.numpy(), axes[:, :, 2]
     wavelength_m = SPEED_OF_LIGHT / freq_hz
     amplitude = np.full(len(means), wavelength_m / (4 * np.pi) ** 1.5)
     q = np.zeros((len(means), 3))

@@ -30,10 +30,13 @@ from addon_rfgs.jobs.record import (
 
 #: Programs that stand where the environment's Python would: they are given a job's arguments.
 PROGRAMS = {
-    "quick": "echo at work; exit 0",
-    "failing": "echo error: no wall anywhere; exit 2",
-    "polite": "trap 'exit 130' INT; echo begun; while :; do sleep 0.05; done",
-    "deaf": "trap '' INT; echo begun; while :; do sleep 0.05; done",
+    "quick": "#!/bin/bash\necho at work; exit 0",
+    "failing": "#!/bin/bash\necho error: no wall anywhere; exit 2",
+    # As rfgs does, it listens also where a shell has let its background jobs ignore Ctrl-C.
+    "polite": f"#!{sys.executable}\nimport signal, sys, time\n"
+    "signal.signal(signal.SIGINT, lambda *_: sys.exit(130))\n"
+    "print('begun', flush=True)\nwhile True:\n    time.sleep(0.05)",
+    "deaf": "#!/bin/bash\ntrap '' INT; echo begun; while :; do sleep 0.05; done",
 }
 
 
@@ -41,7 +44,7 @@ PROGRAMS = {
 def program(tmp_path: Path):
     def make(name: str) -> Path:
         path = tmp_path / name
-        path.write_text(f"#!/bin/bash\n{PROGRAMS[name]}\n")
+        path.write_text(f"{PROGRAMS[name]}\n")
         path.chmod(0o755)
         return path
 

@@ -106,6 +106,9 @@ def blender(
 @pytest.fixture
 def programs(blender: RealBlender, tmp_path: Path) -> tuple[Path, Path]:
     """What jobs are run by: this Python with this tree, and the Blender that opens files for it."""
+    # Jobs that an earlier test has cut off would be found by the next window.
+    own = blender.resources / "extensions" / ".user" / "user_default" / "addon_rfgs"
+    (own / "jobs.json").unlink(missing_ok=True)
     environment, opener = tmp_path / "python", tmp_path / "blender"
     environment.write_text(f'#!/bin/sh\nPYTHONPATH="{ROOT}" exec "{sys.executable}" "$@"\n')
     resources = f'BLENDER_USER_RESOURCES="{blender.resources}"'

@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 from ..errors import AddonError
@@ -70,14 +71,13 @@ class Process:
     def _signal(self, number: int) -> None:
         if not self.running():
             return
-        try:
+        # Between the look and the signal it may end by itself, which is what was asked for.
+        with suppress(ProcessLookupError):
             # Children that must not outlive the program watch over that themselves.
             if number == signal.SIGKILL:
                 os.killpg(self.pid, number)
             else:
                 os.kill(self.pid, number)
-        except ProcessLookupError:
-            pass
 
 
 def birth(pid: int) -> str:

@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from rfgs_core.study.table import number
+
 
 @dataclass(frozen=True)
 class Variant:
@@ -68,9 +70,9 @@ def ablation_table(rows: Sequence[AblationRow]) -> str:
         change = None if full is None or row.f10 is None else row.f10 - full
         cells = (
             row.variant.label,
-            _number(row.f05),
-            _number(row.f10),
-            _number(change, "+.3f") if row.variant.name != "full" else "–",
+            number(row.f05),
+            number(row.f10),
+            number(change, "+.3f") if row.variant.name != "full" else "–",
             str(row.gaussians),
             f"{row.train_s:.0f} s",
             f"{row.variant.claimed_db:.1f}",
@@ -82,7 +84,3 @@ def ablation_table(rows: Sequence[AblationRow]) -> str:
 _NOTES = """\
 F5, F10: F-score at 5 and 10 cm, mean over frames, of the paper's recipe and losses. Last column:
 the paper's picture quality of the same variant: claimed, not reproduced, and another quantity."""
-
-
-def _number(value: float | None, form: str = ".3f") -> str:
-    return "–" if value is None else format(value, form)

@@ -49,19 +49,20 @@ def _cells(row: Row) -> list[str]:
     missed = [name.replace("_", " ") for name, reached in row.marks.items() if reached is False]
     return [
         *(row.scene, row.radio, row.condition, str(row.seeds)),
-        *(_number(v["f05"]), _number(v["f10"]), f"{row.spread_f10:.3f}"),
-        f"{_number(v['rival_f10'])} ({row.best_rival})",
+        *(number(v["f05"]), number(v["f10"]), f"{row.spread_f10:.3f}"),
+        f"{number(v['rival_f10'])} ({row.best_rival})",
         *(_percent(v["cut"]), _percent(v["gap"])),
-        f"{_number(v['template_f05'])} / {_number(v['template_f10'])}",
-        *(_number(v["oracle_f10"]), _number(v["centroid_m"]), _number(v["tracked"])),
-        _number(v["element_snr_db"], 1),
-        f"{_number(v['linear_snr_db'], 1)} / {_number(v['gaussian_process_snr_db'], 1)}",
+        f"{number(v['template_f05'])} / {number(v['template_f10'])}",
+        *(number(v["oracle_f10"]), number(v["centroid_m"]), number(v["tracked"])),
+        number(v["element_snr_db"], ".1f"),
+        f"{number(v['linear_snr_db'], '.1f')} / {number(v['gaussian_process_snr_db'], '.1f')}",
         ", ".join(missed) or "none",
     ]
 
 
-def _number(value: float | None, digits: int = 3) -> str:
-    return "–" if value is None else f"{value:.{digits}f}"
+def number(value: float | None, form: str = ".3f") -> str:
+    """A cell of a table; a dash where there is no value."""
+    return "–" if value is None else format(value, form)
 
 
 def _percent(value: float | None) -> str:

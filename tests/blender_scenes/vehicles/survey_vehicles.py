@@ -16,13 +16,8 @@ import numpy as np
 
 import addon_rfgs
 
-
-def world_vertices(item: bpy.types.Object) -> np.ndarray:
-    evaluated = item.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    flat = np.zeros(3 * len(evaluated.data.vertices), dtype=np.float32)
-    evaluated.data.vertices.foreach_get("co", flat)
-    matrix = np.array(evaluated.matrix_world)
-    return flat.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from survey_scene import world_vertices
 
 
 def of_class(kind: str) -> list[bpy.types.Object]:

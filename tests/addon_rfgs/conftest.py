@@ -21,6 +21,19 @@ def addon(python: Run) -> Run:
 
 
 @pytest.fixture(scope="session")
+def pass_inside(python: Run) -> Callable[[str], None]:
+    """Runs the tests of `inside_NAME.py`, all of which must pass, in a Python of their own."""
+
+    def run(name: str) -> None:
+        inner = Path(__file__).with_name(f"inside_{name}.py")
+        done = python("-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", inner)
+        assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
+        assert " passed" in done.stdout
+
+    return run
+
+
+@pytest.fixture(scope="session")
 def scenes(python: Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder of small .blend files and their bundles."""
     folder = tmp_path_factory.mktemp("scenes")

@@ -17,6 +17,7 @@ from rfgs_core.train.config import (
     Density,
     Objective,
     Observe,
+    Packets,
     Part,
     Recipe,
     TrainConfig,
@@ -52,6 +53,10 @@ class TrainArgs:
     observe: Observe = "complex"
     """What the radio reports, and all that any stage sees: complex, the channel itself; power,
     |CSI|^2 per link and tone; delay_power, the power of each link's delay profile."""
+    packets: Packets | None = None
+    """Of several packets (chirps) per frame: all, which tells the channel's change from noise by
+    delay, direction and Doppler; or first, the one at the frame's own time. Left out: all, but
+    first with --calibrate or with an --observe that has no phases."""
     background: Background = "empty_room"
     """What the moving part is told from: empty_room, its capture; learned, the median over all
     frames of the sequence, where nobody recorded the empty room."""
@@ -97,6 +102,7 @@ def run(args: TrainArgs) -> int:
     from rfgs_core.run.encoders import with_encoder
     from rfgs_core.run.training import train_sequence
     from rfgs_core.seeds import sub_seed
+    from rfgs_core.train.observations import packets_to_read
 
     config = TrainConfig.of_recipe(args.recipe, args.objective, args.seed)
     config = replace(
@@ -142,6 +148,7 @@ def run(args: TrainArgs) -> int:
             f"{args.dataset} ({sequence.name}) has no radio {args.radio!r}; "
             f"it has {', '.join(sequence.radios)}"
         )
+    config = replace(config, packets=packets_to_read(args.packets, sequence, args.radio, config))
     frames = chosen_frames(args.frames, sequence.frames)
     trained = train_sequence(
         dataset, sequence, args.radio, frames, config, args.out, encoder_file, log=args.log

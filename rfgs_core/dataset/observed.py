@@ -20,7 +20,7 @@ Observed = Literal["clean", "impaired"]
 def observed_csi(
     sequence: Sequence, radio: str, frame: int, channel: Observed
 ) -> Complex64[np.ndarray, "tx rx subcarrier"]:
-    """Channel of a frame as a method may see it, NaN where a packet was lost.
+    """Channel at a frame's own time as a method may see it, NaN where a packet was lost.
 
     Receivers report the gain they chose, so it is taken out; noise, phases and steps stay.
 
@@ -29,7 +29,21 @@ def observed_csi(
     """
     if channel == "clean":
         return sequence.csi(radio, frame)
-    csi = sequence.csi(radio, frame, impaired=True)
+    return observed_packets(sequence, radio, frame, channel, 1)[0]
+
+
+def observed_packets(
+    sequence: Sequence, radio: str, frame: int, channel: Observed, count: int | None = None
+) -> Complex64[np.ndarray, "sample tx rx subcarrier"]:
+    """Channels of the first `count` packets of a frame, or of all, as `observed_csi` gives one.
+
+    Raises:
+        RfgsError: The radio's channels were never impaired.
+    """
+    csi = sequence.csi_samples(radio, frame, impaired=channel == "impaired")[:count]
+    if channel == "clean":
+        return csi
     index = sequence.frames.index(frame) * sequence.radio_spec(radio).samples_per_frame
-    gain_db = sequence.impairments(radio).gain_db[index : index + 1]
-    return (csi / amplitude(gain_db, sequence.layout(radio))[0]).astype(np.complex64)
+    gain_db = sequence.impairments(radio).gain_db[index : index + len(csi)]
+    level = amplitude(gain_db, sequence.layout(radio))
+    return (csi / level).astype(np.complex64)

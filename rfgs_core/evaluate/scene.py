@@ -24,7 +24,7 @@ from rfgs_core.gaussians.model import Gaussians
 from rfgs_core.radio import Layout, Radio
 from rfgs_core.render.view import moving_gaussians
 from rfgs_core.seeds import sub_seed
-from rfgs_core.train.config import Background, Observe
+from rfgs_core.train.config import Background, Observe, Packets
 from rfgs_core.train.delay_maps import delay_power_map
 from rfgs_core.train.observations import Observations
 
@@ -130,18 +130,25 @@ class Scene:
         """What the moving part was told from."""
         return self.run.config.get("background", "empty_room")
 
+    @property
+    def packets(self) -> Packets:
+        """Which packets of a frame were read."""
+        return self.run.config.get("packets", "first")
+
     def csi(self, frame: int) -> Complex[np.ndarray, "tx rx subcarrier"]:
         """True channel of a frame: predictions are held against it, whatever was observed."""
         return self.run.sequence.csi(self.radio.name, frame)
 
     def evidence(self, frame: int, score: Float[np.ndarray, "x y z"]) -> Evidence:
         """What controls may see of a frame, and where the method's own `score` is centred."""
-        csi = observed_csi(self.run.sequence, self.radio.name, frame, self.run.channel)
         static, power_map = self.csi_static, None
-        if (self.observe, self.background) != ("complex", "empty_room"):
+        if (self.observe, self.background, self.packets) == ("complex", "empty_room", "first"):
+            csi = observed_csi(self.run.sequence, self.radio.name, frame, self.run.channel)
+        else:
             seen = self.run.observations(frame)
-            hidden = ~(seen.links[..., None] & seen.tones)
-            csi, static = np.where(hidden, np.nan, seen.delta + seen.static), seen.static
+            hidden, static = ~(seen.links[..., None] & seen.tones), seen.static
+            # In double precision, so that taking the room off again gives the change as it is.
+            csi = np.where(hidden, np.nan, seen.delta.astype(np.complex128) + static)
             if seen.kind == "delay_power":
                 power_map = partial(delay_power_map, seen)
         evidence = Evidence.hide(

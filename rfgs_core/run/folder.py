@@ -83,6 +83,7 @@ class Run:
         return observe(
             *(self.sequence, self.config["radio"], frame, self.channel),
             *(self.config.get("observe", "complex"), self._background()),
+            packets=self.config.get("packets", "first"),
         )
 
     def _background(self) -> Reported | None:

@@ -106,7 +106,7 @@ def train_sequence(
     if encoder_file is not None and not (out / ENCODER_FILE).exists():
         keep_encoder(encoder_file, out)
     if config.background == "learned" and not (out / BACKGROUND_FILE).exists():
-        empty = learned_background(sequence, radio, config.channel, config.observe)
+        empty = learned_background(sequence, radio, config.channel, config.observe, config.packets)
         save_arrays(out / BACKGROUND_FILE, {"empty": empty})
     spent = float(run.config.get("train_s", 0.0))
     before: FrameState | None = None

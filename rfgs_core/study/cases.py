@@ -44,7 +44,11 @@ SCENES: dict[str, StudyScene] = {
 
 CONDITIONS: dict[str, Condition] = {
     "clean": Condition("clean, direct paths only: an inverse crime", 1, "clean"),
-    "impaired": Condition("thermal noise, 10 bits, phase noise (`lab`)", 1, "impaired"),
+    "impaired": Condition(
+        "thermal noise, 10 bits, phase noise (`lab`); `mmwave` with 64 chirps per frame",
+        1,
+        "impaired",
+    ),
     "walls": Condition("clean, up to two wall bounces", 3, "clean"),
 }
 
@@ -53,6 +57,9 @@ RADIOS = ("wifi", "mmwave", "uwb")
 
 #: Impairments that every dataset of the study carries beside its clean channels.
 IMPAIRMENTS = "lab"
+
+#: Packets per frame of impaired radios whose noise hides people in a single one.
+PACKETS = {"mmwave": 64}
 
 
 @dataclass(frozen=True)
@@ -74,9 +81,16 @@ class Case:
         return max(CONDITIONS[self.condition].depth, SCENES[self.scene].least_depth)
 
     @property
+    def packets(self) -> int:
+        """Packets per frame."""
+        impaired = CONDITIONS[self.condition].channel == "impaired"
+        return PACKETS.get(self.radio, 1) if impaired else 1
+
+    @property
     def dataset(self) -> Path:
-        """Folder of the dataset within the study; seeds and channels share one."""
-        return Path("data") / f"{self.scene}-{self.radio}-depth{self.depth}"
+        """Folder of the dataset within the study; seeds share one, and channels of one packet."""
+        several = f"-packets{self.packets}" if self.packets > 1 else ""
+        return Path("data") / f"{self.scene}-{self.radio}-depth{self.depth}{several}"
 
     @property
     def run(self) -> Path:
@@ -89,6 +103,7 @@ class Case:
             *("dataset_factory", "generate", self.scene, "--radio", self.radio),
             *("--frames", SCENES[self.scene].frames, "--depth", str(self.depth)),
             *("--no-images", "--impairments", IMPAIRMENTS),
+            *("--packets-per-frame", str(self.packets)),
             *("--out", str(out / self.dataset)),
         )
 

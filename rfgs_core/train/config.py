@@ -14,6 +14,8 @@ EncoderKind = Literal["matched_filter", "cnn", "paths"]
 #: complex: the channel itself; power: |csi|² per link and tone; delay_power: the power of each
 #: link's delay profile.
 Observe = Literal["complex", "power", "delay_power"]
+#: all: every packet of a frame helps to tell its change from noise; first: the one at its own time.
+Packets = Literal["all", "first"]
 #: empty_room: the capture without anything that moves; learned: the median over the frames.
 Background = Literal["empty_room", "learned"]
 #: Offsets of devices that are estimated: none, of oscillators, of clocks, or of both.
@@ -36,6 +38,8 @@ class TrainConfig:
     """clean: the traced channel; impaired: what imperfect radios make of it."""
     observe: Observe = "complex"
     """What the radio reports of that channel; no stage sees more."""
+    packets: Packets = "first"
+    """Which packets of a frame are read; see `packets_to_read`."""
     background: Background = "empty_room"
     """What the moving part is told from."""
     recipe: Recipe = "rfgs"

@@ -156,8 +156,9 @@ def start_frame(
     """
     if not observations.changed:
         raise RfgsError(
-            "the channel of this frame is that of the empty scene, nobody is in it; choose other "
-            "--frames, or generate the dataset with a larger --depth"
+            "the channel of this frame is that of the empty scene, or lost in noise: nobody is in "
+            "it; choose other --frames, or generate the dataset with a larger --depth or more "
+            "--packets-per-frame"
         )
     rng = np.random.default_rng(seed)
     maps = pair_maps(observations)

@@ -13,10 +13,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from jaxtyping import Complex64
 
 from rfgs_core.dataset.observed import Observed
 from rfgs_core.errors import RfgsError
-from rfgs_core.train.config import Observe
+from rfgs_core.train.config import Observe, Packets
 from rfgs_core.train.observations import Reported, reported, visible_channel
 
 if TYPE_CHECKING:
@@ -27,7 +28,11 @@ LEAST_FRAMES = 3
 
 
 def learned_background(
-    sequence: Sequence, radio: str, channel: Observed, kind: Observe
+    sequence: Sequence,
+    radio: str,
+    channel: Observed,
+    kind: Observe,
+    packets: Packets = "first",
 ) -> Reported:
     """What the radio reports of the room, learned from all frames of a sequence.
 
@@ -36,6 +41,7 @@ def learned_background(
         radio: Which radio.
         channel: The traced channel, or what imperfect radios make of it.
         kind: What the radio reports.
+        packets: Of all packets the mean counts, in which noise and whoever moves fade.
 
     Returns:
         As `observe` takes it; zero where something is held out. Frames that lost the packet
@@ -52,8 +58,9 @@ def learned_background(
     measured = sequence.radio(radio)["measured"].values
     ever, rows, shape = np.zeros_like(measured), [], ()
     for frame in sequence.frames:
-        _, links, tones, csi = visible_channel(sequence, radio, frame, channel)
-        values = reported(np.where(tones, csi, 0), tones, kind)
+        _, links, tones, csi = visible_channel(sequence, radio, frame, channel, packets)
+        mean = csi[0] if len(csi) == 1 else _mean(np.where(tones, csi, 0))
+        values = reported(np.where(tones, mean, 0), tones, kind)
         rows.append(np.where(links[..., None], values, np.nan)[measured])
         ever |= links
         shape = values.shape
@@ -64,3 +71,10 @@ def learned_background(
     background = np.zeros(shape, dtype=np.complex64 if kind == "complex" else np.float32)
     background[ever] = median
     return background
+
+
+def _mean(csi: Complex64[np.ndarray, "packet tx rx subcarrier"]) -> np.ndarray:
+    """Mean over the packets that a link received; zero where there are none."""
+    received = np.isfinite(csi)
+    total = np.where(received, csi, 0).sum(axis=0)
+    return total / np.maximum(received.sum(axis=0), 1)

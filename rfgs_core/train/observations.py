@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Bool, Complex64, Float32, Float64, Int64
 
-from rfgs_core.dataset.observed import Observed, observed_csi
+from rfgs_core.dataset.observed import Observed, observed_packets
 from rfgs_core.encode.matched_filter import device_pairs
 from rfgs_core.errors import RfgsError
 from rfgs_core.radio import Layout
-from rfgs_core.train.config import Observe
+from rfgs_core.train.config import Observe, Packets, TrainConfig
+from rfgs_core.train.packets import change_at_first
 from rfgs_core.train.phase_free import (
     delay_amplitude,
     direct_amplitude,
@@ -110,6 +111,31 @@ def need_still_antennas(sequence: Sequence, radio: str) -> None:
         )
 
 
+def packets_to_read(
+    asked: Packets | None, sequence: Sequence, radio: str, config: TrainConfig
+) -> Packets:
+    """Which packets of a frame a run reads; None asks for all where that makes sense.
+
+    Raises:
+        RfgsError: All are asked for where there is one, or where their phases are not known.
+    """
+    count = sequence.radio_spec(radio).samples_per_frame
+    if count == 1:
+        why_not = (
+            f"{sequence.name} holds one packet of {radio} per frame; generate it with "
+            "--packets-per-frame"
+        )
+    elif config.observe != "complex":
+        why_not = f"--observe {config.observe} has no phases to follow from packet to packet"
+    elif config.calibrate != "none":
+        why_not = f"--calibrate {config.calibrate} finds offsets of a frame, not of its packets"
+    else:
+        return asked or "all"
+    if asked == "all":
+        raise RfgsError(f"--packets all: {why_not}; leave --packets out")
+    return "first"
+
+
 def reported(
     csi: Complex64[np.ndarray, "*link subcarrier"],
     tones: Bool[np.ndarray, "subcarrier"],
@@ -125,9 +151,13 @@ def reported(
 
 
 def visible_channel(
-    sequence: Sequence, radio: str, frame: int, channel: Observed
+    sequence: Sequence, radio: str, frame: int, channel: Observed, packets: Packets = "first"
 ) -> tuple[Layout, Bool[np.ndarray, "tx rx"], Bool[np.ndarray, "subcarrier"], np.ndarray]:
-    """Elements, visible links and tones, and the channel of a frame with everything in it.
+    """Elements, visible links and tones, and the channels of a frame with everything in them.
+
+    Returns:
+        The channels are (packet, tx, rx, subcarrier), NaN where a packet was lost; links that
+        lost all of them are not visible.
 
     Raises:
         RfgsError: What is visible is not finite, or the antennas move within a frame.
@@ -137,15 +167,17 @@ def visible_channel(
     # The links that exist are those the channels were stored with.
     elements = replace(sequence.layout(radio), measured=data["measured"].values)
     links, tones = _visible(sequence.splits["rf"][radio], elements, data.sizes["subcarrier"])
-    csi = observed_csi(sequence, radio, frame, channel)
+    count = 1 if packets == "first" else None
+    csi = observed_packets(sequence, radio, frame, channel, count)
+    received = np.broadcast_to(links, csi.shape[:3])
     if channel == "impaired":
-        links &= ~np.isnan(csi).all(axis=2)
-    _need_finite(csi, links, tones, f"csi of frame {frame} ({sequence.name}, {radio})")
-    return elements, links, tones, csi
+        received = received & ~np.isnan(csi).all(axis=3)
+    _need_finite(csi, received, tones, f"csi of frame {frame} ({sequence.name}, {radio})")
+    return elements, received.any(axis=0), tones, csi
 
 
 def _need_finite(csi: np.ndarray, links: np.ndarray, tones: np.ndarray, what: str) -> None:
-    if not np.isfinite(csi[links[:, :, None] & tones]).all():
+    if not np.isfinite(csi[links[..., None] & tones]).all():
         raise RfgsError(f"{what} holds NaN or infinity; run `rfgs-factory validate` on the dataset")
 
 
@@ -156,8 +188,9 @@ def observe(
     channel: Observed = "clean",
     kind: Observe = "complex",
     empty: Reported | None = None,
+    packets: Packets = "first",
 ) -> Observations:
-    """Reads one frame at its own time and hides what is held out, and links that lost a packet.
+    """Reads one frame at its own time and hides what is held out, and links that heard nothing.
 
     Args:
         sequence: The data.
@@ -167,12 +200,14 @@ def observe(
         kind: What the radio reports of it; nothing else reaches the result.
         empty: What it reports of the empty room, as `reported` gives it; None takes the
             empty-room capture.
+        packets: Whether the frame's other packets help to tell the change from noise; only of
+            the channel itself.
 
     Raises:
         RfgsError: The channel holds values that are not finite, or its antennas move within a
             frame.
     """
-    elements, links, tones, csi = visible_channel(sequence, radio, frame, channel)
+    elements, links, tones, csi = visible_channel(sequence, radio, frame, channel, packets)
     if empty is None:
         static = sequence.csi_static(radio)
         _need_finite(
@@ -181,8 +216,10 @@ def observe(
         empty = reported(static, tones, kind)
     seen = links[:, :, None] & tones
     freq_hz = np.asarray(sequence.radio(radio)["freq_hz"].values, dtype=np.float64)
-    now, delay_change = reported(csi, tones, kind), None
-    if kind == "complex":
+    now, delay_change = reported(csi[0], tones, kind), None
+    if kind == "complex" and len(csi) > 1:
+        delta, static = change_at_first(csi - empty, links, tones, elements), empty
+    elif kind == "complex":
         delta, static = now - empty, empty
     elif kind == "power":
         wave = direct_wave(elements, freq_hz)

@@ -44,9 +44,13 @@ def test_every_case_once_and_seeds_share_a_dataset() -> None:
     assert {case.condition for case in ultra} == {"clean", "impaired"}
     assert "through_wall" not in {case.scene for case in ultra}
     assert len(chosen) == 3 * (4 * 2 * 3 + 3 * 2)
-    # Clean and impaired channels stand in one dataset; behind a wall all cases need depth 3.
+    # Clean and impaired channels stand in one dataset, but for radars, whose noise asks for many
+    # chirps; behind a wall all cases need depth 3.
     folders = {case.dataset for case in chosen if case.scene == "living_room_walk"}
-    assert len(folders) == 5
+    assert len(folders) == 6
+    many = {case for case in chosen if "--packets-per-frame 64" in " ".join(case.generate(Path()))}
+    assert {(case.radio, case.condition) for case in many} == {("mmwave", "impaired")}
+    assert {"packets64" in str(case.dataset) for case in many} == {True}
     assert {case.depth for case in chosen if case.scene == "through_wall"} == {3}
 
 

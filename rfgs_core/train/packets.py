@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The channel change at a frame's own time, estimated from all packets of the frame.
+
+Somebody who moves turns the channel from packet to packet at a few Doppler frequencies, is met at
+a few delays and seen in a few directions; thermal noise is everywhere alike. Per device pair the
+change y becomes cells: directions of the arrays × delays, a unitary transform of the visible
+entries. A cell's packets y_n are a stationary process of spectrum S in noise of power σ²,
+and the linear estimate of its first sample with the least mean squared error is
+
+    x̂ = r₀ᴴ (R + σ² I)⁻¹ y,   R[n, m] = r(n − m),   r(k) = mean over ν of S(ν) e^{+j2πkν},
+
+the Wiener filter (N. Wiener, Extrapolation, Interpolation and Smoothing of Stationary Time Series,
+1949). A filter per Doppler bin, max(0, 1 − σ²/P), is its limit for many packets; at the first
+packet, an end of the record, that limit does not hold, because bins take the record for a period.
+
+All that enters comes from the data: σ² is the median power of the cells of all delays and Dopplers
+(people fill few of them), S what the periodogram, averaged over neighbouring cells, has above σ²
+where noise alone would hardly reach it. Lost packets are left out of y.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Bool, Complex, Complex64, Float
+from scipy.ndimage import uniform_filter1d
+from scipy.stats import gamma
+
+from rfgs_core.encode.matched_filter import device_pairs
+from rfgs_core.radio import Layout
+
+#: Doppler frequencies per resolved one at which spectra are held.
+DOPPLER_GRID = 2
+#: Neighbouring cells, along each axis, that a periodogram is averaged over.
+NEIGHBOURS = 3
+#: Share of the cells of noise alone that are taken for somebody.
+FALSE_ALARMS = 1e-5
+#: Noise below this share of a pair's power leaves its first packet as it is.
+SILENT = 1e-5
+#: Cells that are solved at once.
+_CELLS = 1024
+
+
+def noise_power(
+    change: Complex[np.ndarray, "packet link subcarrier"], tones: Bool[np.ndarray, "subcarrier"]
+) -> float:
+    """Power of what has no delay and no Doppler of its own: white noise of one entry.
+
+    The median over delay–Doppler cells of exponentially distributed powers is ln 2 of their mean.
+    Hann windows keep the side lobes of strong echoes from passing for noise.
+
+    Args:
+        change: Channel change; packets evenly spaced.
+        tones: Visible tones; the longest run of them is read.
+    """
+    index = np.flatnonzero(tones)
+    run = max(np.split(index, np.flatnonzero(np.diff(index) > 1) + 1), key=len)
+    band, time = (np.hanning(size + 2)[1:-1] for size in (len(run), len(change)))
+    window = band * time[:, None, None] / np.sqrt((band**2).sum() * (time**2).sum())
+    cells = np.fft.fft(np.fft.fft(change[:, :, run] * window, axis=2), axis=0)
+    return float(np.median(cells.real**2 + cells.imag**2) / np.log(2.0))
+
+
+def doppler_spectrum(
+    cells: Complex[np.ndarray, "packet *cell"], noise: float, count: int
+) -> Float[np.ndarray, "doppler *cell"]:
+    """Power over Doppler of each cell without noise, zero where noise may be all there is.
+
+    Args:
+        cells: Channel change by direction and delay; zero where a packet was lost.
+        noise: Power of the noise in a cell of one packet.
+        count: Packets that were received.
+
+    Returns:
+        Spectra of mean r(0) on `DOPPLER_GRID` × packet frequencies, that of nothing first.
+    """
+    size = DOPPLER_GRID * len(cells)
+    spectrum = np.fft.fft(cells, n=size, axis=0)
+    power = (spectrum.real**2 + spectrum.imag**2) / count
+    averaged = [min(NEIGHBOURS, length) for length in power.shape]
+    for axis, length in enumerate(averaged):
+        power = uniform_filter1d(power, length, axis=axis, mode="wrap")
+    # Of the Doppler grid only one in DOPPLER_GRID values is independent of the others.
+    looks = np.prod(averaged) / DOPPLER_GRID
+    heard = power > noise * gamma.isf(FALSE_ALARMS, looks) / looks
+    return np.where(heard, power - noise, 0.0)
+
+
+def first_of(
+    cells: Complex[np.ndarray, "packet cell"],
+    spectrum: Float[np.ndarray, "doppler cell"],
+    noise: float,
+    received: Bool[np.ndarray, "packet"],
+) -> Complex64[np.ndarray, "cell"]:
+    """Least-squares estimate of each cell's first packet, see the module."""
+    first = np.zeros(cells.shape[1], dtype=np.complex64)
+    (rows,) = np.nonzero(received)
+    lag = rows[:, None] - rows
+    (heard,) = np.nonzero(spectrum.any(axis=0))
+    for part in np.array_split(heard, -(-len(heard) // _CELLS)) if len(heard) else []:
+        covariance = np.fft.ifft(spectrum[:, part], axis=0).astype(np.complex64)
+        matrix = covariance[lag].transpose(2, 0, 1)
+        matrix[:, np.arange(len(rows)), np.arange(len(rows))] += noise
+        weighed = np.linalg.solve(matrix, cells[rows][:, part].T[..., None])[..., 0]
+        first[part] = np.einsum("nc,cn->c", covariance[-rows], weighed)
+    return first
+
+
+def _columns(rx_column: np.ndarray, rx: np.ndarray) -> tuple[np.ndarray, int]:
+    """Receiving elements column by column, and how many a column has; 1 if columns differ."""
+    order = rx[np.argsort(rx_column[rx], kind="stable")]
+    _, counts = np.unique(rx_column[rx], return_counts=True)
+    return order, int(counts[0]) if (counts == counts[0]).all() else 1
+
+
+def _pair_at_first(
+    change: Complex[np.ndarray, "packet tx column row subcarrier"],
+    tones: Bool[np.ndarray, "subcarrier"],
+    received: Bool[np.ndarray, "packet"],
+) -> Complex[np.ndarray, "tx column row subcarrier"]:
+    """The estimate of one device pair."""
+    noise = noise_power(change[received].reshape(received.sum(), -1, len(tones)), tones)
+    power = float(np.mean(np.abs(change[received][..., tones]) ** 2))
+    if received[0] and noise <= SILENT * power:
+        return change[0]
+    cells = np.fft.ifft(change, axis=4, norm="ortho")
+    cells = np.fft.fftn(cells, axes=(1, 2, 3), norm="ortho")
+    noise *= float(tones.mean())
+    spectrum = doppler_spectrum(cells, noise, int(received.sum()))
+    flat = cells.reshape(len(cells), -1), spectrum.reshape(len(spectrum), -1)
+    first = first_of(*flat, noise, received).reshape(cells.shape[1:])
+    return np.fft.fft(np.fft.ifftn(first, axes=(0, 1, 2), norm="ortho"), axis=3, norm="ortho")
+
+
+def change_at_first(
+    change: Complex64[np.ndarray, "packet tx rx subcarrier"],
+    links: Bool[np.ndarray, "tx rx"],
+    tones: Bool[np.ndarray, "subcarrier"],
+    layout: Layout,
+) -> Complex64[np.ndarray, "tx rx subcarrier"]:
+    """The change of all visible links at the first packet, estimated from all of them.
+
+    Args:
+        change: csi − csi_static of each packet, evenly spaced; NaN where one was lost.
+        links: Links that may be read.
+        tones: Tones that may be read.
+        layout: Antenna elements.
+
+    Returns:
+        Zero where nothing may be read.
+    """
+    estimate = np.zeros(change.shape[1:], dtype=np.complex64)
+    pair, names = device_pairs(layout.tx_device, layout.rx_device, links)
+    for index in range(len(names)):
+        tx, rx = (np.unique(axis) for axis in np.nonzero(pair == index))
+        rx, rows = _columns(layout.rx_column, rx)
+        block = np.where(tones, change[:, tx[:, None], rx], 0)
+        received = np.isfinite(block).all(axis=(1, 2, 3))
+        block[~received] = 0
+        shape = (*block.shape[:2], -1, rows, len(tones))
+        found = _pair_at_first(block.reshape(shape), tones, received)
+        estimate[tx[:, None], rx] = found.reshape(block.shape[1:])
+    return np.where(links[..., None] & tones, estimate, 0).astype(np.complex64)

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from rfgs_core.predict import Prediction
+    from rfgs_core.propagation import RadioGaussians
     from rfgs_core.run import Run
 
 
@@ -23,8 +24,10 @@ class PredictArgs:
 
     The prediction is what the fitted Gaussians scatter, plus the free-space direct path between
     the antennas with the Gaussians' shadow on it. The paths by way of walls are known along
-    recorded links only, so they are missing here; near walls a real channel holds more. Also
-    prints what the Gaussians reflect and what their frequency behaviour says of the material.
+    recorded links only, so they are missing here; near walls a real channel holds more. With
+    --room the run's static Gaussians stand in for them, as a guess (`rfgs eval` tells how good on
+    a device pair that training did not see). Also prints what the Gaussians reflect and what
+    their frequency behaviour says of the material.
 
     Example: rfgs predict run --tx 0.5,0.5,1.2 --rx 3.0,4.0,1.2 --rx -1.0,2.0,1.2
     """
@@ -44,6 +47,8 @@ class PredictArgs:
     """Put the radio's own receiving array at each --rx instead of a single antenna."""
     facing: str | None = None
     """Point x,y,z [m] that the arrays are turned to; the middle of the person when left out."""
+    room: bool = False
+    """Add what the static Gaussians of the run scatter (`rfgs train --static-set`)."""
     also: Annotated[tuple[Path, ...], tyro.conf.UseAppendAction] = ()
     """Runs of other radios on the same frame, for the material: bands far apart tell more."""
 
@@ -51,7 +56,7 @@ class PredictArgs:
 def run(args: PredictArgs) -> int:
     """Writes arrays and picture, prints the table; exit code 0."""
     from rfgs_core.predict.antennas import positions
-    from rfgs_core.predict.arrays import NOTE
+    from rfgs_core.predict.arrays import note_of
     from rfgs_core.run import open_run
 
     tx_xyz, rx_xyz = positions(args.tx, args.rx)
@@ -62,7 +67,7 @@ def run(args: PredictArgs) -> int:
     lines = [*_table(prediction, arrays), *_reflectors(arrays), _material(trained, frame, args)]
     path = out or args.run / "predictions" / f"{frame:06d}.npz"
     _write(path, arrays)
-    lines += [f"holds: {NOTE}", f"{path} and {path.with_suffix('.png').name} written"]
+    lines += [f"holds: {note_of(arrays)}", f"{path} and {path.with_suffix('.png').name} written"]
     sys.stdout.write("\n".join(lines) + "\n")
     return 0
 
@@ -97,10 +102,26 @@ def _predict(
         arrays = [receiving_array(radio, place, middle) for place in rx_xyz]
         elements = np.stack([xyz for xyz, _ in arrays])
         boresight_rad = [yaw for _, yaw in arrays]
-    prediction = predict_channel(gaussians, tx_xyz, elements, radio.freq_hz)
+    room = _room(trained, np.concatenate([tx_xyz[None], elements.reshape(-1, 3)]), args)
+    prediction = predict_channel(gaussians, tx_xyz, elements, radio.freq_hz, room)
     echoes = echoes_at(gaussians, tx_xyz, rx_xyz, radio.freq_hz)
     own = reflectors(gaussians, radio.freq_hz)
     return prediction, prediction_arrays(prediction, boresight_rad, means, echoes, own)
+
+
+def _room(trained: Run, antennas: np.ndarray, args: PredictArgs) -> RadioGaussians | None:
+    """The static set, less what stands too near to the new antennas."""
+    from rfgs_core.errors import RfgsError
+    from rfgs_core.run.static import has_static_set, read_static_set
+
+    if not args.room:
+        return None
+    if not has_static_set(trained.path):
+        raise RfgsError(
+            f"--room: {trained.path} has no static Gaussians; train it with --static-set 2000"
+        )
+    static = read_static_set(trained.path).away_from(antennas)
+    return static.head.radio_gaussians(static.gaussians)
 
 
 def _write(path: Path, arrays: dict[str, np.ndarray]) -> None:

@@ -60,6 +60,10 @@ class TrainArgs:
     background: Background = "empty_room"
     """What the moving part is told from: empty_room, its capture; learned, the median over all
     frames of the sequence, where nobody recorded the empty room."""
+    static_set: int = 0
+    """Gaussians of what stands still, shared by all frames and fitted to the background less the
+    direct paths; 0: none. With --background learned, what moves is then taken out of every frame
+    before the median is taken again. Needs --observe complex."""
     density: Density | None = None
     """How Gaussians come and go: none; paper, section 3.5 of the paper (needs its losses); 3dgs,
     clone, split, prune and reset; residual, new ones where the back-projected residual peaks.
@@ -110,6 +114,7 @@ def run(args: TrainArgs) -> int:
         channel=args.channel,
         observe=args.observe,
         background=args.background,
+        static_set=args.static_set,
         calibrate=args.calibrate,
         density=args.density,
         coarse_share=args.coarse,

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float
 from tqdm import tqdm
 
+from rfgs_core.evaluate.background import background_metrics
 from rfgs_core.evaluate.controls import CONTROLS, ControlResult, phase_free
 from rfgs_core.evaluate.geometry import GEOMETRY_KEYS, geometry_metrics
 from rfgs_core.evaluate.image import IMAGE_KEYS
@@ -57,6 +58,7 @@ def evaluate_run(run: EvaluatedRun, *, oracle: bool = True) -> dict[str, Any]:
     metrics["controls"] = groups
     metrics["reasons"] = table.reasons(image, image_reasons, bool(pictures))
     metrics["frames"] = table.frames()
+    metrics["background"] = background_metrics(scene)
     metrics |= _circumstances(scene)
     metrics["verdicts"] = verdicts(metrics)
     metrics["eval_s"] = round(time.perf_counter() - start_s, 2)

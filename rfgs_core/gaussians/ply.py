@@ -61,6 +61,20 @@ class GaussianCloud:
         """Colours, sRGB in [0, 1]."""
         return np.clip(0.5 + SH_C0 * self.f_dc, 0.0, 1.0).astype(np.float32)
 
+    @staticmethod
+    def join(first: GaussianCloud, second: GaussianCloud) -> GaussianCloud:
+        """Both clouds, rows of `first` before rows of `second`.
+
+        Powers are kept where they are known of every Gaussian.
+        """
+        both = [cloud for cloud in (first, second) if len(cloud)] or [second]
+        power = [cloud.rf_power_db for cloud in both if cloud.rf_power_db is not None]
+        names = ("means", "quats", "log_scales", "logit_opacities", "f_dc")
+        return GaussianCloud(
+            **{name: np.concatenate([getattr(cloud, name) for cloud in both]) for name in names},
+            rf_power_db=np.concatenate(power) if len(power) == len(both) else None,
+        )
+
     def to_gaussians(self, features: Float32[np.ndarray, "M 32"] | None = None) -> Gaussians:
         """The same Gaussians for computing; features live in another file, zero if not given."""
         if features is None:

@@ -18,13 +18,20 @@ NOTE = (
     "walls are known along recorded links only and are not predicted"
 )
 
+#: The same where a static set stands in for the walls.
+ROOM_NOTE = (
+    "person's scattering + shadowed free-space direct path (isotropic antennas) + what the static "
+    "Gaussians scatter, which explain the empty room along recorded links and guess it elsewhere"
+)
+
 #: Array → unit and axes.
 UNITS: dict[str, tuple[str, str]] = {
     "tx_xyz": ("m", "xyz"),
     "rx_xyz": ("m", "rx, xyz"),
     "element_xyz": ("m", "rx, element, xyz"),
     "freq_hz": ("Hz", "subcarrier"),
-    "csi": ("1", "rx, element, subcarrier: csi_scatter + csi_direct"),
+    "csi": ("1", "rx, element, subcarrier: csi_scatter + csi_direct, + csi_room if there is one"),
+    "csi_room": ("1", "rx, element, subcarrier: what the static Gaussians scatter"),
     "csi_scatter": ("1", "rx, element, subcarrier: what the Gaussians scatter"),
     "csi_direct": ("1", "rx, element, subcarrier: straight way with the person's shadow"),
     "csi_free": ("1", "rx, element, subcarrier: straight way without a person"),
@@ -75,6 +82,7 @@ def prediction_arrays(
         "csi_scatter": prediction.csi_scatter,
         "csi_direct": prediction.csi_direct,
         "csi_free": prediction.csi_free,
+        **({} if prediction.csi_room is None else {"csi_room": prediction.csi_room}),
         **profiles,
         "azimuth_deg": azimuth_deg,
         "elevation_deg": elevation_deg,
@@ -97,4 +105,9 @@ def prediction_arrays(
 def write_prediction(path: Path, arrays: dict[str, np.ndarray]) -> None:
     """Writes arrays to an .npz file, with `units` (name, unit, axes per row) and `note`."""
     units = np.array([(name, *UNITS[name]) for name in arrays])
-    save_arrays(path, {**arrays, "units": units, "note": np.array(NOTE)})
+    save_arrays(path, {**arrays, "units": units, "note": np.array(note_of(arrays))})
+
+
+def note_of(arrays: dict[str, np.ndarray]) -> str:
+    """What a prediction holds, in words."""
+    return ROOM_NOTE if "csi_room" in arrays else NOTE

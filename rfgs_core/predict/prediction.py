@@ -3,7 +3,8 @@
 
 The empty room is known along recorded links only, so two parts can be predicted elsewhere: what
 the Gaussians scatter, and the straight way between the antennas (Friis, isotropic antennas) with
-the shadow that the Gaussians throw on it. Reflections from walls are not in it.
+the shadow that the Gaussians throw on it. Reflections from walls are not in it, unless a static
+set, fitted to the recorded links, stands in for them.
 """
 
 from __future__ import annotations
@@ -34,6 +35,8 @@ class Prediction:
     """The straight way without a person: λ/(4πd) e^{−j2πfd/c}."""
     passed: Complex64[np.ndarray, "rx element"]
     """Share T of the straight way that passes the Gaussians, at the centre of the band."""
+    csi_room: Complex64[np.ndarray, "rx element subcarrier"] | None = None
+    """What the static set scatters; None without one."""
 
     @property
     def rx_xyz(self) -> Float64[np.ndarray, "rx 3"]:
@@ -47,8 +50,9 @@ class Prediction:
 
     @property
     def csi(self) -> Complex64[np.ndarray, "rx element subcarrier"]:
-        """Both parts: the shadowed straight way and the scattering."""
-        return self.csi_direct + self.csi_scatter
+        """All parts: the shadowed straight way, the scattering and the room's."""
+        moving = self.csi_direct + self.csi_scatter
+        return moving if self.csi_room is None else moving + self.csi_room
 
 
 def tones_of(freq_hz: Float[np.ndarray, "subcarrier"]) -> Tones:
@@ -62,6 +66,7 @@ def predict_channel(
     tx_xyz: Float[np.ndarray, "3"],
     element_xyz: Float[np.ndarray, "rx element 3"],
     freq_hz: Float[np.ndarray, "subcarrier"],
+    room: RadioGaussians | None = None,
 ) -> Prediction:
     """Channels between antennas anywhere.
 
@@ -70,26 +75,30 @@ def predict_channel(
         tx_xyz: Transmitting antenna [m].
         element_xyz: Receiving elements of each position [m].
         freq_hz: Tone frequencies [Hz], equally spaced.
+        room: Static Gaussians as the radio sees them, in place of the room's reflections.
     """
     tx = np.asarray(tx_xyz, dtype=np.float64)
     elements = np.ascontiguousarray(element_xyz, dtype=np.float64)
     shape, flat = elements.shape[:2], elements.reshape(-1, 3)
     links = Links(torch.from_numpy(np.tile(tx, (len(flat), 1))), torch.from_numpy(flat))
-    g = gaussians
+    g, echoes = gaussians, []
     with torch.no_grad():
-        echo = scatter(
-            *(g.means, g.quats, g.scales_rf, g.gamma, links, tones_of(freq_hz)),
-            *(g.normals, g.sharpness, g.visibility),
-        )
+        for part in (g, *([] if room is None else [room])):
+            echo = scatter(
+                *(part.means, part.quats, part.scales_rf, part.gamma, links, tones_of(freq_hz)),
+                *(part.normals, part.sharpness, part.visibility),
+            )
+            echoes.append(echo.numpy().reshape(*shape, -1).astype(np.complex64))
         passed = shadow(g.means, g.quats, g.scales, g.alpha, _straight(links, freq_hz))
     free = friis(np.linalg.norm(flat - tx, axis=1), freq_hz)
     return Prediction(
         tx_xyz=tx,
         element_xyz=elements,
         freq_hz=np.asarray(freq_hz, dtype=np.float64),
-        csi_scatter=echo.numpy().reshape(*shape, -1).astype(np.complex64),
+        csi_scatter=echoes[0],
         csi_free=free.reshape(*shape, -1).astype(np.complex64),
         passed=passed.numpy().reshape(shape).astype(np.complex64),
+        csi_room=echoes[1] if room is not None else None,
     )
 
 

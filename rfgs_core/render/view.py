@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 import torch
-from jaxtyping import Float32, UInt8
+from jaxtyping import Bool, Float32, UInt8
 
 from rfgs_core.dataset.sequence import Sequence
 from rfgs_core.errors import RfgsError, RfgsFormatError
@@ -25,6 +25,8 @@ Split = Literal["train", "test"]
 
 #: File of the fitted shader inside a run.
 SHADER_FILE = "shader.npz"
+#: Static Gaussians inside a run; the shader knows only what moves, so that they are grey.
+STATIC_FILE = Path("gaussians", "static.ply")
 
 
 class TrainedRun(Protocol):
@@ -102,10 +104,13 @@ def fitted_shader(run: TrainedRun) -> Shader | None:
 
 def moving_gaussians(run: TrainedRun, frame: int) -> Gaussians:
     """The Gaussians of a frame without the static ones."""
-    everything = run.gaussians(frame)
-    count = len(run.attributes(frame)["features"])
-    rows = torch.arange(len(everything)) >= len(everything) - count
-    return everything.select(rows).detach()
+    return run.gaussians(frame).select(~static_rows(run, frame)).detach()
+
+
+def static_rows(run: TrainedRun, frame: int) -> Bool[torch.Tensor, "M"]:
+    """Which of a frame's Gaussians stand still."""
+    count = len(run.gaussians(frame))
+    return torch.arange(count) < count - len(run.attributes(frame)["features"])
 
 
 def render_view(run: TrainedRun, camera: str | Camera, frame: int) -> View:
@@ -125,7 +130,7 @@ def render_view(run: TrainedRun, camera: str | Camera, frame: int) -> View:
     eye = camera if isinstance(camera, Camera) else camera_of(run.sequence, camera)
     file = run.sequence.files.image_empty(eye.name)
     if not file.is_file():
-        return _render(run, run.gaussians(frame).detach(), eye, MID_GREY)
+        return _render(run, run.gaussians(frame).detach(), eye, MID_GREY, static_rows(run, frame))
     empty = _colors(run.sequence.image_empty(eye.name), eye, file)
     return _render(run, moving_gaussians(run, frame), eye, torch.from_numpy(empty))
 
@@ -184,8 +189,8 @@ def color_run_files(run: TrainedRun, shader: Shader | None) -> None:
     """
     first = run.frames[0]
     everything = run.gaussians(first).detach()
-    static = torch.arange(len(everything)) < len(everything) - len(moving_gaussians(run, first))
-    sets = {"point_cloud.ply": everything, "gaussians/static.ply": everything.select(static)}
+    static = static_rows(run, first)
+    sets = {"point_cloud.ply": everything}
     for frame in run.frames:
         sets[f"gaussians/{frame:06d}.ply"] = moving_gaussians(run, frame)
     for name, gaussians in sets.items():
@@ -197,7 +202,8 @@ def color_run_files(run: TrainedRun, shader: Shader | None) -> None:
             raise RfgsFormatError(
                 f"{path}: holds {len(stored)} Gaussians, the run {len(gaussians)}"
             )
-        colored = cloud_of(gaussians, _shade(shader, gaussians).numpy())
+        still = static if name == "point_cloud.ply" else None
+        colored = cloud_of(gaussians, _shade(shader, gaussians, still).numpy())
         write_ply(path, replace(stored, f_dc=colored.f_dc))
 
 
@@ -206,25 +212,35 @@ def colored_cloud(run: TrainedRun, frame: int, shader: Shader | None) -> Gaussia
 
     The reflected power is added where the run knows it for every Gaussian.
     """
-    gaussians = run.gaussians(frame).detach()
-    power = run.attributes(frame).get("rf_power_db")
-    known = power is not None and len(power) == len(gaussians)
-    rgb = _shade(shader, gaussians).numpy()
-    return cloud_of(gaussians, rgb, power if known else None)
+    attributes = run.attributes(frame)
+    moving, rows = moving_gaussians(run, frame), static_rows(run, frame)
+    rgb = _shade(shader, moving).numpy()
+    static = cloud_of(run.gaussians(frame).detach().select(rows))
+    if len(static):
+        static = replace(static, rf_power_db=read_ply(run.path / STATIC_FILE).rf_power_db)
+    return GaussianCloud.join(static, cloud_of(moving, rgb, attributes.get("rf_power_db")))
 
 
 def _render(
-    run: TrainedRun, gaussians: Gaussians, camera: Camera, background: torch.Tensor | float
+    run: TrainedRun,
+    gaussians: Gaussians,
+    camera: Camera,
+    background: torch.Tensor | float,
+    still: Bool[torch.Tensor, "M"] | None = None,
 ) -> View:
-    drawn = splat(gaussians, _shade(fitted_shader(run), gaussians), camera)
+    drawn = splat(gaussians, _shade(fitted_shader(run), gaussians, still), camera)
     picture = drawn.over(background).clamp(0.0, 1.0)
     return View(picture.numpy(), drawn.alpha.numpy(), drawn.depth.numpy())
 
 
-def _shade(shader: Shader | None, gaussians: Gaussians) -> torch.Tensor:
+def _shade(
+    shader: Shader | None, gaussians: Gaussians, still: Bool[torch.Tensor, "M"] | None = None
+) -> torch.Tensor:
+    """Colours; grey without a shader, and where Gaussians stand still."""
     if shader is None:
         return torch.full((len(gaussians), 3), MID_GREY)
-    return shader.colors(gaussians.features.float())
+    colors = shader.colors(gaussians.features.float())
+    return colors if still is None else torch.where(still[:, None], MID_GREY, colors)
 
 
 def _colors(picture: UInt8[np.ndarray, "H W 4"], camera: Camera, file: Any) -> np.ndarray:

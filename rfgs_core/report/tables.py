@@ -38,6 +38,12 @@ _CHANNEL_COLUMNS = (
     Column("delay_profile_corr", "delay profile", "", True, 2, "correlation, unseen links"),
 )
 
+_BACKGROUND_COLUMNS = (
+    Column("visible_snr_db", "visible", "dB", True, 1, "SNR on what training sees"),
+    *_CHANNEL_COLUMNS,
+    Column("pair_snr_db", "pair", "dB", True, 1, "SNR on unseen device pairs, with phase"),
+)
+
 #: Group of `metrics.json` → title and columns.
 GROUPS: dict[str, tuple[str, tuple[Column, ...]]] = {
     "geometry": (
@@ -113,7 +119,30 @@ class Table:
 
 def metric_tables(metrics: Mapping[str, Any]) -> list[Table]:
     """All tables of a run; controls without any value of a group are left out of it."""
-    return [_table(metrics, group) for group in GROUPS if metrics.get(group)]
+    tables = [_table(metrics, group) for group in GROUPS if metrics.get(group)]
+    return [*tables, *([_background_table(metrics)] if metrics.get("background") else [])]
+
+
+def _background_table(metrics: Mapping[str, Any]) -> Table:
+    """The empty room as the static set predicts it, beside what needs no Gaussians."""
+    part = metrics["background"]
+    best = {column.key: _best(part["rows"], column) for column in _BACKGROUND_COLUMNS}
+    rows = []
+    for name, values in part["rows"].items():
+        cells = []
+        for column in _BACKGROUND_COLUMNS:
+            value = _rounded(values, column)
+            wins = value is not None and value == best[column.key]
+            cells.append(Cell(show(values[column.key], column.digits), wins, "not computed"))
+        rows.append(Row(name, "method" if name.startswith("static") else "control", cells))
+    title = f"The empty room, csi_static, from {part['n_gaussians']} static Gaussians"
+    if part["surface_m"]:
+        near = {name: f"{100 * value:.0f} cm" for name, value in part["surface_m"].items()}
+        title += (
+            f" (half of their power within {near['power_median']} of a true surface; anywhere in "
+            f"the room: {near['chance_median']})"
+        )
+    return Table(title, _BACKGROUND_COLUMNS, rows, [])
 
 
 def _table(metrics: Mapping[str, Any], group: str) -> Table:

@@ -21,6 +21,7 @@ from rfgs_core.files import read_json
 from rfgs_core.gaussians import FEATURE_DIM, Gaussians
 from rfgs_core.gaussians.ply import read_ply
 from rfgs_core.run.calibration import read_calibration
+from rfgs_core.run.static import static_gaussians
 from rfgs_core.train.channel import Channel
 from rfgs_core.train.head import HEAD_SHAPES, RadioHead
 from rfgs_core.train.observations import Observations, Reported, observe
@@ -116,13 +117,7 @@ class Run:
 
     def gaussians(self, frame: int) -> Gaussians:
         """Static Gaussians, then the moving ones of a frame."""
-        static = self.path / "gaussians" / "static.ply"
-        moving = self.moving(frame)
-        if not static.exists():
-            return moving
-        cloud = read_ply(static)
-        empty = np.zeros((len(cloud.means), moving.features.shape[1]), dtype=np.float32)
-        return Gaussians.join(cloud.to_gaussians(empty), moving)
+        return Gaussians.join(static_gaussians(self.path), self.moving(frame))
 
     def moving(self, frame: int) -> Gaussians:
         """Moving Gaussians of a frame with their features."""

@@ -17,7 +17,7 @@ from rfgs_core.dataset import Dataset, Sequence
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json, write_json
 from rfgs_core.gaussians import Gaussians
-from rfgs_core.gaussians.ply import cloud_of, read_ply, write_ply
+from rfgs_core.gaussians.ply import GaussianCloud, cloud_of, read_ply, write_ply
 from rfgs_core.run.calibration import (
     calibration_path,
     need_shared_links,
@@ -32,17 +32,19 @@ from rfgs_core.run.encoders import (
 )
 from rfgs_core.run.folder import BACKGROUND_FILE, SCHEMA, Run, open_run, relative_dataset
 from rfgs_core.run.log import Scalars, TrainingLog
+from rfgs_core.run.static import has_static_set, need_phases, static_ply, write_static_set
 from rfgs_core.seeds import sub_seed
 from rfgs_core.threads import one_torch_thread
 from rfgs_core.train.calibrate import calibrate
 from rfgs_core.train.config import TrainConfig
 from rfgs_core.train.frame import FrameState, solve_reflectivity, start_frame
 from rfgs_core.train.head import HEAD_SHAPES, RadioHead
-from rfgs_core.train.learned_background import learned_background
+from rfgs_core.train.learned_background import learned_background, without_movers
 from rfgs_core.train.observations import need_still_antennas
 from rfgs_core.train.offsets import Offsets
 from rfgs_core.train.parameters import GAUSSIAN_SHAPES
 from rfgs_core.train.refine import refine
+from rfgs_core.train.static_set import fit_static_set
 from rfgs_core.train.tracks import Tracks
 
 _CHECKPOINT: dict[str, Shape] = {
@@ -85,6 +87,7 @@ def train_sequence(
     """
     need_still_antennas(sequence, radio)
     need_shared_links(sequence, radio, config)
+    need_phases(config)
     if config.encoder == "paths":
         dataset.need("paths")
     if encoder_file is not None:
@@ -107,6 +110,8 @@ def train_sequence(
         keep_encoder(encoder_file, out)
     if config.background == "learned" and not (out / BACKGROUND_FILE).exists():
         empty = learned_background(sequence, radio, config.channel, config.observe, config.packets)
+        if config.static_set:
+            empty = without_movers(sequence, radio, empty, config)
         save_arrays(out / BACKGROUND_FILE, {"empty": empty})
     spent = float(run.config.get("train_s", 0.0))
     before: FrameState | None = None
@@ -127,6 +132,12 @@ def train_sequence(
             else:
                 bar.update(config.iterations + 2)
             before = state
+    if config.static_set and not has_static_set(out):
+        # Of a calibrated run the background has no offsets only once a frame is fitted.
+        seed = sub_seed(config.seed, sequence.name, radio, "static set")
+        observations = run.observations(frames[0])
+        with one_torch_thread():
+            write_static_set(out, fit_static_set(observations, config.static_set, seed))
     _write_point_cloud(run)
     return Run(out, read_json(out / "config.json"))
 
@@ -214,9 +225,8 @@ def _store(run: Run, frame: int, state: FrameState) -> None:
             "body": state.body,
         },
     )
-    static = run.path / "gaussians" / "static.ply"
-    if not static.exists():
-        write_ply(static, cloud_of(Gaussians.none()))
+    if not static_ply(run.path).exists():
+        write_ply(static_ply(run.path), cloud_of(Gaussians.none()))
     head = state.head.arrays()
     save_arrays(run.path / "radio_head.npz", head)
     arrays = {name: value.numpy() for name, value in state.gaussians.items()}
@@ -244,5 +254,7 @@ def _finished(run: Run, frame: int) -> FrameState | None:
 
 def _write_point_cloud(run: Run) -> None:
     """Static Gaussians and those of the first frame in one file, for any splat viewer."""
-    moving = read_ply(run.ply_path(run.frames[0]))
-    write_ply(run.path / "point_cloud.ply", moving)
+    write_ply(
+        run.path / "point_cloud.ply",
+        GaussianCloud.join(read_ply(static_ply(run.path)), read_ply(run.ply_path(run.frames[0]))),
+    )

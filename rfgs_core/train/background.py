@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Complex128, Int64
+from jaxtyping import Bool, Complex64, Complex128, Int64
 
 from rfgs_core.propagation import EnvironmentPaths
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
@@ -21,16 +21,39 @@ def direct_gain(
 ) -> Complex128[np.ndarray, "pair"]:
     """Complex factor on Friis' direct path per device pair, by least squares."""
     tx, rx = np.nonzero(pair >= 0)
-    length = np.linalg.norm(observations.layout.tx_xyz[tx] - observations.layout.rx_xyz[rx], axis=1)
-    freq_hz = observations.freq_hz[observations.tones]
-    wave = np.exp(-2j * np.pi * freq_hz * length[:, None] / SPEED_OF_LIGHT)
-    wave *= SPEED_OF_LIGHT / (4 * np.pi * freq_hz * length[:, None])
+    wave = direct_channel(observations)[tx, rx][:, observations.tones].astype(np.complex128)
     seen = observations.static[tx, rx][:, observations.tones]
     index = pair[tx, rx]
     match = np.sum(np.conj(wave) * seen, axis=1)
     power = np.sum(np.abs(wave) ** 2, axis=1)
     real = np.bincount(index, match.real, count) + 1j * np.bincount(index, match.imag, count)
     return real / np.maximum(np.bincount(index, power, count), 1e-30)
+
+
+def direct_channel(observations: Observations) -> Complex64[np.ndarray, "tx rx subcarrier"]:
+    """Friis' direct path of every link, λ/(4πd) e^{−j2πfd/c}."""
+    offset = observations.layout.tx_xyz[:, None] - observations.layout.rx_xyz
+    length_m = np.maximum(np.linalg.norm(offset, axis=2), 1e-3)[..., None]
+    wavelength_m = SPEED_OF_LIGHT / observations.freq_hz
+    turn = np.exp(-2j * np.pi * length_m / wavelength_m)
+    return (wavelength_m / (4 * np.pi * length_m) * turn).astype(np.complex64)
+
+
+def direct_background(
+    observations: Observations,
+) -> Complex64[np.ndarray, "tx rx subcarrier"]:
+    """Direct paths of all measured links, those within a device too, with the pairs' gains.
+
+    A device pair that training cannot see gets the gain of the reversed pair, else that of free
+    space.
+    """
+    pair, names = observations.pairs
+    gains = dict(zip(names, direct_gain(observations, pair, len(names)), strict=True))
+    layout, direct = observations.layout, direct_channel(observations)
+    for a, b in layout.device_pairs:
+        block = np.ix_(layout.tx_device == a, layout.rx_device == b)
+        direct[block] *= np.complex64(gains.get((a, b), gains.get((b, a), 1.0)))
+    return direct * layout.measured[..., None]
 
 
 def direct_paths(observations: Observations, links: Bool[np.ndarray, "tx rx"]) -> EnvironmentPaths:

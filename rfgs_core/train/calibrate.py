@@ -19,7 +19,7 @@ import numpy as np
 import torch
 from jaxtyping import Complex64
 
-from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.train.background import direct_channel
 from rfgs_core.train.channel import Channel
 from rfgs_core.train.config import TrainConfig
 from rfgs_core.train.frame import solve_reflectivity, start_frame
@@ -83,15 +83,6 @@ def _likeliest(spectra: CrossSpectra, config: TrainConfig, least_noise: float) -
         timing=config.calibrate != "phase",
         least_noise=least_noise,
     )
-
-
-def direct_channel(observations: Observations) -> Complex64[np.ndarray, "tx rx subcarrier"]:
-    """Friis' direct path of every link, λ/(4πd) e^{−j2πfd/c}."""
-    offset = observations.layout.tx_xyz[:, None] - observations.layout.rx_xyz
-    length_m = np.maximum(np.linalg.norm(offset, axis=2), 1e-3)[..., None]
-    wavelength_m = SPEED_OF_LIGHT / observations.freq_hz
-    turn = np.exp(-2j * np.pi * length_m / wavelength_m)
-    return (wavelength_m / (4 * np.pi * length_m) * turn).astype(np.complex64)
 
 
 def _fitted_change(

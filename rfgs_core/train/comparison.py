@@ -70,10 +70,10 @@ class ComplexComparison:
         self, observations: Observations, change: Complex[Tensor, "link subcarrier"]
     ) -> Observations:
         """The residual channel."""
-        return _with_entries(observations, (self.target - change).numpy())
+        return with_entries(observations, (self.target - change).numpy())
 
 
-def _with_entries(
+def with_entries(
     observations: Observations, entries: Complex[np.ndarray, "link tone"]
 ) -> Observations:
     """The observations with other visible entries of the change."""
@@ -132,7 +132,7 @@ class PowerComparison:
         left = self.target - self.predicted(change, np.arange(len(self.target)))
         wave = direct_wave(observations.layout, observations.freq_hz)
         wave = wave[observations.links][:, observations.tones]
-        return _with_entries(observations, left.numpy() * wave)
+        return with_entries(observations, left.numpy() * wave)
 
 
 @dataclass(frozen=True)

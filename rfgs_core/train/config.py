@@ -42,6 +42,8 @@ class TrainConfig:
     """Which packets of a frame are read; see `packets_to_read`."""
     background: Background = "empty_room"
     """What the moving part is told from."""
+    static_set: int = 0
+    """Gaussians of what stands still, fitted to the background; 0: none."""
     recipe: Recipe = "rfgs"
     """rfgs: our start, rates and steps; paper: the paper's numbers (sections 3.2–3.6)."""
     num_gaussians: int = 6000

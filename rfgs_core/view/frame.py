@@ -14,6 +14,7 @@ from rfgs_core.predict.echoes import reflectors
 from rfgs_core.render.shader import Shader
 from rfgs_core.render.view import colored_cloud
 from rfgs_core.run import Run
+from rfgs_core.run.static import has_static_set, read_static_set
 from rfgs_core.seeds import sub_seed
 
 #: Distances to the true surface are not told apart beyond this [m].
@@ -78,15 +79,16 @@ def load_frame(run: Run, frame: int, shader: Shader | None) -> ShownFrame:
     gaussians = cloud.to_gaussians()
     truth = true_surface(run, frame)
     static = len(cloud) - len(attributes["features"])
+    still = still_values(run, static)
     return ShownFrame(
         frame=frame,
         means=cloud.means,
         covariances=gaussians.covariances.numpy(),
         opacities=gaussians.opacities.numpy(),
         rgb=cloud.rgb,
-        power_db=_behind_static(static, attributes["rf_power_db"]),
-        phase_rad=_behind_static(static, _phase_rad(run, frame)),
-        error_m=_behind_static(static, distance_m(cloud.means[static:], truth)),
+        power_db=_behind(still[0], attributes["rf_power_db"]),
+        phase_rad=_behind(still[1], _phase_rad(run, frame)),
+        error_m=_behind(np.full(static, np.nan), distance_m(cloud.means[static:], truth)),
         truth=truth,
     )
 
@@ -119,7 +121,14 @@ def _phase_rad(run: Run, frame: int) -> Float64[np.ndarray, "M"]:
     return reflectors(gaussians, run.sequence.radio_spec(run.config["radio"]).freq_hz).phase_rad
 
 
-def _behind_static(static: int, values: np.ndarray) -> Float32[np.ndarray, "M"]:
-    """Values of the moving Gaussians behind NaN for the static ones."""
-    unknown = np.full(static, np.nan, np.float32)
-    return np.concatenate([unknown, np.asarray(values, np.float32)])
+def still_values(run: Run, count: int) -> Float32[np.ndarray, "2 count"]:
+    """Reflected power [dB] and phase [rad] of the static Gaussians; NaN where a PLY is all."""
+    if not has_static_set(run.path):
+        return np.full((2, count), np.nan, np.float32)
+    static = read_static_set(run.path)
+    return np.stack([static.power_db, np.angle(static.gamma)]).astype(np.float32)
+
+
+def _behind(static: np.ndarray, moving: np.ndarray) -> Float32[np.ndarray, "M"]:
+    """Values of the static Gaussians, then those of the moving ones."""
+    return np.concatenate([static, moving]).astype(np.float32)

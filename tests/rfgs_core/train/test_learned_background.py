@@ -14,7 +14,8 @@ from rfgs_core.errors import RfgsError
 from rfgs_core.evaluate.scene import Scene
 from rfgs_core.files import read_json
 from rfgs_core.run import open_run
-from rfgs_core.train.learned_background import learned_background
+from rfgs_core.train import learned_background as learned_background_module
+from rfgs_core.train.learned_background import learned_background, without_movers
 from rfgs_core.train.observations import observe, reported
 from tests import tiny_dataset as tiny
 
@@ -99,3 +100,20 @@ def test_who_moves_is_found_without_an_empty_room(
 def test_too_few_frames_are_refused(tiny_dataset: Path) -> None:
     with pytest.raises(RfgsError, match="holds 2 frames; expected at least 3"):
         learned_background(open_dataset(tiny_dataset).sequence(), "wifi", "clean", "complex")
+
+
+def test_taking_movers_out_in_turn_leaves_less_of_them_in_the_room(
+    walk: Path, quick_config, no_capture, monkeypatch
+) -> None:
+    sequence = open_dataset(walk).sequence()
+    config = replace(quick_config, num_gaussians=100, solver_steps=8)
+    first = learned_background(sequence, "wifi", "clean", "complex")
+    monkeypatch.setattr(learned_background_module, "TURNS", 1)
+    better = without_movers(sequence, "wifi", first, config)
+    monkeypatch.undo()
+    seen = observe(sequence, "wifi", 4)
+    room = seen.static
+    errors = [np.sum(np.abs(background - room) ** 2) for background in (first, better)]
+    assert errors[1] < 0.8 * errors[0]
+    keep = seen.links[..., None] & seen.tones
+    assert (better[~keep] == 0).all()

@@ -12,7 +12,8 @@ from rfgs_core.errors import RfgsError
 from rfgs_core.radio import preset
 from rfgs_core.radio.impairments import Draw
 from rfgs_core.radio.impairments.oscillators import oscillator_turn
-from rfgs_core.train.calibrate import Calibration, direct_channel
+from rfgs_core.train.background import direct_channel
+from rfgs_core.train.calibrate import Calibration
 from rfgs_core.train.observations import Observations
 from rfgs_core.train.offsets import CrossSpectra, Offsets, estimate_offsets
 

@@ -11,6 +11,7 @@ from typing import Literal
 import tyro
 
 from rfgs_core.dataset.observed import Observed
+from rfgs_core.train.config import Packets, TrainConfig
 
 
 @dataclass(frozen=True)
@@ -32,11 +33,14 @@ class EncodeArgs:
     frames: str | None = None
     """Frames A:B[:STEP] (inclusive), or one number; all when left out. The last of several is
     kept for the error that is printed."""
-    network: Literal["auto", "csi", "cube", "range"] = "auto"
+    network: Literal["auto", "csi", "cube", "doppler", "range"] = "auto"
     """csi: 2D over antennas and subcarriers (Wi-Fi); cube: 3D over range and angles (mmWave);
-    range: 1D over range (UWB); auto: by the radio."""
+    doppler: 3D over Doppler, range and angle (mmWave with several chirps per frame); range: 1D
+    over range (UWB); auto: by the radio."""
     channel: Observed = "clean"
     """clean: the traced channel; impaired: what `rfgs-factory impair` made of it."""
+    packets: Packets | None = None
+    """Of several packets (chirps) per frame: all, or first, the one at the frame's own time."""
     steps: int = 200
     """Adam steps, one frame each."""
     seed: int = 0
@@ -51,7 +55,7 @@ def run(args: EncodeArgs) -> int:
     from rfgs_core.encode.learned import network_for, save_encoder
     from rfgs_core.errors import RfgsError
     from rfgs_core.frames import chosen_frames
-    from rfgs_core.train.observations import observe
+    from rfgs_core.train.observations import observe, packets_to_read
     from rfgs_core.train.self_supervised import train_encoder
 
     if args.out.suffix != ".npz":
@@ -61,8 +65,9 @@ def run(args: EncodeArgs) -> int:
     dataset = open_dataset(args.dataset)
     dataset.need("csi", "csi_static")
     sequence = dataset.sequence(args.sequence)
+    packets = packets_to_read(args.packets, sequence, args.radio, TrainConfig())
     frames = [
-        observe(sequence, args.radio, frame, args.channel)
+        observe(sequence, args.radio, frame, args.channel, packets=packets)
         for frame in chosen_frames(args.frames, sequence.frames)
     ]
     network = network_for(frames[0]) if args.network == "auto" else args.network

@@ -23,6 +23,16 @@ class FrameChannel(Protocol):
         ...
 
     @property
+    def packets(self) -> Complex64[np.ndarray, "packet tx rx subcarrier"] | None:
+        """Change at each packet, zero where hidden; None where one was read."""
+        ...
+
+    @property
+    def packet_interval_s(self) -> float:
+        """Time between packets [s]; zero where only one was read."""
+        ...
+
+    @property
     def links(self) -> Bool[np.ndarray, "tx rx"]:
         """Links that may be read."""
         ...

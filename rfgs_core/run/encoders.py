@@ -18,7 +18,7 @@ from rfgs_core.encode.path_features import PathFeatures
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import sha256, write_bytes
 from rfgs_core.radio.path_table import PathTable
-from rfgs_core.train.config import TrainConfig
+from rfgs_core.train.config import Packets, TrainConfig
 
 #: Name of a learned encoder inside a run.
 ENCODER_FILE = "encoder.npz"
@@ -49,15 +49,20 @@ def keep_encoder(file: Path, out: Path) -> None:
     write_bytes(out / ENCODER_FILE, file.read_bytes())
 
 
-def refuse_other_radios(file: Path, sequence: Sequence, radio: str) -> None:
-    """Refuses an encoder that was made for another radio.
+def refuse_other_radios(file: Path, sequence: Sequence, radio: str, packets: Packets) -> None:
+    """Refuses an encoder that was made for another radio, or for other packets of it.
 
     Raises:
-        RfgsError: Tones or antennas differ.
+        RfgsError: Tones, antennas or, if its network looks at them, packets differ.
     """
     encoder = load_encoder(file)
     freq_hz = np.asarray(sequence.radio(radio)["freq_hz"].values, dtype=np.float64)
-    encoder.radio.refuse_others(RadioSignature.of(sequence.layout(radio), freq_hz), encoder.name)
+    times_s = sequence.sample_times_s(radio, sequence.frames[0])
+    rhythm = 1, 0.0
+    if encoder.kind == "doppler" and packets == "all" and len(times_s) > 1:
+        rhythm = len(times_s), float(times_s[1] - times_s[0])
+    own = RadioSignature.of(sequence.layout(radio), freq_hz, *rhythm)
+    encoder.radio.refuse_others(own, encoder.name)
 
 
 def run_encoder(run: Path, config: Mapping[str, Any], sequence: Sequence, frame: int) -> Encoder:

@@ -91,7 +91,7 @@ def train_sequence(
     if config.encoder == "paths":
         dataset.need("paths")
     if encoder_file is not None:
-        refuse_other_radios(encoder_file, sequence, radio)
+        refuse_other_radios(encoder_file, sequence, radio, config.packets)
     bodies = sum(1 for row in sequence.instances if row["class"] == "person")
     config = replace(config, bodies=max(bodies, 1))
     settings: dict[str, Any] = {

@@ -14,7 +14,7 @@ from rfgs_core.encode.matched_filter import device_pairs
 from rfgs_core.errors import RfgsError
 from rfgs_core.radio import Layout
 from rfgs_core.train.config import Observe, Packets, TrainConfig
-from rfgs_core.train.packets import change_at_first
+from rfgs_core.train.packets import change_of_packets
 from rfgs_core.train.phase_free import (
     delay_amplitude,
     direct_amplitude,
@@ -56,6 +56,10 @@ class Observations:
     """What the radio reports."""
     delay_change: Float32[np.ndarray, "tx rx delay"] | None = None
     """||h(τ)| − |h₀(τ)|| of each visible link, zero elsewhere; only of powers per delay."""
+    packets: Complex64[np.ndarray, "packet tx rx subcarrier"] | None = None
+    """Change at each packet, estimated from all, zero where hidden; None where one was read."""
+    packet_interval_s: float = 0.0
+    """Time between packets [s]; zero where one was read."""
 
     @property
     def changed(self) -> bool:
@@ -80,7 +84,7 @@ class Observations:
 
     def with_delta(self, delta: Complex64[np.ndarray, "tx rx subcarrier"]) -> Observations:
         """The same observations with another channel change, for example a residual."""
-        return replace(self, delta=delta.astype(np.complex64))
+        return replace(self, delta=delta.astype(np.complex64), packets=None, packet_interval_s=0.0)
 
 
 def _visible(
@@ -217,8 +221,11 @@ def observe(
     seen = links[:, :, None] & tones
     freq_hz = np.asarray(sequence.radio(radio)["freq_hz"].values, dtype=np.float64)
     now, delay_change = reported(csi[0], tones, kind), None
+    change, interval_s = None, 0.0
     if kind == "complex" and len(csi) > 1:
-        delta, static = change_at_first(csi - empty, links, tones, elements), empty
+        change = change_of_packets(csi - empty, links, tones, elements)
+        delta, static = change[0], empty
+        interval_s = float(np.diff(sequence.sample_times_s(radio, frame)[:2])[0])
     elif kind == "complex":
         delta, static = now - empty, empty
     elif kind == "power":
@@ -243,4 +250,6 @@ def observe(
         time_s=sequence.time_s(frame),
         kind=kind,
         delay_change=delay_change,
+        packets=change,
+        packet_interval_s=interval_s,
     )

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The channel change at a frame's own time, estimated from all packets of the frame.
+"""The channel change at a frame's packets, its own time first, estimated from all of them.
 
 Somebody who moves turns the channel from packet to packet at a few Doppler frequencies, is met at
 a few delays and seen in a few directions; thermal noise is everywhere alike. Per device pair the
 change y becomes cells: directions of the arrays × delays, a unitary transform of the visible
 entries. A cell's packets y_n are a stationary process of spectrum S in noise of power σ²,
-and the linear estimate of its first sample with the least mean squared error is
+and the linear estimate of least mean squared error is
 
-    x̂ = r₀ᴴ (R + σ² I)⁻¹ y,   R[n, m] = r(n − m),   r(k) = mean over ν of S(ν) e^{+j2πkν},
+    x̂ = R (R + σ² I)⁻¹ y,   R[n, m] = r(n − m),   r(k) = mean over ν of S(ν) e^{+j2πkν},
 
 the Wiener filter (N. Wiener, Extrapolation, Interpolation and Smoothing of Stationary Time Series,
 1949). A filter per Doppler bin, max(0, 1 − σ²/P), is its limit for many packets; at the first
@@ -34,7 +34,7 @@ DOPPLER_GRID = 2
 NEIGHBOURS = 3
 #: Share of the cells of noise alone that are taken for somebody.
 FALSE_ALARMS = 1e-5
-#: Noise below this share of a pair's power leaves its first packet as it is.
+#: Noise below this share of a pair's power leaves its packets as they are.
 SILENT = 1e-5
 #: Cells that are solved at once.
 _CELLS = 1024
@@ -85,24 +85,23 @@ def doppler_spectrum(
     return np.where(heard, power - noise, 0.0)
 
 
-def first_of(
+def least_squares(
     cells: Complex[np.ndarray, "packet cell"],
     spectrum: Float[np.ndarray, "doppler cell"],
     noise: float,
     received: Bool[np.ndarray, "packet"],
-) -> Complex64[np.ndarray, "cell"]:
-    """Least-squares estimate of each cell's first packet, see the module."""
-    first = np.zeros(cells.shape[1], dtype=np.complex64)
-    (rows,) = np.nonzero(received)
-    lag = rows[:, None] - rows
+) -> Complex64[np.ndarray, "packet cell"]:
+    """Least-squares estimate of each cell's packets, lost ones included, see the module."""
+    estimate = np.zeros(cells.shape, dtype=np.complex64)
+    every, (rows,) = np.arange(len(cells)), np.nonzero(received)
     (heard,) = np.nonzero(spectrum.any(axis=0))
     for part in np.array_split(heard, -(-len(heard) // _CELLS)) if len(heard) else []:
         covariance = np.fft.ifft(spectrum[:, part], axis=0).astype(np.complex64)
-        matrix = covariance[lag].transpose(2, 0, 1)
-        matrix[:, np.arange(len(rows)), np.arange(len(rows))] += noise
-        weighed = np.linalg.solve(matrix, cells[rows][:, part].T[..., None])[..., 0]
-        first[part] = np.einsum("nc,cn->c", covariance[-rows], weighed)
-    return first
+        towards = covariance[every[:, None] - rows].transpose(2, 0, 1)
+        matrix = towards[:, rows] + np.float32(noise) * np.eye(len(rows), dtype=np.float32)
+        weighed = np.linalg.solve(matrix, cells[rows][:, part].T[..., None])
+        estimate[:, part] = (towards @ weighed)[..., 0].T
+    return estimate
 
 
 def _columns(rx_column: np.ndarray, rx: np.ndarray) -> tuple[np.ndarray, int]:
@@ -112,32 +111,33 @@ def _columns(rx_column: np.ndarray, rx: np.ndarray) -> tuple[np.ndarray, int]:
     return order, int(counts[0]) if (counts == counts[0]).all() else 1
 
 
-def _pair_at_first(
+def _pair_estimate(
     change: Complex[np.ndarray, "packet tx column row subcarrier"],
     tones: Bool[np.ndarray, "subcarrier"],
     received: Bool[np.ndarray, "packet"],
-) -> Complex[np.ndarray, "tx column row subcarrier"]:
+) -> Complex[np.ndarray, "packet tx column row subcarrier"]:
     """The estimate of one device pair."""
     noise = noise_power(change[received].reshape(received.sum(), -1, len(tones)), tones)
     power = float(np.mean(np.abs(change[received][..., tones]) ** 2))
-    if received[0] and noise <= SILENT * power:
-        return change[0]
+    if received.all() and noise <= SILENT * power:
+        return change
     cells = np.fft.ifft(change, axis=4, norm="ortho")
     cells = np.fft.fftn(cells, axes=(1, 2, 3), norm="ortho")
     noise *= float(tones.mean())
     spectrum = doppler_spectrum(cells, noise, int(received.sum()))
     flat = cells.reshape(len(cells), -1), spectrum.reshape(len(spectrum), -1)
-    first = first_of(*flat, noise, received).reshape(cells.shape[1:])
-    return np.fft.fft(np.fft.ifftn(first, axes=(0, 1, 2), norm="ortho"), axis=3, norm="ortho")
+    estimate = least_squares(*flat, noise, received).reshape(cells.shape)
+    antennas = np.fft.ifftn(estimate, axes=(1, 2, 3), norm="ortho")
+    return np.fft.fft(antennas, axis=4, norm="ortho")
 
 
-def change_at_first(
+def change_of_packets(
     change: Complex64[np.ndarray, "packet tx rx subcarrier"],
     links: Bool[np.ndarray, "tx rx"],
     tones: Bool[np.ndarray, "subcarrier"],
     layout: Layout,
-) -> Complex64[np.ndarray, "tx rx subcarrier"]:
-    """The change of all visible links at the first packet, estimated from all of them.
+) -> Complex64[np.ndarray, "packet tx rx subcarrier"]:
+    """The change of all visible links at each packet, estimated from all of them.
 
     Args:
         change: csi − csi_static of each packet, evenly spaced; NaN where one was lost.
@@ -148,7 +148,7 @@ def change_at_first(
     Returns:
         Zero where nothing may be read.
     """
-    estimate = np.zeros(change.shape[1:], dtype=np.complex64)
+    estimate = np.zeros(change.shape, dtype=np.complex64)
     pair, names = device_pairs(layout.tx_device, layout.rx_device, links)
     for index in range(len(names)):
         tx, rx = (np.unique(axis) for axis in np.nonzero(pair == index))
@@ -157,6 +157,6 @@ def change_at_first(
         received = np.isfinite(block).all(axis=(1, 2, 3))
         block[~received] = 0
         shape = (*block.shape[:2], -1, rows, len(tones))
-        found = _pair_at_first(block.reshape(shape), tones, received)
-        estimate[tx[:, None], rx] = found.reshape(block.shape[1:])
+        found = _pair_estimate(block.reshape(shape), tones, received)
+        estimate[:, tx[:, None], rx] = found.reshape(block.shape)
     return np.where(links[..., None] & tones, estimate, 0).astype(np.complex64)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Complex64, Float64, Int64
+from jaxtyping import Bool, Complex, Complex64, Float64, Int64
 from torch import Tensor
 
 from rfgs_core.encode.preprocess import normalise_subcarriers
@@ -32,6 +32,9 @@ class Blocks:
     """Their positions [m]."""
     freq_hz: Float64[Tensor, "subcarrier"]
     """Tones [Hz]."""
+    packets: Complex64[Tensor, "pair packet tx rx subcarrier"] | None = None
+    """Preprocessed change of each packet, in units of the RMS of all of a pair's packets; None
+    where one was read."""
 
     def __len__(self) -> int:
         return len(self.csi)
@@ -46,16 +49,15 @@ class Blocks:
         rows = (tx[:, :, None], rx[:, None, :])
         visible = seen.links[rows][..., None] & seen.tones
         csi = np.where(visible, normal[rows], 0)
-        power = np.sum(np.abs(csi) ** 2, axis=(1, 2, 3)) / np.sum(visible, axis=(1, 2, 3))
-        csi = csi / np.sqrt(np.where(power > 0.0, power, 1.0))[:, None, None, None]
         return Blocks(
-            csi=torch.from_numpy(csi.astype(np.complex64)),
+            csi=_unit_rms(csi, visible),
             visible=torch.from_numpy(visible),
             tx=tx,
             rx=rx,
             tx_xyz=torch.from_numpy(seen.layout.tx_xyz[tx]),
             rx_xyz=torch.from_numpy(seen.layout.rx_xyz[rx]),
             freq_hz=torch.from_numpy(seen.freq_hz),
+            packets=_packets(seen, rows, visible),
         )
 
     def choose(self, pairs: Int64[np.ndarray, "chosen"]) -> Blocks:
@@ -64,9 +66,37 @@ class Blocks:
         return Blocks(
             *(self.csi[rows], self.visible[rows], self.tx[pairs], self.rx[pairs]),
             *(self.tx_xyz[rows], self.rx_xyz[rows], self.freq_hz),
+            None if self.packets is None else self.packets[rows],
         )
 
     def hide(self, mask: Bool[Tensor, "pair tx rx subcarrier"]) -> Blocks:
         """The same with more of it hidden."""
         visible = self.visible & ~mask
-        return replace(self, csi=self.csi * visible, visible=visible)
+        packets = None if self.packets is None else self.packets * visible[:, None]
+        return replace(self, csi=self.csi * visible, visible=visible, packets=packets)
+
+
+def _unit_rms(
+    csi: Complex[np.ndarray, "pair *axes"], visible: Bool[np.ndarray, "pair *axes"]
+) -> Complex64[Tensor, "pair *axes"]:
+    """The channel of each pair in units of its RMS over visible entries; silence stays zero."""
+    axes = tuple(range(1, csi.ndim))
+    power = np.sum(np.abs(csi) ** 2, axis=axes, keepdims=True)
+    power = power / np.sum(visible, axis=axes, keepdims=True)
+    return torch.from_numpy((csi / np.sqrt(np.where(power > 0.0, power, 1.0))).astype(np.complex64))
+
+
+def _packets(
+    seen: FrameChannel,
+    rows: tuple[np.ndarray, np.ndarray],
+    visible: Bool[np.ndarray, "pair tx rx subcarrier"],
+) -> Complex64[Tensor, "pair packet tx rx subcarrier"] | None:
+    """Packets like `Blocks.csi`: all of them share the scale of a subcarrier and of a pair."""
+    if seen.packets is None:
+        return None
+    tx, rx = np.nonzero(seen.links)
+    power = np.mean(np.abs(seen.packets[:, tx, rx]) ** 2, axis=(0, 1))
+    gain = np.divide(1.0, np.sqrt(power), out=np.zeros_like(power), where=power > 0.0)
+    blocks = np.moveaxis(seen.packets[:, rows[0], rows[1]], 0, 1) * gain
+    everywhere = np.broadcast_to(visible[:, None], blocks.shape)
+    return _unit_rms(np.where(everywhere, blocks, 0), everywhere)

@@ -17,6 +17,7 @@ from rfgs_core.encode.learned.networks import NETWORKS, NetworkKind
 from rfgs_core.encode.learned.signature import RadioSignature
 from rfgs_core.encode.learned.steering import focus, steering
 from rfgs_core.encode.protocol import FEATURES, FrameChannel
+from rfgs_core.errors import RfgsError
 from rfgs_core.threads import one_torch_thread
 
 #: Features that are read at once.
@@ -80,11 +81,16 @@ class LearnedEncoder:
         """An encoder for the radio of a frame, its weights all one.
 
         Raises:
-            RfgsError: The network cannot take this radio's arrays.
+            RfgsError: The network cannot take this radio's arrays, or lacks its packets.
         """
-        radio = RadioSignature.of(seen.layout, seen.freq_hz)
-        if kind == "cube":
-            radio.need_linear_arrays()
+        radio = signature(kind, seen)
+        if kind in ("cube", "doppler"):
+            radio.need_linear_arrays(kind)
+        if kind == "doppler" and seen.packets is None:
+            raise RfgsError(
+                "the doppler network expects several packets per frame, one is read; generate them "
+                "with --packets-per-frame, or use --network cube"
+            )
         return LearnedEncoder(kind, EncoderModel(kind, seed), radio)
 
     def __call__(
@@ -95,7 +101,7 @@ class LearnedEncoder:
         Raises:
             RfgsError: The frame is of another radio.
         """
-        self.radio.refuse_others(RadioSignature.of(seen.layout, seen.freq_hz), self.name)
+        self.radio.refuse_others(signature(self.kind, seen), self.name)
         blocks = Blocks.of(seen)
         pair, _ = seen.pairs
         with torch.no_grad(), one_torch_thread():
@@ -125,6 +131,14 @@ class LearnedEncoder:
         ]
         focused = torch.from_numpy(np.concatenate(parts, axis=1))
         return self.model.join(focused, blocks, torch.from_numpy(points)).numpy()
+
+
+def signature(kind: NetworkKind, seen: FrameChannel) -> RadioSignature:
+    """What a network of some kind depends on of a frame's radio: one alone knows of packets."""
+    if kind != "doppler" or seen.packets is None:
+        return RadioSignature.of(seen.layout, seen.freq_hz)
+    count, interval_s = len(seen.packets), seen.packet_interval_s
+    return RadioSignature.of(seen.layout, seen.freq_hz, count, interval_s)
 
 
 def _per_link(

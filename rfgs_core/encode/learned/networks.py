@@ -5,6 +5,7 @@
 |---|---|---|---|
 | csi | Wi-Fi | 2D: receiving antennas × subcarriers | amplitude, unwrapped phase |
 | cube | mmWave | 3D: range × angle of departure × angle of arrival | range–angle cube |
+| doppler | mmWave, several chirps | 3D: Doppler × arrival × range | range–Doppler–angle cube |
 | range | UWB | 1D: range | range profile of each link |
 
 Output c is the channel times the network's weight c (between 0 and 2; in the network's own
@@ -20,7 +21,7 @@ from itertools import pairwise
 from typing import Literal
 
 import torch
-from jaxtyping import Bool, Complex, Float
+from jaxtyping import Bool, Complex, Float, Int64
 from torch import Tensor, nn
 
 from rfgs_core.encode.learned.blocks import Blocks
@@ -28,12 +29,14 @@ from rfgs_core.encode.preprocess import hamming, unwrap_phase
 from rfgs_core.encode.protocol import FEATURES, FrameChannel
 from rfgs_core.radio.presets import ULTRA_WIDE_BAND
 
-NetworkKind = Literal["csi", "cube", "range"]
+NetworkKind = Literal["csi", "cube", "doppler", "range"]
 
 #: Channels after each layer (paper section 3.2).
 LAYERS = (64, 32, FEATURES)
 #: Width of the window of each feature, as a share of the band.
 WINDOW_SHARE = 0.25
+#: Most Doppler frequencies that are weighed apart; finer ones share a weight.
+DOPPLER_BANDS = 16
 
 
 def feature_windows(freq_hz: Float[Tensor, "subcarrier"]) -> Float[Tensor, "32 subcarrier"]:
@@ -104,6 +107,32 @@ class CubeGates(Gates):
         return torch.fft.fft(torch.fft.fftn(cube, dim=(2, 3), norm="ortho"), norm="ortho")
 
 
+class DopplerGates(Gates):
+    """MmWave with several chirps per frame: the range–Doppler–angle cube of a device pair.
+
+    Whoever moves is met at Dopplers of his own, and what is left of the empty room at zero.
+    Directions of departure share their weights: a cube of four axes has no convolution that a
+    processor takes in its stride.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(nn.Conv3d, 3)
+
+    def weigh(self, blocks: Blocks) -> Complex[Tensor, "pair 32 tx rx subcarrier"]:
+        """Weights per cell; the weighed cube is turned back to the first packet."""
+        assert blocks.packets is not None
+        time = torch.hamming_window(blocks.packets.shape[1], periodic=False)[:, None, None, None]
+        shown = _doppler_cube(blocks.packets * _band_window(blocks.freq_hz) * time)
+        gates = self.gates(doppler_picture(shown))
+        bands = _bands(shown.shape[1])
+        cube = _doppler_cube(blocks.packets)
+        # At the first packet all Dopplers simply add.
+        parts = cube.new_zeros((cube.shape[0], int(bands[-1]) + 1, *cube.shape[2:]))
+        parts = parts.index_add(1, bands, cube) / cube.shape[1] ** 0.5
+        first = torch.einsum("pcbar,pbdar->pcdar", gates.to(parts.dtype), parts)
+        return torch.fft.fft(torch.fft.fftn(first, dim=(2, 3), norm="ortho"), norm="ortho")
+
+
 class RangeGates(Gates):
     """UWB: the range profile of each link."""
 
@@ -140,6 +169,39 @@ def csi_picture(
     return torch.stack([csi.abs(), (phase * visible).float(), visible.float()], dim=2)
 
 
+def _doppler_cube(
+    packets: Complex[Tensor, "pair packet tx rx subcarrier"],
+) -> Complex[Tensor, "pair doppler departure arrival range"]:
+    """Range–Doppler–angle cube, Dopplers ascending, that of nothing in the middle."""
+    doppler = torch.fft.fftshift(torch.fft.fft(packets, dim=1, norm="ortho"), dim=1)
+    return torch.fft.ifftn(doppler, dim=(2, 3, 4), norm="ortho")
+
+
+def _bands(packets: int) -> Int64[Tensor, "doppler"]:
+    """Which of at most `DOPPLER_BANDS` each Doppler frequency belongs to."""
+    return torch.arange(packets) * min(packets, DOPPLER_BANDS) // packets
+
+
+def doppler_picture(
+    cube: Complex[Tensor, "pair doppler departure arrival range"],
+) -> Float[Tensor, "pair 3 band arrival range"]:
+    """RMS and largest amplitude of each band over departures, and the band's Doppler frequency.
+
+    The frequency, −1 to 1, is what a convolution cannot know: it sees every place alike.
+    """
+    bands = _bands(cube.shape[1])
+    count = int(bands[-1]) + 1
+    amplitude = cube.abs()
+    loudest = torch.stack(
+        [amplitude[:, bands == band].amax(dim=(1, 2)) for band in range(count)], 1
+    )
+    power = torch.stack(
+        [amplitude[:, bands == band].square().mean(dim=(1, 2)) for band in range(count)], 1
+    )
+    frequency = torch.linspace(-1.0, 1.0, count)[:, None, None].expand_as(power)
+    return torch.stack([power.sqrt(), loudest, frequency], dim=1)
+
+
 def _band_window(freq_hz: Float[Tensor, "subcarrier"]) -> Float[Tensor, "subcarrier"]:
     """Hamming window over the whole band."""
     tones = freq_hz.numpy()
@@ -161,15 +223,18 @@ def _parts(values: Complex[Tensor, "pair *axes"]) -> Float[Tensor, "pair 3 *axes
 NETWORKS: dict[NetworkKind, Callable[[], Gates]] = {
     "csi": CsiGates,
     "cube": CubeGates,
+    "doppler": DopplerGates,
     "range": RangeGates,
 }
 
 
 def network_for(seen: FrameChannel) -> NetworkKind:
-    """The network of a kind of radio: bandwidth and who hears whom decide."""
+    """The network of a kind of radio: bandwidth, who hears whom, and a radar's packets decide."""
     freq_hz = seen.freq_hz
     if (freq_hz[-1] - freq_hz[0]) / freq_hz.mean() > ULTRA_WIDE_BAND:
         return "range"
     tx, rx = seen.links.nonzero()
     radar = bool((seen.layout.tx_device[tx] == seen.layout.rx_device[rx]).all())
-    return "cube" if radar else "csi"
+    if radar:
+        return "cube" if seen.packets is None else "doppler"
+    return "csi"

@@ -22,27 +22,50 @@ class RadioSignature:
     """Transmitting elements of a device from their centre [m]."""
     rx_offset_m: Float64[np.ndarray, "rx 3"]
     """Receiving elements of a device from their centre [m]."""
+    packets: int = 1
+    """Packets of a frame that are read."""
+    packet_interval_s: float = 0.0
+    """Time between them [s]; zero for a single one."""
 
     @staticmethod
-    def of(layout: Layout, freq_hz: Float64[np.ndarray, "subcarrier"]) -> RadioSignature:
+    def of(
+        layout: Layout,
+        freq_hz: Float64[np.ndarray, "subcarrier"],
+        packets: int = 1,
+        packet_interval_s: float = 0.0,
+    ) -> RadioSignature:
         """The signature of a radio."""
         return RadioSignature(
             freq_hz,
             _offsets_m(layout.tx_xyz, layout.tx_quat_wxyz, layout.tx_device),
             _offsets_m(layout.rx_xyz, layout.rx_quat_wxyz, layout.rx_device),
+            packets,
+            packet_interval_s,
         )
 
     def __str__(self) -> str:
         low, high = self.freq_hz[[0, -1]] * 1e-9
         arrays = f"{len(self.tx_offset_m)} TX and {len(self.rx_offset_m)} RX antennas per device"
-        return f"{len(self.freq_hz)} tones from {low:.4g} to {high:.4g} GHz, {arrays}"
+        band = f"{len(self.freq_hz)} tones from {low:.4g} to {high:.4g} GHz"
+        if self.packets == 1:
+            return f"{band}, {arrays}"
+        return (
+            f"{band}, {arrays}, {self.packets} packets {1e3 * self.packet_interval_s:.4g} ms apart"
+        )
 
     def refuse_others(self, other: RadioSignature, name: str) -> None:
         """Refuses another radio.
 
         Raises:
-            RfgsError: Tones or antennas differ.
+            RfgsError: Tones, antennas or packets differ.
         """
+        rhythm = [(one.packets, round(one.packet_interval_s * 1e9)) for one in (self, other)]
+        if rhythm[0] != rhythm[1]:
+            raise RfgsError(
+                f"{name} was made for a radio of {self}; of this one {other.packets} per frame are "
+                f"read, {other.packet_interval_s * 1e3:.4g} ms apart; make one for it with "
+                "`rfgs encode`"
+            )
         for mine, theirs, tolerance in (
             (self.freq_hz, other.freq_hz, 1.0),
             (self.tx_offset_m, other.tx_offset_m, 1e-6),
@@ -55,8 +78,11 @@ class RadioSignature:
                     "for it with `rfgs encode`"
                 )
 
-    def need_linear_arrays(self) -> None:
+    def need_linear_arrays(self, network: str) -> None:
         """Refuses arrays that have no single row of directions.
+
+        Args:
+            network: Which network asks for them.
 
         Raises:
             RfgsError: An array is not a line of evenly spaced antennas.
@@ -65,8 +91,8 @@ class RadioSignature:
             steps_m = np.diff(offsets_m, axis=0)
             if len(steps_m) and np.abs(steps_m - steps_m[0]).max() > 1e-6:
                 raise RfgsError(
-                    "the cube network expects evenly spaced antennas in a line, this radio has "
-                    f"{len(offsets_m)} in another arrangement; use --network csi"
+                    f"the {network} network expects evenly spaced antennas in a line, this radio "
+                    f"has {len(offsets_m)} in another arrangement; use --network csi"
                 )
 
 

@@ -15,7 +15,7 @@ from rfgs_core.encode.learned.signature import RadioSignature
 from rfgs_core.errors import RfgsError, RfgsFormatError
 
 #: Schema of the file.
-SCHEMA = "rfgs-encoder/1"
+SCHEMA = "rfgs-encoder/2"
 _REMEDY = "make it again with `rfgs encode`"
 _SHAPES: dict[str, Shape | None] = {
     "schema": None,
@@ -23,6 +23,8 @@ _SHAPES: dict[str, Shape | None] = {
     "freq_hz": ("subcarrier",),
     "tx_offset_m": ("tx", 3),
     "rx_offset_m": ("rx", 3),
+    "packets": (),
+    "packet_interval_s": (),
 }
 
 
@@ -37,6 +39,8 @@ def save_encoder(path: Path, encoder: LearnedEncoder) -> None:
             "freq_hz": encoder.radio.freq_hz,
             "tx_offset_m": encoder.radio.tx_offset_m,
             "rx_offset_m": encoder.radio.rx_offset_m,
+            "packets": np.array(encoder.radio.packets),
+            "packet_interval_s": np.array(encoder.radio.packet_interval_s),
             **{f"weights.{name}": value.numpy() for name, value in weights},
         },
     )
@@ -69,5 +73,8 @@ def load_encoder(path: Path) -> LearnedEncoder:
     model.load_state_dict(
         {name.removeprefix("weights."): torch.from_numpy(arrays[name]) for name in expected}
     )
-    radio = RadioSignature(arrays["freq_hz"], arrays["tx_offset_m"], arrays["rx_offset_m"])
+    radio = RadioSignature(
+        *(arrays["freq_hz"], arrays["tx_offset_m"], arrays["rx_offset_m"]),
+        *(int(arrays["packets"]), float(arrays["packet_interval_s"])),
+    )
     return LearnedEncoder(kind, model, radio, str(path))

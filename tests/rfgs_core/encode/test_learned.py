@@ -13,7 +13,12 @@ import torch
 from rfgs_core.arrays import load_arrays, save_arrays
 from rfgs_core.encode.learned import LearnedEncoder, load_encoder, network_for, save_encoder
 from rfgs_core.encode.learned.blocks import Blocks
-from rfgs_core.encode.learned.networks import csi_picture, feature_windows
+from rfgs_core.encode.learned.networks import (
+    _doppler_cube,
+    csi_picture,
+    doppler_picture,
+    feature_windows,
+)
 from rfgs_core.encode.protocol import FEATURES
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.gaussians import FEATURE_DIM
@@ -26,9 +31,13 @@ SCATTERER_M = np.array([1.7, 2.1, 1.2])
 RADIOS = {
     "csi": Radio("wifi", 5.72e9, 5.88e9, 16, 1, 1, 2, 4, (0.0, 0.0, -0.3)),
     "cube": Radio("radar", 60e9, 61e9, 24, 4, 1, 1, 4, (0.0, 0.05, 0.0), own_device_links="only"),
+    "doppler": Radio(
+        "radar", 60e9, 61e9, 24, 4, 1, 1, 4, (0.0, 0.05, 0.0), own_device_links="only"
+    ),
     "range": Radio("uwb", 3.1e9, 6.1e9, 48, 1, 1, 1, 4, (0.0, 0.0, -0.3), rx_spacing_m=0.2),
 }
 KINDS = list(RADIOS)
+PACKETS, INTERVAL_S = 20, 0.25e-3
 
 
 def scattered(kind: str, hide: bool = True, point: np.ndarray = SCATTERER_M) -> Observations:
@@ -44,7 +53,15 @@ def scattered(kind: str, hide: bool = True, point: np.ndarray = SCATTERER_M) -> 
         links[:, -1] = False
         tones[5:8] = False
     delta = np.where(links[..., None] & tones, wave, 0).astype(np.complex64)
-    return Observations(delta, 0 * delta, links, tones, elements, radio.freq_hz, BOUNDS_M)
+    seen = Observations(delta, 0 * delta, links, tones, elements, radio.freq_hz, BOUNDS_M)
+    return seen if kind != "doppler" else turning(seen, 2.3)
+
+
+def turning(seen: Observations, bins: float, still: float = 0.0) -> Observations:
+    """Packets whose change turns by some Doppler bins, and `still` times it that does not."""
+    turn = np.exp(2j * np.pi * bins * np.arange(PACKETS) / PACKETS)[:, None, None, None] + still
+    packets = (turn * seen.delta).astype(np.complex64)
+    return replace(seen, delta=packets[0], packets=packets, packet_interval_s=INTERVAL_S)
 
 
 def shaken(kind: str, seen: Observations) -> LearnedEncoder:
@@ -187,6 +204,65 @@ def test_planar_arrays_have_no_cube() -> None:
         LearnedEncoder.untrained("cube", scattered("csi"), 0)
 
 
+def test_a_speed_lights_its_band_of_the_doppler_picture() -> None:
+    """A path that gets shorter by v in 2 v T f/c turns; who stands still is in the middle."""
+    for bins in (0.0, 4.0, -6.0):
+        seen = turning(scattered("cube", hide=False), bins)
+        blocks = Blocks.of(seen)
+        assert blocks.packets is not None
+        cube = _doppler_cube(blocks.packets)
+        picture = doppler_picture(cube)
+        assert picture.shape == (len(blocks), 3, 16, 4, 24)
+        frequency = picture[0, 2, :, 0, 0]
+        assert frequency[0] == -1 and frequency[-1] == 1 and (frequency.diff() > 0).all()
+        for pair in range(len(blocks)):
+            band = int(picture[pair, 0].sum(dim=(1, 2)).argmax())
+            assert band == int((PACKETS // 2 + bins) * 16 // PACKETS)
+        # Largest amplitude and RMS of a band are those of the cube.
+        torch.testing.assert_close(picture[:, 1].amax(), cube.abs().amax())
+
+
+def test_weights_part_who_moves_from_what_stands_still(monkeypatch) -> None:
+    """Weights of zero at Doppler zero take the residual of the room out, and nothing else."""
+    seen = turning(scattered("cube"), 5.0, still=3.0)
+    blocks = Blocks.of(seen)
+    network = LearnedEncoder.untrained("doppler", seen, 0).model.network
+    window = feature_windows(blocks.freq_hz)[:, None, None, :]
+    assert blocks.packets is not None
+    level = float(blocks.packets[:, 0].abs().square().sum().sqrt())
+    with torch.no_grad():
+        whole = network(blocks)
+    torch.testing.assert_close(whole, blocks.packets[:, None, 0] * window, atol=1e-5, rtol=1e-4)
+
+    def moving_only(picture: torch.Tensor) -> torch.Tensor:
+        gates = torch.ones(len(picture), FEATURES, *picture.shape[2:])
+        gates[:, :, 8] = 0.0
+        return gates
+
+    monkeypatch.setattr(network, "gates", moving_only)
+    with torch.no_grad():
+        moving = network(blocks)
+    # One part turns and three stand still.
+    torch.testing.assert_close(moving, whole / 4.0, atol=1e-4 * level, rtol=1e-3)
+
+
+def test_packets_belong_to_the_radio_of_a_doppler_encoder(tmp_path: Path) -> None:
+    seen = scattered("doppler")
+    save_encoder(tmp_path / "d.npz", LearnedEncoder.untrained("doppler", seen, 0))
+    encoder = load_encoder(tmp_path / "d.npz")
+    assert encoder.radio.packets == PACKETS and encoder.radio.packet_interval_s == INTERVAL_S
+    single = scattered("cube")
+    faster = replace(seen, packet_interval_s=0.5 * INTERVAL_S)
+    for other, told in ((single, "1 per frame are read"), (faster, "20 per .*0.125 ms apart")):
+        with pytest.raises(RfgsError, match=f"20 packets 0.25 ms apart; of this one {told}.*`rfgs"):
+            encoder(other, near(1))
+    # The other networks look at the first packet, however many there are.
+    cube = LearnedEncoder.untrained("cube", single, 0)
+    np.testing.assert_array_equal(cube(seen, near(3)), cube(single, near(3)))
+    with pytest.raises(RfgsError, match="the doppler network expects several packets per frame"):
+        LearnedEncoder.untrained("doppler", single, 0)
+
+
 def test_damaged_files_are_refused(tmp_path: Path) -> None:
     file = tmp_path / "e.npz"
     with pytest.raises(RfgsError, match="no such file; make it again with `rfgs encode`"):
@@ -195,7 +271,7 @@ def test_damaged_files_are_refused(tmp_path: Path) -> None:
     arrays = load_arrays(file, "")
     first = next(name for name in arrays if name.startswith("weights."))
     for change, message in (
-        ({"schema": np.array("rfgs-encoder/2")}, "expected schema rfgs-encoder/1, found rfgs-enc"),
+        ({"schema": np.array("rfgs-encoder/1")}, "expected schema rfgs-encoder/2, found rfgs-enc"),
         ({"network": np.array("transformer")}, "network 'transformer' is unknown"),
         ({first: arrays[first][:1]}, "is missing, not finite or not of shape"),
         ({first: arrays[first] * np.nan}, "is missing, not finite or not of shape"),

@@ -13,6 +13,7 @@ from rfgs_core.encode import spread as spread_module
 from rfgs_core.encode.learned import LearnedEncoder
 from rfgs_core.encode.spread import FeatureSpread
 from rfgs_core.errors import RfgsError
+from rfgs_core.radio import Radio
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.seeds import sub_seed
 from rfgs_core.train.losses import SamplePoints, feature_loss, paper_loss
@@ -22,20 +23,24 @@ from rfgs_core.train.self_supervised import Example, SelfSupervised, correlation
 SCATTERERS_M = np.array([[1.3, 2.1, 1.2], [2.4, 1.3, 0.8], [1.5, 2.3, 0.5]])
 
 
+def with_scatterers(
+    empty: Observations, frame: int, places: np.ndarray = SCATTERERS_M
+) -> Observations:
+    """Scatterers that wander from frame to frame."""
+    wavelength_m = SPEED_OF_LIGHT / empty.freq_hz
+    delta = np.zeros(empty.delta.shape, complex)
+    for place in np.atleast_2d(places) + 0.2 * frame:
+        out = np.linalg.norm(empty.layout.tx_xyz - place, axis=1)[:, None, None]
+        back = np.linalg.norm(empty.layout.rx_xyz - place, axis=1)[:, None]
+        delta += np.exp(-2j * np.pi * (out + back) / wavelength_m) / (out * back)
+    return empty.with_delta(np.where(empty.links[..., None], delta, 0))
+
+
 @pytest.fixture
 def frames(make_observations) -> list[Observations]:
-    """Three scatterers that wander from frame to frame."""
+    """Two frames of a radio without packets."""
     empty = make_observations(num_subcarriers=16, rx_rows=2)
-    wavelength_m = SPEED_OF_LIGHT / empty.freq_hz
-    result = []
-    for frame in range(2):
-        delta = np.zeros(empty.delta.shape, complex)
-        for place in SCATTERERS_M + 0.2 * frame:
-            out = np.linalg.norm(empty.layout.tx_xyz - place, axis=1)[:, None, None]
-            back = np.linalg.norm(empty.layout.rx_xyz - place, axis=1)[:, None]
-            delta += np.exp(-2j * np.pi * (out + back) / wavelength_m) / (out * back)
-        result.append(empty.with_delta(delta))
-    return result
+    return [with_scatterers(empty, frame) for frame in range(2)]
 
 
 @pytest.fixture
@@ -81,6 +86,43 @@ def test_masks_hide_runs_and_nothing_else(frames) -> None:
         for run in (tones, antennas):
             assert run.nonzero().diff(dim=0).abs().max() == 1
         assert torch.equal(pair, (tones | antennas[:, None]).expand_as(pair))
+
+
+@pytest.fixture
+def chirps(make_observations) -> list[Observations]:
+    """Scatterers that pass a radar, each at a speed of its own."""
+    radar = Radio("radar", 60e9, 61e9, 24, 4, 1, 1, 4, (0.0, 0.05, 0.0), own_device_links="only")
+    empty = make_observations(radar)
+    result = []
+    for frame in range(2):
+        packets = np.zeros((16, *empty.delta.shape), np.complex64)
+        for place, bins in zip(SCATTERERS_M, (3.0, -5.0, 0.0), strict=True):
+            turn = np.exp(2j * np.pi * bins / 16 * np.arange(16))[:, None, None, None]
+            packets += turn * with_scatterers(empty, frame, place).delta
+        seen = empty.with_delta(packets[0])
+        result.append(replace(seen, packets=packets, packet_interval_s=0.25e-3))
+    return result
+
+
+def test_features_of_a_doppler_encoder_part(chirps) -> None:
+    """As `test_features_part_and_still_predict_what_is_hidden`, of chirps."""
+    result = train_encoder(chirps, "doppler", 20, 0)
+    assert result.unseen and not result.spread.collapsed
+    assert result.trained_db < result.untrained_db + 0.3
+    first = LearnedEncoder.untrained("doppler", chirps[0], sub_seed(0, "weights"))
+    points = np.random.default_rng(0).uniform([0.5, 0.5, 0.3], [3.5, 3.0, 2.0], (400, 3))
+    before, after = (encoder(chirps[1], points) for encoder in (first, result.encoder))
+    assert correlation(torch.from_numpy(after)) < 0.9 * correlation(torch.from_numpy(before))
+    twins = [weights(train_encoder(chirps[:1], "doppler", 1, 0)) for _ in range(2)]
+    assert all(torch.equal(a, b) for a, b in zip(*twins, strict=True))
+
+
+def test_what_is_hidden_is_hidden_in_every_packet(chirps) -> None:
+    full, seen, _ = Example.of(chirps[0], 0).draw(np.random.default_rng(0))
+    assert full.packets is not None and seen.packets is not None
+    hidden = (full.visible & ~seen.visible)[:, None].expand_as(full.packets)
+    assert (seen.packets[hidden] == 0).all() and (full.packets[hidden] != 0).any()
+    assert torch.equal(seen.packets[~hidden], full.packets[~hidden])
 
 
 def test_a_collapsed_encoder_is_refused(frames, monkeypatch) -> None:

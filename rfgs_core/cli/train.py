@@ -66,7 +66,8 @@ class TrainArgs:
     before the median is taken again. Needs --observe complex."""
     density: Density | None = None
     """How Gaussians come and go: none; paper, section 3.5 of the paper (needs its losses); 3dgs,
-    clone, split, prune and reset; residual, new ones where the back-projected residual peaks.
+    clone, split, prune and reset; residual, new ones where the back-projected residual peaks;
+    motion, between frames, more for a body that moves fast and fewer for one that stands still.
     Left out: paper with the paper's losses, else none."""
     recipe: Recipe = "rfgs"
     """rfgs: our start, rates and steps; paper: the paper's numbers."""

@@ -20,6 +20,7 @@ from rfgs_core.files import write_text
 from rfgs_core.render.view import pictures_of
 from rfgs_core.report.charts import CONTROL, file_uri, picture_uri
 from rfgs_core.report.compare import read_metrics
+from rfgs_core.report.motion_chart import write_motion_chart
 from rfgs_core.report.page import (
     Card,
     Page,
@@ -166,11 +167,24 @@ def _section(run: EvaluatedRun, metrics: dict[str, Any]) -> RunSection:
             "the matched filter alone would say.",
         ),
         f10=Shot(f10_chart(metrics["frames"], DRAWN), "F10 of every frame beside its controls."),
+        motion=_motion(run),
         views=_views(run),
         tables=metric_tables(metrics),
         limits=_limits(metrics),
         conditions=pairs(metrics["conditions"] | {"trace_depth": metrics["trace_depth"]}),
         reasons=sorted(metrics["reasons"].items()),
+    )
+
+
+def _motion(run: EvaluatedRun) -> Shot | None:
+    """Number of Gaussians over time; the picture stays in the run as `motion.png`."""
+    path = run.path / "motion.png"
+    if not write_motion_chart(path, run.path, run.sequence, run.frames):
+        return None
+    return Shot(
+        file_uri(path.read_bytes()),
+        "Moving Gaussians over time, and how fast their bodies move over the ground: the track "
+        "that was estimated from radio, beside the true pelvis.",
     )
 
 

@@ -68,6 +68,8 @@ class RunSection:
     """Gaussians beside the true mesh."""
     f10: Shot
     """F10 per frame."""
+    motion: Shot | None
+    """Gaussians and speeds over time; None of a few frames."""
     views: list[list[Shot]]
     """Rows of true, rendered and person-only pictures."""
     tables: list[Table]

@@ -156,7 +156,10 @@ def fit_frame(
         _calibrate(run, frame, config, seed)
     observations = run.observations(frame)
     encoder = run_encoder(run.path, run.config, run.sequence, frame)
-    state = start_frame(observations, config, seed, before, encoder)
+    earlier = None
+    if config.density == "motion" and before is not None:
+        earlier = run.observations(run.frames[run.frames.index(frame) - 1])
+    state = start_frame(observations, config, seed, before, encoder, earlier)
     bar.update(1)
     if config.objective != "paper":
         state = solve_reflectivity(observations, state, config)

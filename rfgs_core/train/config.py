@@ -24,8 +24,8 @@ Calibrate = Literal["none", "phase", "timing", "both"]
 #: new Gaussians, the frequency gradient as their condition, and pruning.
 Part = Literal["rf_weights", "densify", "feature_gradients", "prune"]
 #: none; paper: section 3.5; 3dgs: clone, split, prune, reset; residual: at peaks of the
-#: back-projected residual.
-Density = Literal["none", "paper", "3dgs", "residual"]
+#: back-projected residual; motion: between frames, as many as suit the pace of the bodies.
+Density = Literal["none", "paper", "3dgs", "residual", "motion"]
 
 
 @dataclass(frozen=True)

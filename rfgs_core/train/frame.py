@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +20,7 @@ from rfgs_core.train.channel import Channel
 from rfgs_core.train.comparison import comparison_of
 from rfgs_core.train.config import TrainConfig
 from rfgs_core.train.delay_power import DelayPowerModel
+from rfgs_core.train.density.motion import kept, novelty, paces_m_s, wanted_counts
 from rfgs_core.train.head import SHARPNESS, RadioHead
 from rfgs_core.train.localise import PairMaps, locate_bodies, pair_maps
 from rfgs_core.train.observations import Observations
@@ -145,11 +147,21 @@ def start_frame(
     seed: int,
     before: FrameState | None,
     encoder: Encoder = MATCHED_FILTER,
+    earlier: Observations | None = None,
 ) -> FrameState:
     """Locates the bodies and draws Gaussians; a later frame keeps the earlier one's.
 
     From frame to frame all Gaussians move along with their body; the third that the new
-    channel supports least is drawn anew and gets new track numbers.
+    channel supports least is drawn anew and gets new track numbers. With `--density motion` their
+    number then follows the bodies' pace.
+
+    Args:
+        observations: The frame.
+        config: Settings.
+        seed: Seed of the draws.
+        before: The fitted frame before; None in a first one.
+        encoder: φ.
+        earlier: What was observed then; only `--density motion` reads it.
 
     Raises:
         RfgsError: Nobody changes the channel.
@@ -168,6 +180,16 @@ def start_frame(
     track_id, goes_on = np.arange(len(points), dtype=np.int64), None
     if before is not None:
         points, track_id = _carry_over(before, maps, axes_xy, points)
+        if config.density == "motion" and earlier is not None:
+            wanted = wanted_counts(
+                config.num_gaussians, paces_m_s(tracks, novelty(observations, earlier))
+            )
+
+            def draw(body: int, count: int) -> Float64[np.ndarray, "count 3"]:
+                own = axes_xy[body : body + 1]
+                return draw_points(maps, own, observations.bounds_m, count, rng)
+
+            points, track_id = _at_pace(before, axes_xy, wanted, points, track_id, draw)
         goes_on = np.isin(track_id, before.track_id)
     gaussians = gaussians_at(points, outward_normals(points, axes_xy))
     power = fit_power(observations, gaussians, config)
@@ -204,6 +226,27 @@ def _carry_over(
     points[weakest] = fresh[:count]
     track_id[weakest] = track_id.max() + 1 + np.arange(count)
     return points, track_id
+
+
+def _at_pace(
+    before: FrameState,
+    axes_xy: Float64[np.ndarray, "body 2"],
+    wanted: Int64[np.ndarray, "body"],
+    points: Float64[np.ndarray, "M 3"],
+    track_id: Int64[np.ndarray, "M"],
+    draw: Callable[[int, int], np.ndarray],
+) -> tuple[Float64[np.ndarray, "N 3"], Int64[np.ndarray, "N"]]:
+    """Drops each body's weakest Gaussians, or draws some, until there are as many as wanted."""
+    # What came anew has not reflected anything yet.
+    power = np.where(np.isin(track_id, before.track_id), before.power.numpy(), 0.0)
+    keep = kept(nearest_axis(points, axes_xy), power, wanted)
+    points, track_id = points[keep], track_id[keep]
+    have = np.bincount(nearest_axis(points, axes_xy), minlength=len(wanted))
+    more = [draw(body, int(count)) for body, count in enumerate(wanted - have) if count > 0]
+    points = np.concatenate([points, *more])
+    unused = max(track_id.max(initial=-1), before.track_id.max()) + 1
+    fresh = unused + np.arange(len(points) - len(track_id))
+    return points, np.concatenate([track_id, fresh])
 
 
 def solve_reflectivity(

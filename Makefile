@@ -7,7 +7,7 @@ READY := .venv/.ready
 # A machine with only `python3` is fine as long as that is Python 3.11.
 PYTHON_FOUND := $(shell command -v $(PYTHON) || command -v python3)
 
-.PHONY: demo test test-slow test-blender lint format sync system clean
+.PHONY: demo test test-slow test-blender test-bpy lint format sync system clean
 
 demo: $(READY) system
 	$(VENV)/rfgs demo --out demo
@@ -20,6 +20,9 @@ test-slow: $(READY) system
 
 test-blender: $(READY) system
 	bash .ci/test_blender.sh
+
+test-bpy: $(READY) system
+	bash .ci/test_bpy.sh
 
 lint: $(READY)
 	$(VENV)/ruff check .

@@ -15,14 +15,15 @@ from typing import NoReturn, TextIO
 import bpy
 
 from .channels.commands import add_csi
-from .check.commands import add_fix
+from .check.commands import add_check, add_fix
 from .devices.commands import add_devices
-from .errors import AddonError
+from .errors import AddonError, disk_message
 from .export.commands import add_export
 from .gaussians.commands import add_export_gaussians, add_import
 from .jobs.commands import (
     add_environment,
     add_evaluate,
+    add_forget,
     add_generate,
     add_resume,
     add_stop,
@@ -31,7 +32,6 @@ from .jobs.commands import (
 from .materials.commands import add_materials
 from .paths.commands import add_paths
 from .removal.commands import add_remove_data
-from .scene.commands import add_check
 
 _COMMANDS = (
     add_check,
@@ -48,6 +48,7 @@ _COMMANDS = (
     add_evaluate,
     add_resume,
     add_stop,
+    add_forget,
     add_paths,
     add_remove_data,
 )
@@ -90,6 +91,8 @@ def run(arguments: Sequence[str], program: str = "rfgs", blend: Path | None = No
             code = 0
         except AddonError as error:
             message, code = f"error: {error}\n", USER_ERROR
+        except OSError as error:
+            message, code = f"error: {disk_message(error)}\n", USER_ERROR
         except SystemExit as request:  # argparse after --help
             return int(request.code or 0)
     if code:

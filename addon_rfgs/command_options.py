@@ -25,7 +25,7 @@ def add_python(command: argparse.ArgumentParser) -> None:
     )  # fmt: skip
 
 
-def set_number(settings: Any, name: str, value: int) -> None:
+def set_number(settings: Any, name: str, value: float) -> None:
     """Sets a number of the panel; Blender would cut off silently what is out of range.
 
     Raises:
@@ -34,7 +34,8 @@ def set_number(settings: Any, name: str, value: int) -> None:
     spec = type(settings).bl_rna.properties[name]
     if not spec.hard_min <= value <= spec.hard_max:
         option = name.replace("_", "-")
-        raise AddonError(f"--{option} {value}: expected {spec.hard_min} to {spec.hard_max}")
+        limits = f"{spec.hard_min:g} to {spec.hard_max:g}"
+        raise AddonError(f"--{option} {value:g}: expected {limits}")
     setattr(settings, name, value)
 
 

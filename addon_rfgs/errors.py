@@ -6,3 +6,10 @@ from __future__ import annotations
 
 class AddonError(Exception):
     """A mistake in the scene, a file or the arguments; the message says what to do."""
+
+
+def disk_message(error: OSError) -> str:
+    """What the disk refused: no right to write, no space, a folder that is gone."""
+    names = [str(name) for name in (error.filename, error.filename2) if name]
+    place = names[-1] if names else "a file"
+    return f"{place}: {error.strerror or error}; choose another place or make room there"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import bpy
 
-from .errors import AddonError
+from .errors import AddonError, disk_message
 
 Progress = Callable[[int, int], None]
 
@@ -37,6 +37,9 @@ class Reporting:
             self.report({"INFO"}, self.work(context, self._progress(manager)))
         except AddonError as error:
             self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        except OSError as error:
+            self.report({"ERROR"}, disk_message(error))
             return {"CANCELLED"}
         finally:
             manager.progress_end()

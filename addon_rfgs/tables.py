@@ -23,6 +23,9 @@ SPEED_OF_LIGHT: float = _TABLES["speed_of_light"]
 #: A closed mesh that fills more of the scene than this is the room itself, not furniture.
 ROOM_FRACTION: float = _TABLES["room_fraction"]
 
+#: An array with more elements is refused by the factory.
+MOST_ELEMENTS: int = _TABLES["most_elements"]
+
 #: Fields of a radio that Empties hold, with the value each starts with.
 RADIO_DEFAULTS: dict[str, object] = _TABLES["radio_defaults"]
 

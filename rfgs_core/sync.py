@@ -16,6 +16,7 @@ from rfgs_core.files import write_text
 from rfgs_core.radio.antennas import PATTERNS, POLARIZATIONS
 from rfgs_core.radio.check import ROOM_FRACTION
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.radio.files import MOST_ELEMENTS
 from rfgs_core.radio.materials import MATERIALS
 from rfgs_core.radio.presets import PRESETS, OwnLinks, Radio, preset
 from rfgs_core.skeleton import JOINTS, PARENTS
@@ -51,6 +52,7 @@ def tables() -> dict[str, Any]:
         "schema": "rfgs-tables/1",
         "speed_of_light": SPEED_OF_LIGHT,
         "room_fraction": ROOM_FRACTION,
+        "most_elements": MOST_ELEMENTS,
         "radios": [
             {
                 "name": radio.name,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The command `fix`."""
+"""The commands `check` and `fix`."""
 
 from __future__ import annotations
 
@@ -9,9 +9,52 @@ from typing import Any, TextIO
 
 import bpy
 
+from ..command_options import add_scene_options
 from ..errors import AddonError
+from ..files import write_json
 from ..saving import save_copy
-from .repairs import REPAIRABLE, findings, repair, repairable
+from ..scene.check import check_scene
+from ..scene.findings import Finding
+from ..scene.override_file import read_overrides
+from .repairs import REPAIRABLE, findings, repair, repairable, select_meant
+
+
+def add_check(commands: Any) -> None:
+    """Adds `check` to the commands."""
+    check = commands.add_parser(
+        "check",
+        help="say what the scene holds and what is guessed",
+        description="Lists what would go wrong with the scene, the worst first.",
+    )
+    check.add_argument("--out", type=Path, help="JSON file of the report; default: print findings")
+    check.add_argument(
+        "--select", type=int, metavar="N", help="select what the N-th finding is about, from 1"
+    )
+    check.add_argument("--save", type=Path, metavar="BLEND", help=".blend to save with --select")
+    add_scene_options(check)
+    check.set_defaults(run=_check)
+
+
+def _check(options: argparse.Namespace, _out: TextIO) -> str:
+    if (options.select is None) != (options.save is None):
+        raise AddonError("check: --select N and --save FILE.blend belong together")
+    overrides = read_overrides(options.overrides)
+    report = check_scene(bpy.context.scene, options.frames, overrides)
+    rows = [Finding(**row) for row in report["findings"]]
+    if options.select is not None:
+        return _save_selected(rows, options.select, options.save)
+    if options.out is None:
+        return "\n".join(f"{row.severity}: {row.sentence}" for row in rows) or "nothing to say"
+    write_json(options.out, report)
+    return f"wrote {options.out}: {len(rows)} findings"
+
+
+def _save_selected(rows: list[Finding], number: int, path: Path) -> str:
+    if not 1 <= number <= len(rows):
+        raise AddonError(f"--select {number}: there are {len(rows)} findings, counted from 1")
+    item = select_meant(bpy.context, rows[number - 1])
+    save_copy(path)
+    return f"selected {item.name}; wrote {path}"
 
 
 def add_fix(commands: Any) -> None:

@@ -66,11 +66,11 @@ def _edited(item: bpy.types.Object) -> Iterator[bmesh.types.BMesh]:
     """Yields an object's mesh and writes it back if the block succeeds.
 
     Raises:
-        AddonError: It is no mesh of the object's own.
+        AddonError: It is no mesh, or not of the object's own.
     """
     mesh = item.data
-    if not isinstance(mesh, bpy.types.Mesh) or mesh.library is not None:
-        raise AddonError(f"object {item.name!r}: expected a mesh of this file to repair")
+    if not isinstance(mesh, bpy.types.Mesh):
+        raise AddonError(f"object {item.name!r}: expected a mesh to repair")
     if mesh.users > 1:
         raise AddonError(
             f"object {item.name!r}: its mesh is shared by {mesh.users} objects; make it single user"

@@ -80,14 +80,7 @@ class RFGS_OT_select_finding(_OnFinding, bpy.types.Operator):
 
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
         """Selects and frames."""
-        item = repairs.meant(context.scene, _row(context, self.index).finding())
-        if item.name not in context.view_layer.objects:
-            raise AddonError(f"object {item.name!r} is excluded from the view layer")
-        for other in context.selected_objects:
-            other.select_set(False)
-        item.hide_set(False)
-        item.select_set(True)
-        context.view_layer.objects.active = item
+        item = repairs.select_meant(context, _row(context, self.index).finding())
         _frame(context)
         return f"Selected {item.name}"
 

@@ -8,6 +8,7 @@ from collections.abc import Callable
 import bpy
 
 from ..errors import AddonError
+from ..ownership import need_own
 from ..scene.check import check_scene
 from ..scene.findings import Finding
 from ..scene.frames import file_label, unit_scale
@@ -40,11 +41,13 @@ def findings(scene: bpy.types.Scene) -> list[Finding]:
 
 def repairable(scene: bpy.types.Scene, finding: Finding) -> bool:
     """Whether `repair` would do something about a finding."""
-    if finding.kind == "material_band":
-        try:
+    try:
+        for block in _changed(scene, finding):
+            need_own(block)
+        if finding.kind == "material_band":
             scene_repairs.guess_in_band(scene, finding.material)
-        except AddonError:
-            return False
+    except AddonError:
+        return False
     return finding.kind in REPAIRABLE
 
 
@@ -55,8 +58,10 @@ def repair(scene: bpy.types.Scene, finding: Finding) -> str:
         What was done.
 
     Raises:
-        AddonError: Nothing can be done.
+        AddonError: Nothing can be done, or not in this file.
     """
+    for block in _changed(scene, finding):
+        need_own(block)
     if finding.kind in _MESHES:
         return _MESHES[finding.kind](meant(scene, finding), unit_scale(scene))
     if finding.kind in _DEVICES:
@@ -70,6 +75,18 @@ def repair(scene: bpy.types.Scene, finding: Finding) -> str:
     raise AddonError(f"{finding.sentence}: no safe repair")
 
 
+def _changed(scene: bpy.types.Scene, finding: Finding) -> list[bpy.types.ID]:
+    """What a repair changes, beside the scene."""
+    if finding.kind in _MESHES:
+        item = meant(scene, finding)
+        return [item, item.data]
+    if finding.kind in _DEVICES:
+        return [meant(scene, finding)]
+    if finding.kind == "material_band" and finding.material in bpy.data.materials:
+        return [bpy.data.materials[finding.material]]
+    return []
+
+
 def meant(scene: bpy.types.Scene, finding: Finding) -> bpy.types.Object:
     """The object that a finding is about: of an instance, the object with the geometry.
 
@@ -81,3 +98,20 @@ def meant(scene: bpy.types.Scene, finding: Finding) -> bpy.types.Object:
         if name in scene.objects:
             return scene.objects[name]
     raise AddonError(f"{file_label()}: no object {finding.object!r} in the scene")
+
+
+def select_meant(context: bpy.types.Context, finding: Finding) -> bpy.types.Object:
+    """Selects the object that a finding is about, and nothing else.
+
+    Raises:
+        AddonError: There is none, or it is not in the view layer.
+    """
+    item = meant(context.scene, finding)
+    if item.name not in context.view_layer.objects:
+        raise AddonError(f"object {item.name!r} is excluded from the view layer")
+    for other in context.view_layer.objects:
+        other.select_set(other == item)
+    item.hide_set(False)
+    item.select_set(True)
+    context.view_layer.objects.active = item
+    return item

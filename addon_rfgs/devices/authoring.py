@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 
 from ..errors import AddonError
+from ..ownership import need_own
 from ..scene.bounds import HEADROOM_M
 from ..scene.content import content_ready
 from ..scene.frames import file_label, unit_scale
@@ -109,13 +110,19 @@ def mirror_devices(
 
 
 def match_devices(scene: bpy.types.Scene, source: bpy.types.Object) -> int:
-    """Gives every Empty of the scene's own radio the properties of one; returns how many."""
+    """Gives every Empty of the scene's own radio the properties of one; returns how many.
+
+    Raises:
+        AddonError: One is linked from another file; none has changed then.
+    """
     fields = source.rfgs.rf.row()
     others = [
         item
         for item in empties.devices(scene)
         if item.rfgs.radio.strip() in empties.OWN_RADIOS and item.rfgs.rf.row() != fields
     ]
+    for item in others:
+        need_own(item)
     for item in others:
         item.rfgs.rf.take(fields)
     return len(others)

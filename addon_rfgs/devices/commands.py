@@ -20,7 +20,7 @@ from ..saving import save_copy
 from ..scene.bounds import MARGIN_M
 from ..scene.frames import file_label, unit_scale
 from ..scene.override_file import boresight
-from ..tables import RADIO_CHOICES, RADIO_DEFAULTS, RADIOS
+from ..tables import MOST_ELEMENTS, RADIO_CHOICES, RADIO_DEFAULTS, RADIOS
 from . import authoring, empties
 from .layout import wavelength_m
 
@@ -169,6 +169,8 @@ def _said(options: argparse.Namespace) -> dict[str, Any]:
         rows, _, cols = text.partition("x")
         if not (rows.isdecimal() and cols.isdecimal() and int(rows) and int(cols)):
             raise AddonError(f"{array}: expected ROWSxCOLS, as 8x8, got {text!r}")
+        if int(rows) * int(cols) > MOST_ELEMENTS:
+            raise AddonError(f"{array}: {text} is more than {MOST_ELEMENTS} elements")
         said |= {f"{array}_rows": int(rows), f"{array}_cols": int(cols)}
     return {name: value for name, value in said.items() if value is not None}
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import AddonError
 from ..naming import closest
+from ..ownership import drop_empty, need_own, own_collection
 from ..scene.frames import file_label, unit_scale
 from ..tables import RADIO_FIELDS, RADIOS
 
@@ -58,10 +59,15 @@ def pose_of(item: bpy.types.Object, unit: float) -> np.ndarray:
 
 
 def set_pose(item: bpy.types.Object, pose: np.ndarray, unit: float) -> None:
-    """Puts a device at a rigid world_from_device [4, 4] in metres."""
+    """Puts a device at a rigid world_from_device [4, 4] in metres; its own scale stays.
+
+    Raises:
+        AddonError: It is linked from another file.
+    """
+    need_own(item)
     matrix = mathutils.Matrix(pose.tolist())
     matrix.translation /= unit
-    item.matrix_world = matrix
+    item.matrix_world = matrix @ mathutils.Matrix.Diagonal((*item.matrix_world.to_scale(), 1.0))
 
 
 def known_radio(name: str) -> str:
@@ -106,7 +112,7 @@ def add_device(
     item.empty_display_type, item.empty_display_size = "PLAIN_AXES", _AXES_M / unit
     item.rfgs.role, item.rfgs.radio = role, known_radio(radio)
     item.rfgs.rf.take(fields)
-    _collection(scene).objects.link(item)
+    own_collection(scene, COLLECTION).objects.link(item)
     set_pose(item, pose, unit)
     return item
 
@@ -120,12 +126,10 @@ def duplicate(item: bpy.types.Object) -> bpy.types.Object:
 
 
 def remove(items: Iterable[bpy.types.Object]) -> None:
-    """Removes devices, and the collection of devices if it is empty then."""
+    """Removes devices, and collections of devices that are empty then."""
     for item in items:
         bpy.data.objects.remove(item)
-    collection = bpy.data.collections.get(COLLECTION)
-    if collection is not None and not collection.all_objects:
-        bpy.data.collections.remove(collection)
+    drop_empty(COLLECTION)
 
 
 def mirror(item: bpy.types.Object, axis: int, plane_m: float, unit: float) -> None:
@@ -139,12 +143,3 @@ def mirror(item: bpy.types.Object, axis: int, plane_m: float, unit: float) -> No
     flip[axis, 3] = 2.0 * plane_m
     # Turning local y as well keeps the axes right-handed.
     set_pose(item, flip @ pose_of(item, unit) @ np.diag([1.0, -1.0, 1.0, 1.0]), unit)
-
-
-def _collection(scene: bpy.types.Scene) -> bpy.types.Collection:
-    found = bpy.data.collections.get(COLLECTION)
-    if found is None:
-        found = bpy.data.collections.new(COLLECTION)
-    if found.name not in scene.collection.children:
-        scene.collection.children.link(found)
-    return found

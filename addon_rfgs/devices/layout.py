@@ -31,8 +31,12 @@ def local_elements(fields: Mapping[str, Any], array: str) -> np.ndarray:
     pitch = spacing_m(fields, array)
     y = (column - 0.5 * (cols - 1)) * pitch
     z = -(row - 0.5 * (rows - 1)) * pitch
-    offset = fields["tx_offset_m"] if array == "tx" else (0.0, 0.0, 0.0)
-    return np.stack([np.zeros_like(y), y, z], axis=1) + offset
+    return np.stack([np.zeros_like(y), y, z], axis=1) + centre_m(fields, array)
+
+
+def centre_m(fields: Mapping[str, Any], array: str) -> np.ndarray:
+    """Middle of an array [3] in the device's axes [m]."""
+    return np.array(fields["tx_offset_m"] if array == "tx" else (0.0, 0.0, 0.0))
 
 
 def arrays_of(role: str) -> tuple[str, ...]:
@@ -53,5 +57,9 @@ def world_elements(fields: Mapping[str, Any], array: str, pose: np.ndarray) -> n
 
 def width_m(fields: Mapping[str, Any]) -> float:
     """Extent of all elements of a device along its local y [m]."""
-    both = [local_elements(fields, array)[:, 1] for array in ("tx", "rx")]
-    return float(np.ptp(np.concatenate(both)))
+    ends = []
+    for array in ("tx", "rx"):
+        half = 0.5 * (fields[f"{array}_cols"] - 1) * spacing_m(fields, array)
+        middle = centre_m(fields, array)[1]
+        ends += [middle - half, middle + half]
+    return float(np.ptp(ends))

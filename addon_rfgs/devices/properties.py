@@ -9,7 +9,7 @@ from typing import Any
 
 import bpy
 
-from ..tables import RADIO_CHOICES, RADIO_DEFAULTS, RADIOS
+from ..tables import MOST_ELEMENTS, RADIO_CHOICES, RADIO_DEFAULTS, RADIOS
 from .layout import spacing_m, wavelength_m
 
 _GHZ = 1e9
@@ -29,10 +29,14 @@ def _choice(name: str, label: str, text: str) -> Any:
     return bpy.props.EnumProperty(name=label, description=text, items=items, default=default)
 
 
-def _count(name: str, label: str, text: str, low: int = 1) -> Any:
+def _count(name: str, label: str, text: str, **limits: int) -> Any:
     return bpy.props.IntProperty(
-        name=label, description=text, default=RADIO_DEFAULTS[name], min=low
+        name=label, description=text, default=RADIO_DEFAULTS[name], **limits
     )
+
+
+def _elements(name: str, label: str, axis: str) -> Any:
+    return _count(name, label, f"Elements along local {axis}", min=1, max=MOST_ELEMENTS)
 
 
 def _number(name: str, label: str, text: str, **limits: float) -> Any:
@@ -93,12 +97,12 @@ class RadioFields:
     freq_min_ghz: _edge_ghz("freq_min_hz", "From [GHz]")  # type: ignore[valid-type]
     freq_max_ghz: _edge_ghz("freq_max_hz", "To [GHz]")  # type: ignore[valid-type]
     num_subcarriers: _count(  # type: ignore[valid-type]
-        "num_subcarriers", "Subcarriers", "Tones at the centres of equal slices of the band", 2
+        "num_subcarriers", "Subcarriers", "Tones at the centres of equal slices of the band", min=2
     )
-    tx_rows: _count("tx_rows", "TX rows", "Elements along local z")  # type: ignore[valid-type]
-    tx_cols: _count("tx_cols", "TX columns", "Elements along local y")  # type: ignore[valid-type]
-    rx_rows: _count("rx_rows", "RX rows", "Elements along local z")  # type: ignore[valid-type]
-    rx_cols: _count("rx_cols", "RX columns", "Elements along local y")  # type: ignore[valid-type]
+    tx_rows: _elements("tx_rows", "TX rows", "z")  # type: ignore[valid-type]
+    tx_cols: _elements("tx_cols", "TX columns", "y")  # type: ignore[valid-type]
+    rx_rows: _elements("rx_rows", "RX rows", "z")  # type: ignore[valid-type]
+    rx_cols: _elements("rx_cols", "RX columns", "y")  # type: ignore[valid-type]
     tx_spacing_m: _spacing_m("tx_spacing_m", "TX spacing")  # type: ignore[valid-type]
     rx_spacing_m: _spacing_m("rx_spacing_m", "RX spacing")  # type: ignore[valid-type]
     tx_spacing_wavelengths: _spacing_wavelengths(  # type: ignore[valid-type]

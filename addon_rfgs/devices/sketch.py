@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from .layout import arrays_of, spacing_m, wavelength_m, width_m, world_elements
+from ..tables import MOST_ELEMENTS
+from .layout import arrays_of, centre_m, spacing_m, wavelength_m, width_m, world_elements
 
 #: Side of the square that stands for an element, as a share of the elements' distance.
 _SQUARE = 0.5
@@ -47,7 +48,7 @@ def sketch(fields: Mapping[str, Any], role: str, pose: np.ndarray) -> Sketch:
         for array in ("tx", "rx")
     }
     # A device that only sends does so from its TX array, beside its origin.
-    start = world_elements(fields, used[-1], pose).mean(axis=0)
+    start = pose[:3, :3] @ centre_m(fields, used[-1]) + pose[:3, 3]
     length = max(_SHORTEST_M, _WIDTHS * width_m(fields))
     return Sketch(squares["tx"], squares["rx"], _arrow(start, pose[:3, :3], length))
 
@@ -64,7 +65,12 @@ def joined(sketches: Iterable[Sketch]) -> Sketch:
 
 
 def _squares(fields: Mapping[str, Any], array: str, pose: np.ndarray) -> np.ndarray:
-    """Sides [4 N, 2, 3] of a square around each element, in the array's plane."""
+    """Sides [4 N, 2, 3] of a square around each element, in the array's plane.
+
+    Arrays that nothing can trace are not drawn either: one wrong digit would halt the view.
+    """
+    if fields[f"{array}_rows"] * fields[f"{array}_cols"] > MOST_ELEMENTS:
+        return np.zeros((0, 2, 3))
     side = min(_SQUARE * spacing_m(fields, array), _LARGEST * wavelength_m(fields))
     corners = 0.5 * side * np.array([(0, -1, -1), (0, 1, -1), (0, 1, 1), (0, -1, 1)])
     ring = corners @ pose[:3, :3].T

@@ -4,20 +4,22 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import bpy
 
 from ..errors import AddonError
+from ..ownership import found_collection, own_collection
 from ..scene.frames import unit_scale
+from ..timing import key_visibility
 from .cloud_mesh import FRAME, make_mesh
 from .coloring import Coloring, color_clouds
 from .display import Display, add_modifier
 from .features import read_features
 from .nodes import GROUP
 from .splats import read_gaussians
-from .timing import key_visibility
 
 #: Collection that holds everything imported.
 COLLECTION = "RF-GS Gaussians"
@@ -35,6 +37,8 @@ class Inspection:
     """The cloud of frame f is shown at frame f + offset."""
     interpolation: str = "HOLD"
     """What is seen between recorded frames, see `key_visibility`."""
+    fall_back: bool = False
+    """Colour automatically where no cloud has what the colouring shows, instead of refusing."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,8 @@ class Imported:
     """Frames of the timeline at which clouds appear."""
     count: int
     """Gaussians in all clouds."""
+    automatic: str = ""
+    """Why colours are automatic and not as wanted."""
 
 
 def import_gaussians(scene: bpy.types.Scene, path: Path, wanted: Inspection) -> Imported:
@@ -66,7 +72,7 @@ def import_gaussians(scene: bpy.types.Scene, path: Path, wanted: Inspection) -> 
         count = sum(len(mesh.vertices) for mesh in meshes)
         if not count:
             raise AddonError(f"{path}: holds no Gaussians (0 points)")
-        color_clouds(meshes, wanted.coloring)
+        automatic = _color(meshes, wanted)
     except AddonError:
         for mesh in meshes:
             bpy.data.meshes.remove(mesh)
@@ -76,33 +82,41 @@ def import_gaussians(scene: bpy.types.Scene, path: Path, wanted: Inspection) -> 
     for item in objects:
         collection.objects.link(item)
         add_modifier(item, wanted.display)
-    key_visibility(objects, wanted.frame_offset, wanted.interpolation)
+    time_clouds(scene, objects, wanted.frame_offset, wanted.interpolation)
     frames = [mesh[FRAME] + wanted.frame_offset for mesh in meshes if FRAME in mesh]
-    return Imported(objects, sorted(frames), count)
+    return Imported(objects, sorted(frames), count, automatic)
 
 
-def clouds_in_file() -> list[bpy.types.Object]:
-    """Clouds imported earlier.
+def time_clouds(
+    scene: bpy.types.Scene, items: Iterable[bpy.types.Object], offset: int, interpolation: str
+) -> None:
+    """Keys when each cloud of a frame is visible; those that belong to no frame always are."""
+    framed = [(int(item.data[FRAME]), item) for item in items if FRAME in item.data]
+    key_visibility(scene, framed, offset, interpolation)
+
+
+def clouds_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """Clouds imported into a scene earlier.
 
     Raises:
         AddonError: There are none.
     """
-    found = clouds_here()
+    found = clouds_here(scene)
     if not found:
-        raise AddonError("no imported Gaussians in this file")
+        raise AddonError(f"the scene {scene.name!r} has no imported Gaussians; import some first")
     return found
 
 
-def clouds_here() -> list[bpy.types.Object]:
-    """Clouds imported earlier, if any."""
-    collection = bpy.data.collections.get(COLLECTION)
+def clouds_here(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """Clouds imported into a scene earlier, if any."""
+    collection = found_collection(scene, COLLECTION)
     items = collection.objects if collection else []
     return [item for item in items if item.type == "MESH" and GROUP in item.modifiers]
 
 
 def chosen_clouds(context: bpy.types.Context) -> list[bpy.types.Object]:
     """The selected clouds, else all that are seen at this frame."""
-    items = clouds_in_file()
+    items = clouds_of(context.scene)
     chosen = [item for item in items if item in context.selected_objects]
     return chosen or [item for item in items if not item.hide_viewport]
 
@@ -133,6 +147,18 @@ def _read_mesh(frame: int | None, file: Path) -> bpy.types.Mesh:
     return make_mesh(frame, cloud, read_features(file, len(cloud)))
 
 
+def _color(meshes: list[bpy.types.Mesh], wanted: Inspection) -> str:
+    """Colours clouds; returns why automatically and not as wanted, empty if as wanted."""
+    try:
+        color_clouds(meshes, wanted.coloring)
+    except AddonError as error:
+        if not wanted.fall_back:
+            raise
+        color_clouds(meshes, Coloring())
+        return str(error)
+    return ""
+
+
 def _make_object(scene: bpy.types.Scene, mesh: bpy.types.Mesh) -> bpy.types.Object:
     mesh.name = f"Gaussians {mesh[FRAME]:06d}" if FRAME in mesh else "Gaussians static"
     item = bpy.data.objects.new(mesh.name, mesh)
@@ -144,14 +170,10 @@ def _make_object(scene: bpy.types.Scene, mesh: bpy.types.Mesh) -> bpy.types.Obje
 
 def _fresh_collection(scene: bpy.types.Scene) -> bpy.types.Collection:
     """The collection of imports, emptied of an earlier one; what a user put there stays."""
-    collection = bpy.data.collections.get(COLLECTION)
-    if collection is None:
-        collection = bpy.data.collections.new(COLLECTION)
+    collection = own_collection(scene, COLLECTION)
     for item in [item for item in collection.objects if GROUP in item.modifiers]:
         mesh = item.data
         bpy.data.objects.remove(item)
         if isinstance(mesh, bpy.types.Mesh) and not mesh.users:
             bpy.data.meshes.remove(mesh)
-    if collection.name not in scene.collection.children:
-        scene.collection.children.link(collection)
     return collection

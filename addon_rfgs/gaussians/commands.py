@@ -8,14 +8,17 @@ from pathlib import Path
 from typing import Any, TextIO
 
 import bpy
+import numpy as np
 
 from ..errors import AddonError
 from ..naming import closest
-from .clouds import clouds_in_file
+from ..scene.frames import unit_scale
+from .clouds import clouds_of
 from .export_ply import export_gaussians
 from .import_run import Picture, import_run
 from .nodes import NO_POWER_DB
 from .settings import COLOR_MODES, INTERPOLATIONS
+from .view_operators import crop_to
 
 
 def add_import(commands: Any) -> None:
@@ -40,6 +43,13 @@ def add_import(commands: Any) -> None:
         "--power-threshold", type=float, default=NO_POWER_DB, metavar="DB", help="hide weaker ones"
     )
     load.add_argument("--crop-box", metavar="EMPTY", help="hide what is outside this Empty's cube")
+    load.add_argument(
+        "--crop",
+        type=float,
+        nargs=6,
+        metavar=("X0", "Y0", "Z0", "X1", "Y1", "Z1"),
+        help="hide what is outside this box [m]",
+    )
     load.add_argument(
         "--solid-view", action="store_true", help="real meshes, coloured in the Solid view too"
     )
@@ -103,6 +113,11 @@ def _import(options: argparse.Namespace, out: TextIO) -> str:
     settings.solid_view = options.solid_view
     settings.crop_box = _empty(options.crop_box)
     settings.use_crop = options.crop_box is not None
+    if options.crop:
+        low, high = np.array(options.crop).reshape(2, 3) / unit_scale(bpy.context.scene)
+        if not (low < high).all():
+            raise AddonError("--crop: expected X0 < X1, Y0 < Y1 and Z0 < Z1")
+        crop_to(bpy.context.scene, low, high)
     settings.color_by, settings.color_attribute = options.color_by.upper(), options.attribute
     settings.use_range = options.range is not None
     if options.range:
@@ -122,7 +137,8 @@ def _import(options: argparse.Namespace, out: TextIO) -> str:
 
 
 def _export_gaussians(options: argparse.Namespace, out: TextIO) -> str:
-    scene, clouds = bpy.context.scene, clouds_in_file()
+    scene = bpy.context.scene
+    clouds = clouds_of(scene)
     if options.frame is not None:
         scene.frame_set(options.frame)
     if options.object:

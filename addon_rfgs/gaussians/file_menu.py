@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 
 from ..reporting import Progress, Reporting, chosen_path
-from .clouds import import_gaussians
+from .operators import import_shown
 
 _LABEL = "RF Gaussians (.ply)"
 
@@ -40,10 +40,10 @@ class RFGS_OT_import_ply(Reporting, bpy.types.Operator):
 
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
         """Imports, and lets the panel name what is here."""
-        settings, path = context.scene.rfgs.gaussians, chosen_path(self.filepath)
-        done = import_gaussians(context.scene, path, settings.inspection())
-        settings.path = str(path)
-        return f"Imported {done.count} Gaussians in {len(done.objects)} clouds"
+        path = chosen_path(self.filepath)
+        told = import_shown(context.scene, path)
+        context.scene.rfgs.gaussians.path = str(path)
+        return told
 
 
 class RFGS_FH_gaussians(bpy.types.FileHandler):

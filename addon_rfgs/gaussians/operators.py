@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Buttons that bring Gaussians in, write them out and compare them."""
 
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import bpy
 
 from ..reporting import Progress, Reporting, chosen_path
-from .clouds import chosen_clouds, clouds_in_file, import_gaussians
+from .clouds import chosen_clouds, clouds_of, import_gaussians
 from .compare import compare_with_mesh
 from .export_ply import export_gaussians
 from .with_clouds import WithClouds
@@ -21,9 +23,19 @@ class RFGS_OT_import_gaussians(Reporting, bpy.types.Operator):
 
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
         """Imports with the panel's settings."""
-        settings = context.scene.rfgs.gaussians
-        done = import_gaussians(context.scene, chosen_path(settings.path), settings.inspection())
-        return f"Imported {done.count} Gaussians in {len(done.objects)} clouds"
+        return import_shown(context.scene, chosen_path(context.scene.rfgs.gaussians.path))
+
+
+def import_shown(scene: bpy.types.Scene, path: Path) -> str:
+    """Imports with the settings of the panel; returns one line about it.
+
+    Raises:
+        AddonError: There is nothing to import, or a file is damaged; nothing has changed then.
+    """
+    wanted = replace(scene.rfgs.gaussians.inspection(), fall_back=True)
+    done = import_gaussians(scene, path, wanted)
+    more = f"; coloured automatically: {done.automatic}" if done.automatic else ""
+    return f"Imported {done.count} Gaussians in {len(done.objects)} clouds{more}"
 
 
 class RFGS_OT_export_gaussians(WithClouds, bpy.types.Operator):
@@ -69,7 +81,7 @@ class RFGS_OT_compare_gaussians(WithClouds, bpy.types.Operator):
 
     def work(self, context: bpy.types.Context, progress: Progress) -> str:
         """Measures and colours."""
-        settings, clouds = context.scene.rfgs.gaussians, clouds_in_file()
+        settings, clouds = context.scene.rfgs.gaussians, clouds_of(context.scene)
         selected = [
             item for item in context.selected_objects if item.type == "MESH" and item not in clouds
         ]

@@ -72,8 +72,9 @@ class RFGS_PT_gaussians_color(_Part, bpy.types.Panel):
         settings = context.scene.rfgs.gaussians
         if settings.color_by == "ATTRIBUTE":
             self.layout.prop(settings, "color_attribute")
-        lacking = missing([item.data for item in clouds_here()], settings.coloring())
-        if lacking and clouds_here():
+        clouds = [item.data for item in clouds_here(context.scene)]
+        lacking = missing(clouds, settings.coloring())
+        if lacking and clouds:
             self.layout.label(text=f"No cloud has {lacking}", icon="ERROR")
         if settings.color_by in {*RAMPED, "ATTRIBUTE", "AUTO"}:
             self.layout.prop(settings, "use_range")

@@ -10,11 +10,10 @@ import bpy
 
 from ..errors import AddonError
 from ..path_options import RELATIVE_PATH
-from .clouds import Inspection, clouds_in_file
+from .clouds import Inspection, clouds_here, time_clouds
 from .coloring import Coloring, color_clouds
 from .display import Display, set_display
 from .nodes import NO_POWER_DB
-from .timing import key_visibility
 
 DISPLAY_MODES = [
     ("points", "Points", "One sphere of equal size per Gaussian; fast", 0),
@@ -45,37 +44,37 @@ TRUE_MESHES = [
 
 
 def _show(settings: RFGS_PG_gaussians, _context: Any) -> None:
-    _each(lambda items: [set_display(item, settings.display()) for item in items])
+    for item in clouds_here(settings.id_data):
+        set_display(item, settings.display())
 
 
 def _color(settings: RFGS_PG_gaussians, _context: Any) -> None:
-    _each(lambda items: color_clouds([item.data for item in items], settings.coloring()))
+    _recolor(settings, settings.coloring())
 
 
 def _fix_range(settings: RFGS_PG_gaussians, context: Any) -> None:
     """A range that was never given starts as the one that was found."""
-
-    def fill(items: list[bpy.types.Object]) -> None:
-        found = replace(settings.coloring(), limits=None)
-        limits = color_clouds([item.data for item in items], found)
+    if settings.use_range and not settings.is_property_set("range_low"):
+        limits = _recolor(settings, replace(settings.coloring(), limits=None))
         if limits:
             settings.range_low, settings.range_high = limits
-
-    if settings.use_range and not settings.is_property_set("range_low"):
-        _each(fill)
     _color(settings, context)
 
 
 def _time(settings: RFGS_PG_gaussians, _context: Any) -> None:
-    _each(lambda items: key_visibility(items, settings.frame_offset, settings.interpolation))
+    scene = settings.id_data
+    time_clouds(scene, clouds_here(scene), settings.frame_offset, settings.interpolation)
 
 
-def _each(change: Any) -> None:
-    """Changes the clouds that are here. A setting can also be made before there are any."""
+def _recolor(settings: RFGS_PG_gaussians, coloring: Coloring) -> tuple[float, float] | None:
+    """Colours the clouds that are here; returns the ends of the ramp, if there is one.
+
+    Colours that clouds cannot have are named in the panel.
+    """
     try:
-        change(clouds_in_file())
+        return color_clouds([item.data for item in clouds_here(settings.id_data)], coloring)
     except AddonError:
-        return
+        return None
 
 
 def _is_empty(_settings: Any, item: bpy.types.Object) -> bool:

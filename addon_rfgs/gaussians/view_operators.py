@@ -5,12 +5,12 @@ import bpy
 import numpy as np
 
 from ..errors import AddonError
+from ..ownership import own_collection
 from ..reporting import Progress
 from .attributes import positions
-from .clouds import COLLECTION, clouds_in_file
+from .clouds import COLLECTION, clouds_of, time_clouds
 from .coloring import color_clouds
 from .display import set_display, shown
-from .timing import key_visibility
 from .with_clouds import WithClouds
 
 #: Share of the clouds' extent that the crop box leaves free around them.
@@ -26,10 +26,10 @@ class RFGS_OT_update_display(WithClouds, bpy.types.Operator):
 
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
         """Writes the panel's settings into every cloud."""
-        settings, items = context.scene.rfgs.gaussians, clouds_in_file()
+        settings, items = context.scene.rfgs.gaussians, clouds_of(context.scene)
         for item in items:
             set_display(item, settings.display())
-        key_visibility(items, settings.frame_offset, settings.interpolation)
+        time_clouds(context.scene, items, settings.frame_offset, settings.interpolation)
         limits = color_clouds([item.data for item in items], settings.coloring())
         ramp = f", colours from {limits[0]:.3g} to {limits[1]:.3g}" if limits else ""
         return f"Updated {len(items)} clouds{ramp}"
@@ -44,7 +44,7 @@ class RFGS_OT_color_solid_view(WithClouds, bpy.types.Operator):
 
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
         """Sets the clouds, and the view the button was pressed in."""
-        clouds_in_file()
+        clouds_of(context.scene)
         context.scene.rfgs.gaussians.solid_view = True
         space = context.space_data
         if space is None or space.type != "VIEW_3D":
@@ -64,7 +64,7 @@ class RFGS_OT_add_crop_box(WithClouds, bpy.types.Operator):
         """Fits the box and crops with it."""
         settings, low, high = context.scene.rfgs.gaussians, [], []
         settings.use_crop = False
-        for item in clouds_in_file():
+        for item in clouds_of(context.scene):
             matrix = np.array(item.matrix_world)
             local = positions(item.data)[shown(item, settings.display())]
             points = local @ matrix[:3, :3].T + matrix[:3, 3]
@@ -73,18 +73,35 @@ class RFGS_OT_add_crop_box(WithClouds, bpy.types.Operator):
                 high.append(points.max(axis=0))
         if not low:
             raise AddonError("no Gaussian is visible at this frame; lower the thresholds")
-        bounds = np.array([np.min(low, axis=0), np.max(high, axis=0)])
-        box = _own_box(settings.crop_box)
-        box.rotation_euler = (0, 0, 0)
-        box.location = bounds.mean(axis=0)
-        box.scale = np.maximum(0.5 * np.ptp(bounds, axis=0) * (1 + _MARGIN), 1e-3)
-        settings.crop_box, settings.use_crop = box, True
+        box = crop_to(context.scene, np.min(low, axis=0), np.max(high, axis=0), _MARGIN)
         return f"Cropping to {box.name}; move and scale it"
 
 
-def _own_box(chosen: bpy.types.Object | None) -> bpy.types.Object:
+def crop_to(
+    scene: bpy.types.Scene, low: np.ndarray, high: np.ndarray, margin: float = 0.0
+) -> bpy.types.Object:
+    """Shows only the Gaussians in a box.
+
+    Args:
+        scene: Whose Gaussians.
+        low: Lower corner [3], in the scene's units.
+        high: Upper corner [3].
+        margin: Share of its size by which the box is larger.
+
+    Returns:
+        The Empty that is the box.
+    """
+    settings, box = scene.rfgs.gaussians, _own_box(scene)
+    box.rotation_euler = (0, 0, 0)
+    box.location = 0.5 * (low + high)
+    box.scale = np.maximum(0.5 * (high - low) * (1 + margin), 1e-3)
+    settings.crop_box, settings.use_crop = box, True
+    return box
+
+
+def _own_box(scene: bpy.types.Scene) -> bpy.types.Object:
     """The box that was added before, to be fitted again; a user's own Empty stays as it is."""
-    collection = bpy.data.collections[COLLECTION]
+    collection, chosen = own_collection(scene, COLLECTION), scene.rfgs.gaussians.crop_box
     if chosen is not None and chosen.name in collection.objects:
         return chosen
     box = bpy.data.objects.new("RFGS crop box", None)

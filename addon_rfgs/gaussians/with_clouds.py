@@ -4,13 +4,16 @@
 import bpy
 
 from ..reporting import Reporting
-from .clouds import COLLECTION
+from .clouds import clouds_here
 
 
 class WithClouds(Reporting):
     """Mixed into operators that need imported Gaussians."""
 
     @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        """Whether any were imported."""
-        return COLLECTION in bpy.data.collections
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether any were imported into this scene."""
+        found = bool(clouds_here(context.scene))
+        if not found:
+            cls.poll_message_set("Import Gaussians into this scene first")
+        return found

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The commands `environment`, `generate`, `train`, `evaluate`, `resume` and `stop`."""
+"""The commands `environment`, `generate`, `train`, `evaluate`, `resume`, `stop` and `forget`."""
 
 from __future__ import annotations
 
@@ -105,6 +105,15 @@ def add_stop(commands: Any) -> None:
     command.set_defaults(run=_stop)
 
 
+def add_forget(commands: Any) -> None:
+    """Adds `forget` to the commands."""
+    command = commands.add_parser(
+        "forget", help="take a job that is over off the list of unfinished ones; its files stay"
+    )
+    _add_folder(command)
+    command.set_defaults(run=_forget)
+
+
 def _add_folder(command: argparse.ArgumentParser) -> None:
     command.add_argument("folder", type=Path, help="folder of the dataset or run")
     command.add_argument("--kind", choices=_KINDS, help="which job; needed if there are several")
@@ -159,6 +168,13 @@ def _stop(options: argparse.Namespace, out: TextIO) -> str:
         time.sleep(0.1)
     process.kill()
     return f"stopped; finished work is kept, continue with: resume {options.folder}"
+
+
+def _forget(options: argparse.Namespace, out: TextIO) -> str:
+    record = read_record(_record(options))
+    job = QUEUE.restore(record)
+    QUEUE.forget(job)
+    return f"{job.title} is off the list; its files stay"
 
 
 def _record(options: argparse.Namespace) -> Path:

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Buttons around jobs."""
 
+from pathlib import Path
+
 import bpy
 
 from ..errors import AddonError
+from ..gaussians.operators import import_shown
 from ..reporting import Progress, Reporting
 from . import following
 from .checking import CHECK
@@ -148,12 +151,11 @@ class RFGS_OT_import_result(_OnChosenJob, Reporting, bpy.types.Operator):
         return job.state == DONE and isinstance(job.plan, TrainPlan)
 
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
-        """Points the Gaussians panel at the run and imports with its settings."""
+        """Imports with the settings of the Gaussians panel, and points that at the run."""
         folder = following.chosen_job().plan.out
+        told = import_shown(context.scene, Path(folder))
         context.scene.rfgs.gaussians.path = folder
-        if bpy.ops.rfgs.import_gaussians() != {"FINISHED"}:
-            raise AddonError(f"{folder}: nothing was imported")
-        return f"Imported {folder}"
+        return told
 
 
 def await_check() -> str:

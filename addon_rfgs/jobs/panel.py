@@ -6,6 +6,7 @@ import bpy
 from ..tab import Tab
 from .following import chosen_job
 from .preferences import ADDON, draw_check, environment_path, preferences
+from .process import SUPPORTED
 from .queue import DONE, FAILED, RUNNING, STOPPED, STOPPING, WAITING
 
 _ICONS = {
@@ -51,6 +52,8 @@ class RFGS_PT_jobs(Tab, bpy.types.Panel):
         if stored is None:
             layout.label(text="Install the add-on to run jobs", icon="INFO")
             return
+        if not SUPPORTED:
+            layout.label(text="Jobs need Linux or macOS", icon="ERROR")
         if not environment_path():
             layout.label(text="Choose a Python environment", icon="INFO")
             layout.prop(stored, "python", text="")

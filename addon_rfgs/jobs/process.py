@@ -13,6 +13,19 @@ from pathlib import Path
 from ..errors import AddonError
 from .environment import child_environment
 
+#: Whether programs can be told to outlive Blender here, and be found again by the next one.
+SUPPORTED = os.name == "posix"
+
+
+def need_support() -> None:
+    """Refuses jobs where they cannot be run.
+
+    Raises:
+        AddonError: This is Windows.
+    """
+    if not SUPPORTED:
+        raise AddonError("jobs need Linux or macOS; on Windows run rfgs-factory and rfgs in WSL")
+
 
 class Process:
     """A running program; one that an earlier Blender started can be followed, too."""
@@ -32,10 +45,8 @@ class Process:
         Raises:
             AddonError: It cannot be started.
         """
-        if os.name == "nt":
-            raise AddonError("jobs need Linux or macOS; run rfgs-factory and rfgs from WSL instead")
-        log.parent.mkdir(parents=True, exist_ok=True)
         try:
+            log.parent.mkdir(parents=True, exist_ok=True)
             with log.open("wb") as stream:
                 child = subprocess.Popen(
                     arguments,
@@ -46,7 +57,8 @@ class Process:
                     start_new_session=True,
                 )
         except OSError as error:
-            raise AddonError(f"{arguments[0]}: cannot be started: {error.strerror}") from error
+            place = error.filename or arguments[0]
+            raise AddonError(f"the job cannot be started: {place}: {error.strerror}") from error
         return cls(child.pid, birth(child.pid), child)
 
     def running(self) -> bool:
@@ -82,6 +94,8 @@ class Process:
 
 def birth(pid: int) -> str:
     """When a process began, to tell it from a later one of the same number; empty if gone."""
+    if not SUPPORTED:
+        return ""
     if sys.platform == "linux":
         try:
             # After the program's name in brackets: state, and 19 fields on the start (proc(5)).

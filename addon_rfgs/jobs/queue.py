@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ..errors import AddonError
 from .plans import Plan
-from .process import Process
+from .process import Process, need_support
 from .progress import Progress, read_log, reason
 from .record import (
     Record,
@@ -83,8 +83,10 @@ class Queue:
         """Puts a job at the end.
 
         Raises:
-            AddonError: Another one works on that folder, or nothing can be written there.
+            AddonError: Another one works on that folder, nothing can be written there, or this
+                system runs no jobs.
         """
+        need_support()
         plan.arguments()
         if any(job.same(plan) and job.state in ACTIVE for job in self.jobs):
             raise AddonError(f"{plan.out}: such a job is in the list already")
@@ -95,16 +97,18 @@ class Queue:
         self._remember()
         return self.jobs[-1]
 
-    def restore(self, record: Record) -> None:
+    def restore(self, record: Record) -> Job:
         """Takes over a job that an earlier Blender left: running still, done or to be resumed."""
-        if any(job.same(record.plan) for job in self.jobs):
-            return
+        for known in self.jobs:
+            if known.same(record.plan):
+                return known
         job = Job(record.plan, None)
         job.process = Process(record.pid, record.born)
         job.state = RUNNING
         self.jobs.append(job)
         self._follow(job)
         self._remember()
+        return job
 
     def stop(self, job: Job) -> None:
         """Asks a job to stop; a waiting one has not begun."""

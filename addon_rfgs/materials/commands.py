@@ -15,7 +15,7 @@ from ..saving import save_copy
 from ..scene.bands import out_of_band, suitable, used_bands, validity
 from ..tables import MATERIALS
 from . import coloring
-from .guesses import assign, guesses, materials_in_use, named_material
+from .guesses import assign, guesses, materials_in_use, named_material, settable
 
 
 def add_materials(commands: Any) -> None:
@@ -83,10 +83,11 @@ def _guess(options: argparse.Namespace, _out: TextIO) -> str:
     found = guesses(bpy.context.scene)
     lines = [f"{row.material}  {row.radio_material}  {row.why}" for row in found]
     if options.out:
-        for row in found:
+        own = settable(found)
+        for row in own:
             assign([named_material(row.material)], row.radio_material)
         save_copy(options.out)
-        lines.append(f"set {len(found)} materials; wrote {options.out}")
+        lines.append(f"set {len(own)} materials; wrote {options.out}")
     return "\n".join(lines) or "every material in use is labelled"
 
 

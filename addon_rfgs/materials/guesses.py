@@ -11,6 +11,7 @@ import numpy as np
 
 from ..errors import AddonError
 from ..naming import closest
+from ..ownership import need_own
 from ..scene.frames import file_label
 from ..scene.materials import guess
 from ..scene.state import kept, show_what_renders
@@ -63,11 +64,13 @@ def named_material(name: str) -> bpy.types.Material:
     if material is None:
         known = bpy.data.materials.keys()
         raise AddonError(f"{file_label()}: no material {name!r}{closest(name, known)}")
-    if material.library is not None:
-        raise AddonError(
-            f"material {name!r} is linked from {material.library.filepath}; set it there"
-        )
+    need_own(material)
     return material
+
+
+def settable(found: Iterable[Guess]) -> list[Guess]:
+    """Guesses for materials of this file; linked ones are set where they come from."""
+    return [row for row in found if bpy.data.materials[row.material].library is None]
 
 
 def assign(

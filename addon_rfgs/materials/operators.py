@@ -8,7 +8,7 @@ import bpy
 from ..errors import AddonError
 from ..reporting import Progress, Reporting
 from . import coloring
-from .guesses import assign, guesses, materials_in_use, named_material
+from .guesses import assign, guesses, materials_in_use, named_material, settable
 from .properties import material_items
 
 
@@ -64,7 +64,7 @@ class RFGS_OT_guess_materials(Reporting, bpy.types.Operator):
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
         """Fills the table."""
         table = context.window_manager.rfgs.guesses
-        found = guesses(context.scene)
+        found = settable(guesses(context.scene))
         table.rows.clear()
         table.active = 0
         for row in found:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Paths as curves: an object for each link, a spline for each path, a material for each level."""
+"""Paths as curves: an object per link and frame, a spline per path, a material per level."""
 
 from __future__ import annotations
 
@@ -11,12 +11,17 @@ import numpy as np
 
 from ..errors import AddonError
 from ..gaussians.color_maps import ramp
+from ..ownership import collections_of, drop_empty, own_collection
+from ..reporting import Progress
 from ..scene.frames import unit_scale
+from ..timing import key_visibility
 from .dataset import PathDataset, Paths
 
 COLLECTION = "RF-GS Paths"
 #: Materials are named by this and their level.
 MATERIAL = "RF-GS path"
+#: Custom property: whose paths an object shows.
+LINK = "rfgs_link"
 #: Levels of power that are told apart by colour.
 _LEVELS = 12
 
@@ -26,24 +31,40 @@ class Choice:
     """Which paths are shown, and how thick."""
 
     radio: str
-    frame: int | None
-    """None is the scene without anything that moves."""
     tx_device: int = -1
     """Number of the transmitting device, -1 for all."""
     rx_device: int = -1
     count: int = 200
-    """At most so many paths of a link, the strongest."""
+    """At most so many paths of a link and frame, the strongest."""
     range_db: float = 60.0
     """Paths this much weaker than the strongest one shown are left out [dB]."""
     radius_m: float = 0.004
 
 
-def chosen(paths: Paths, choice: Choice) -> Paths:
+#: Paths of each frame; None is the scene without anything that moves.
+Tables = dict[int | None, Paths]
+
+
+def chosen(tables: Tables, choice: Choice) -> Tables:
     """The paths of the wanted links that are strong enough, strongest first.
 
+    Strong means the same in every frame, so that levels can be compared.
+
     Raises:
-        AddonError: There is no such path.
+        AddonError: There is no such path in any frame.
     """
+    found = {frame: _of_links(paths, choice) for frame, paths in tables.items()}
+    tops = [paths.power_db[0] for paths in found.values() if len(paths)]
+    if not tops:
+        raise AddonError(
+            f"no path from device {choice.tx_device} to device {choice.rx_device}; "
+            "-1 stands for all, devices are counted from 0"
+        )
+    least = max(tops) - choice.range_db
+    return {frame: _strongest(paths, least, choice.count) for frame, paths in found.items()}
+
+
+def _of_links(paths: Paths, choice: Choice) -> Paths:
     keep = np.ones(len(paths), bool)
     for devices, wanted in (
         (paths.tx_device, choice.tx_device),
@@ -51,53 +72,75 @@ def chosen(paths: Paths, choice: Choice) -> Paths:
     ):
         if wanted >= 0:
             keep &= devices == wanted
-    found = paths.select(keep)
-    if not len(found):
-        raise AddonError(
-            f"no path from device {choice.tx_device} to device {choice.rx_device}; "
-            "-1 stands for all, devices are counted from 0"
-        )
-    found = found.select(found.power_db >= found.power_db[0] - choice.range_db)
+    return paths.select(keep)
+
+
+def _strongest(paths: Paths, least_db: float, count: int) -> Paths:
+    """Paths that are strong enough, `count` of each link."""
+    found = paths.select(paths.power_db >= least_db)
     # Sorted by power, so the first of each link are its strongest.
     link = found.tx_device.astype(np.int64) * (1 << 31) + found.rx_device
     order = np.argsort(link, kind="stable")
     _, first = np.unique(link[order], return_index=True)
     rank = np.arange(len(order)) - np.repeat(first, np.diff([*first, len(order)]))
-    return found.select(np.sort(order[rank < choice.count]))
+    return found.select(np.sort(order[rank < count]))
 
 
 def show_paths(
-    scene: bpy.types.Scene, dataset: PathDataset, paths: Paths, choice: Choice
+    scene: bpy.types.Scene,
+    dataset: PathDataset,
+    tables: Tables,
+    choice: Choice,
+    progress: Progress | None = None,
 ) -> list[bpy.types.Object]:
-    """Adds a curve object per link; those of the same links, radio and frame are replaced.
+    """Adds a curve object per link and frame, in place of earlier ones of the same links.
 
-    Each object carries, in the order of its splines, `power_db` and `delay_s` as lists and
-    `interactions` and `objects` as JSON.
+    With several frames each is seen from its own until the next one. Each object carries, in the
+    order of its splines, `power_db` and `delay_s` as lists and `interactions` and `objects` as
+    JSON; `rfgs_link` says whose paths they are.
+
+    Args:
+        scene: Where to.
+        dataset: Names devices and objects.
+        tables: From `chosen`.
+        choice: How they were chosen.
+        progress: Called with frames done and in all.
 
     Returns:
         The objects.
     """
-    collection = bpy.data.collections.get(COLLECTION) or bpy.data.collections.new(COLLECTION)
-    if collection.name not in scene.collection.children:
-        scene.collection.children.link(collection)
-    materials = _materials()
-    top = float(paths.power_db[0])
-    made = []
-    for link in np.unique(np.stack([paths.tx_device, paths.rx_device], axis=1), axis=0):
-        part = paths.select((paths.tx_device == link[0]) & (paths.rx_device == link[1]))
-        ends = " to ".join(dataset.device(choice.radio, int(number)) for number in link)
-        when = "static" if choice.frame is None else f"frame {choice.frame}"
-        levels = (part.power_db - (top - choice.range_db)) / max(choice.range_db, 1e-9) * _LEVELS
-        item = _curve_object(f"{choice.radio}: {ends}, {when}", part, levels, materials, choice)
-        # Corners are metres; the object's scale carries them into the scene's units.
-        item.scale = (1 / unit_scale(scene),) * 3
-        item["power_db"] = [float(value) for value in part.power_db]
-        item["delay_s"] = [float(value) for value in part.delay_s]
-        item["interactions"] = json.dumps([part.interactions(i) for i in range(len(part))])
-        item["objects"] = json.dumps([_objects(dataset, part, i) for i in range(len(part))])
+    collection, materials = own_collection(scene, COLLECTION), _materials()
+    top = max(float(paths.power_db[0]) for paths in tables.values() if len(paths))
+    made: list[tuple[int | None, bpy.types.Object]] = []
+    for done, (frame, paths) in enumerate(tables.items(), start=1):
+        for link in np.unique(np.stack([paths.tx_device, paths.rx_device], axis=1), axis=0):
+            part = paths.select((paths.tx_device == link[0]) & (paths.rx_device == link[1]))
+            ends = " to ".join(dataset.device(choice.radio, int(number)) for number in link)
+            item = _curve_object(part, _levels(part, top, choice), materials, choice)
+            # Corners are metres; the object's scale carries them into the scene's units.
+            item.scale = (1 / unit_scale(scene),) * 3
+            item[LINK] = f"{choice.radio}: {ends}" + ("" if frame is not None else ", static")
+            item["power_db"] = [float(value) for value in part.power_db]
+            item["delay_s"] = [float(value) for value in part.delay_s]
+            item["interactions"] = json.dumps([part.interactions(i) for i in range(len(part))])
+            item["objects"] = json.dumps([_objects(dataset, part, i) for i in range(len(part))])
+            made.append((frame, item))
+        if progress:
+            progress(done, len(tables))
+    links = {item[LINK] for _, item in made}
+    _remove([item for item in collection.objects if item.get(LINK) in links])
+    for frame, item in made:
+        item.name = item[LINK] + ("" if frame is None else f", frame {frame}")
+        item.data.name = item.name
         collection.objects.link(item)
-        made.append(item)
-    return made
+    if len(tables) > 1:
+        key_visibility(scene, [(frame, item) for frame, item in made if frame is not None])
+    return [item for _, item in made]
+
+
+def _levels(paths: Paths, top_db: float, choice: Choice) -> np.ndarray:
+    share = (paths.power_db - (top_db - choice.range_db)) / max(choice.range_db, 1e-9)
+    return np.clip(share * _LEVELS, 0, _LEVELS - 1).astype(int)
 
 
 def clear_paths() -> int:
@@ -106,33 +149,31 @@ def clear_paths() -> int:
     Returns:
         How many objects there were.
     """
-    collection = bpy.data.collections.get(COLLECTION)
-    items = list(collection.objects) if collection else []
-    for item in items:
-        bpy.data.curves.remove(item.data)
-    if collection:
-        bpy.data.collections.remove(collection)
+    items = [item for row in collections_of(COLLECTION) for item in row.objects if LINK in item]
+    _remove(items)
+    drop_empty(COLLECTION)
     for material in [row for row in bpy.data.materials if row.name.startswith(MATERIAL + " ")]:
         if not material.users:
             bpy.data.materials.remove(material)
     return len(items)
 
 
+def _remove(items: list[bpy.types.Object]) -> None:
+    """Removes paths with their curves and keys."""
+    for item in items:
+        curve, motion = item.data, item.animation_data
+        action = motion.action if motion else None
+        bpy.data.objects.remove(item)
+        if not curve.users:
+            bpy.data.curves.remove(curve)
+        if action is not None and not action.users:
+            bpy.data.actions.remove(action)
+
+
 def _curve_object(
-    name: str,
-    paths: Paths,
-    levels: np.ndarray,
-    materials: list[bpy.types.Material],
-    choice: Choice,
+    paths: Paths, levels: np.ndarray, materials: list[bpy.types.Material], choice: Choice
 ) -> bpy.types.Object:
-    old = bpy.data.objects.get(name)
-    if (
-        old is not None
-        and old.type == "CURVE"
-        and COLLECTION in {c.name for c in old.users_collection}
-    ):
-        bpy.data.curves.remove(old.data)
-    curve = bpy.data.curves.new(name, "CURVE")
+    curve = bpy.data.curves.new("Paths", "CURVE")
     curve.dimensions = "3D"
     curve.bevel_depth, curve.bevel_resolution = choice.radius_m, 1
     for material in materials:
@@ -143,8 +184,8 @@ def _curve_object(
         spline.points.add(len(corners) - 1)
         rows = np.concatenate([corners, np.ones((len(corners), 1), np.float32)], axis=1)
         spline.points.foreach_set("co", rows.ravel())
-        spline.material_index = int(np.clip(levels[i], 0, _LEVELS - 1))
-    return bpy.data.objects.new(name, curve)
+        spline.material_index = int(levels[i])
+    return bpy.data.objects.new(curve.name, curve)
 
 
 def _objects(dataset: PathDataset, paths: Paths, path: int) -> list[str]:

@@ -115,6 +115,20 @@ def open_path_dataset(folder: Path) -> PathDataset:
         raise AddonError(f"{file}: damaged; make the dataset anew") from error
 
 
+def recorded_frames(dataset: PathDataset, radio: str) -> list[int]:
+    """Frames with a path table.
+
+    Raises:
+        AddonError: There is no such radio, or it has no table.
+    """
+    _need_radio(dataset, radio)
+    found = [frame for frame in sorted(dataset.frames) if _file(dataset, radio, frame).is_file()]
+    if not found:
+        folder = dataset.folder / "radio" / radio / "paths"
+        raise AddonError(f"{folder}: no path table; generate the dataset with ray paths")
+    return found
+
+
 def read_paths(dataset: PathDataset, radio: str, frame: int | None) -> Paths:
     """The paths of a frame, strongest first.
 
@@ -126,20 +140,28 @@ def read_paths(dataset: PathDataset, radio: str, frame: int | None) -> Paths:
     Raises:
         AddonError: There is no such radio or frame, no table, or a damaged one.
     """
-    if radio not in dataset.devices:
-        raise AddonError(
-            f"{dataset.folder}: no radio {radio!r}; it has {', '.join(dataset.devices)}"
-        )
+    _need_radio(dataset, radio)
     if frame is not None and frame not in dataset.frames:
         first, last = min(dataset.frames, default=0), max(dataset.frames, default=0)
         raise AddonError(
             f"{dataset.folder}: no frame {frame}; it has {len(dataset.frames)} of {first} to {last}"
         )
-    name = "static" if frame is None else f"{frame:06d}"
-    file = dataset.folder / "radio" / radio / "paths" / f"{name}.npz"
+    file = _file(dataset, radio, frame)
     if not file.is_file():
         raise AddonError(f"{file}: no path table; generate the dataset with ray paths")
     return _table(file)
+
+
+def _need_radio(dataset: PathDataset, radio: str) -> None:
+    if radio not in dataset.devices:
+        raise AddonError(
+            f"{dataset.folder}: no radio {radio!r}; it has {', '.join(dataset.devices)}"
+        )
+
+
+def _file(dataset: PathDataset, radio: str, frame: int | None) -> Path:
+    name = "static" if frame is None else f"{frame:06d}"
+    return dataset.folder / "radio" / radio / "paths" / f"{name}.npz"
 
 
 def _table(file: Path) -> Paths:

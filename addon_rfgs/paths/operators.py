@@ -4,23 +4,25 @@
 from __future__ import annotations
 
 import bpy
+import numpy as np
 
 from ..errors import AddonError
+from ..ownership import collections_of
 from ..reporting import Progress, Reporting, chosen_path
-from .curves import COLLECTION, Choice, chosen, clear_paths, show_paths
-from .dataset import open_path_dataset, read_paths
+from .curves import COLLECTION, LINK, Choice, chosen, clear_paths, show_paths
+from .dataset import open_path_dataset, read_paths, recorded_frames
 
 
 class RFGS_OT_show_paths(Reporting, bpy.types.Operator):
-    """Show the traced paths of a link in the current frame as curves coloured by power."""
+    """Show the traced paths of a link as curves coloured by power, frame by frame."""
 
     bl_idname = "rfgs.show_paths"
     bl_label = "Show Paths"
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
 
-    def work(self, context: bpy.types.Context, _progress: Progress) -> str:
-        """Reads the path table with the panel's settings."""
-        return show_settings(context.scene)
+    def work(self, context: bpy.types.Context, progress: Progress) -> str:
+        """Reads the path tables with the panel's settings."""
+        return show_settings(context.scene, progress)
 
 
 class RFGS_OT_clear_paths(Reporting, bpy.types.Operator):
@@ -33,21 +35,21 @@ class RFGS_OT_clear_paths(Reporting, bpy.types.Operator):
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
         """There are paths."""
-        return COLLECTION in bpy.data.collections
+        return bool(collections_of(COLLECTION))
 
     def work(self, _context: bpy.types.Context, _progress: Progress) -> str:
         """Removes objects, curves and materials."""
         return f"Removed the paths of {clear_paths()} links"
 
 
-def show_settings(scene: bpy.types.Scene) -> str:
+def show_settings(scene: bpy.types.Scene, progress: Progress | None = None) -> str:
     """Shows the paths that the scene's settings ask for.
 
     Returns:
         What was done, in one line.
 
     Raises:
-        AddonError: There are no such paths.
+        AddonError: There are no such paths; nothing has changed then.
     """
     said = scene.rfgs.paths
     dataset = open_path_dataset(chosen_path(said.dataset or scene.rfgs.jobs.dataset_folder))
@@ -55,17 +57,20 @@ def show_settings(scene: bpy.types.Scene) -> str:
         raise AddonError(f"{dataset.folder}: holds no radio")
     choice = Choice(
         radio=said.radio or next(iter(dataset.devices)),
-        frame=None if said.static else scene.frame_current,
         tx_device=said.tx_device,
         rx_device=said.rx_device,
         count=said.count,
         range_db=said.range_db,
         radius_m=said.radius_m,
     )
-    paths = chosen(read_paths(dataset, choice.radio, choice.frame), choice)
-    items = show_paths(scene, dataset, paths, choice)
-    weakest, strongest = paths.power_db[-1], paths.power_db[0]
+    frames = [None] if said.static else [scene.frame_current]
+    if said.follow and not said.static:
+        frames = recorded_frames(dataset, choice.radio)
+    tables = chosen({frame: read_paths(dataset, choice.radio, frame) for frame in frames}, choice)
+    links = {item[LINK] for item in show_paths(scene, dataset, tables, choice, progress)}
+    power_db = np.concatenate([paths.power_db for paths in tables.values()])
+    more = f" in {len(frames)} frames" if len(frames) > 1 else ""
     return (
-        f"{len(paths)} paths of {len(items)} links of {choice.radio}, "
-        f"{weakest:.0f} to {strongest:.0f} dB"
+        f"{len(power_db)} paths of {len(links)} links of {choice.radio}{more}, "
+        f"{power_db.min():.0f} to {power_db.max():.0f} dB"
     )

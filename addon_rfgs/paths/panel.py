@@ -20,6 +20,8 @@ class RFGS_PT_paths(Tab, bpy.types.Panel):
         layout.use_property_decorate = False
         for name in type(settings).bl_rna.properties.keys():
             if name not in {"rna_type", "name"}:
-                layout.prop(settings, name)
+                row = layout.row()
+                row.active = name != "follow" or not settings.static
+                row.prop(settings, name)
         layout.operator("rfgs.show_paths", icon="CURVE_PATH")
         layout.operator("rfgs.clear_paths", icon="TRASH")

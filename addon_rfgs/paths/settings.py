@@ -20,10 +20,15 @@ class RFGS_PG_paths(bpy.types.PropertyGroup):
     radio: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Radio", description="Radio of the dataset; empty: its first", default=""
     )
+    follow: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Follow timeline",
+        description="Show the paths of every recorded frame, each until the next one; otherwise "
+        "those of the current frame alone, at all times",
+        default=True,
+    )
     static: bpy.props.BoolProperty(  # type: ignore[valid-type]
         name="Without people",
-        description="Paths of the scene without anything that moves, in place of those of the "
-        "current frame",
+        description="Paths of the scene without anything that moves, in place of those of frames",
         default=False,
     )
     tx_device: bpy.props.IntProperty(  # type: ignore[valid-type]
@@ -40,7 +45,7 @@ class RFGS_PG_paths(bpy.types.PropertyGroup):
     )
     count: bpy.props.IntProperty(  # type: ignore[valid-type]
         name="Strongest",
-        description="At most so many paths of each link",
+        description="At most so many paths of each link and frame",
         default=200,
         min=1,
         max=20000,

@@ -12,6 +12,7 @@ from ..devices.empties import COLLECTION as DEVICES
 from ..gaussians.clouds import COLLECTION as CLOUDS
 from ..gaussians.nodes import GROUP
 from ..materials.coloring import restore
+from ..ownership import collections_of, drop_empty
 from ..paths.curves import COLLECTION as PATHS
 from ..paths.curves import clear_paths
 from .stored import remove_properties
@@ -33,9 +34,7 @@ def remove_data() -> tuple[int, int]:
         _remove_object(item)
         count += 1
     for name in (DEVICES, CLOUDS, PATHS):
-        collection = bpy.data.collections.get(name)
-        if collection is not None and not collection.objects and not collection.children:
-            bpy.data.collections.remove(collection)
+        drop_empty(name)
     for rows in (bpy.data.node_groups, bpy.data.materials):
         for row in [row for row in rows if row.name.startswith(GROUP)]:
             if not row.users:
@@ -45,8 +44,8 @@ def remove_data() -> tuple[int, int]:
 
 def _objects() -> list[bpy.types.Object]:
     found = [item for item in bpy.data.objects if GROUP in item.modifiers]
-    devices = bpy.data.collections.get(DEVICES)
-    found += [item for item in devices.objects if item.rfgs.role != "NONE"] if devices else []
+    for collection in collections_of(DEVICES):
+        found += [item for item in collection.objects if item.rfgs.role != "NONE"]
     boxes = {scene.rfgs.gaussians.crop_box for scene in bpy.data.scenes}
     return found + [box for box in boxes if box is not None and box.name.startswith("RFGS ")]
 

@@ -25,7 +25,7 @@ class Finding:
     remedy: str = ""
     """What to do about it."""
     kind: str = ""
-    """Which finding it is where something can be done by a button; see `check.fixes`."""
+    """Which finding it is where something can be done by a button; see `check.repairs`."""
     material: str = ""
     """Name of the Blender material it is about."""
 

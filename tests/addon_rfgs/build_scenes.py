@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Builds small .blend files, exports each, and writes what happened; runs in its own Python.
 
-Usage: build_scenes.py FOLDER. Writes FOLDER/<name>.blend, FOLDER/<name>/ (the bundle) and
-FOLDER/results.json with errors and with what Blender itself says about the scenes.
+Usage: build_scenes.py FOLDER [NAME…], without a name all of them. Writes FOLDER/<name>.blend,
+FOLDER/<name>/ (the bundle) and FOLDER/results.json with errors and with what Blender itself says
+about the scenes.
 """
 
 from __future__ import annotations
@@ -301,12 +302,14 @@ def corners(scene: bpy.types.Scene) -> dict[str, list]:
     return out
 
 
-def main(folder: Path) -> None:
+def main(folder: Path, *names: str) -> None:
     """Builds, exports and reports."""
     addon_rfgs.register()
     results: dict[str, Any] = {}
     for build in SCENES:
         name = build.__name__
+        if names and name not in names:
+            continue
         build()
         path = folder / f"{name}.blend"
         bpy.ops.wm.save_as_mainfile(filepath=str(path))
@@ -329,4 +332,4 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), *sys.argv[2:])

@@ -58,6 +58,14 @@ def registered() -> Iterator[None]:
 
 
 @pytest.fixture
+def in_room(registered: None) -> None:
+    """The small room of `build_scenes.py`, open and as it was built."""
+    from build_scenes import room
+
+    room()
+
+
+@pytest.fixture
 def settings(registered: None, tmp_path: Path) -> Any:
     """The Gaussians panel's settings, after a run of three frames was imported."""
     import bpy

@@ -14,7 +14,6 @@ from typing import Any
 import bpy
 import pytest
 
-import addon_rfgs
 from addon_rfgs.channels import drawing
 from addon_rfgs.channels.image import load_image
 from addon_rfgs.cli import run
@@ -25,16 +24,14 @@ RUN, PYTHON = os.environ["RFGS_RUN"], os.environ["RFGS_PYTHON"]
 
 
 @pytest.fixture
-def said() -> Iterator[Any]:
+def said(registered: None) -> Iterator[Any]:
     """Settings of an empty scene; preferences that name the environment."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    addon_rfgs.register()
     stored = bpy.context.preferences.addons.new()
     stored.module = ADDON
     stored.preferences.python = PYTHON
     yield bpy.context.scene.rfgs.channels
     bpy.context.preferences.addons.remove(stored)
-    addon_rfgs.unregister()
 
 
 def refused(words: str) -> None:

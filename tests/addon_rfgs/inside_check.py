@@ -1,17 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The scene check and its repairs inside Blender; `test_inside_check.py` runs this file."""
+"""The scene check and its repairs inside Blender; `test_inside_blender.py` runs this file."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
-from build_scenes import box, room, still
+from build_scenes import box, still
 
-import addon_rfgs
 from addon_rfgs.check import repairs, scene_repairs
 from addon_rfgs.cli import open_blend, run
 from addon_rfgs.errors import AddonError
@@ -19,13 +17,7 @@ from addon_rfgs.scene import weight
 from addon_rfgs.scene.bodies import inside_out, seams, welded
 from addon_rfgs.scene.findings import Finding
 
-
-@pytest.fixture(autouse=True)
-def registered() -> Iterator[None]:
-    addon_rfgs.register()
-    room()
-    yield
-    addon_rfgs.unregister()
+pytestmark = pytest.mark.usefixtures("in_room")
 
 
 def found(kind: str) -> list[Finding]:
@@ -254,6 +246,22 @@ def test_select_goes_to_what_is_meant() -> None:
     bpy.ops.rfgs.select_finding(index=index)
     assert bpy.context.view_layer.objects.active == point and point.select_get()
     assert [item.name for item in bpy.context.selected_objects] == ["ap"]
+
+
+def test_select_by_command(tmp_path: Path, capfd: pytest.CaptureFixture) -> None:
+    bpy.data.objects["ap"].location = (-5, 1, 1.2)
+    out = tmp_path / "selected.blend"
+    assert run(["check"]) == 0
+    lines = capfd.readouterr().out.splitlines()
+    number = 1 + next(i for i, line in enumerate(lines) if "outside the scene" in line)
+    assert run(["check", "--select", str(number), "--save", str(out)]) == 0
+    open_blend(out)
+    assert [item.name for item in bpy.context.selected_objects] == ["ap"]
+    assert bpy.context.view_layer.objects.active.name == "ap"
+    capfd.readouterr()
+    for words in (["0", "--save", str(out)], ["99", "--save", str(out)], ["1"]):
+        assert run(["check", "--select", *words]) == 2
+        assert capfd.readouterr().err.count("\n") == 1
 
 
 def test_findings_are_not_saved(tmp_path: Path) -> None:

@@ -1,19 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Radio devices inside Blender; `test_inside_devices.py` runs this file."""
+"""Radio devices inside Blender; `test_inside_blender.py` runs this file."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from math import pi
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
-from build_scenes import room
 
-import addon_rfgs
 from addon_rfgs.cli import open_blend, run
 from addon_rfgs.devices import authoring, empties, layout, overlay, placement
 from addon_rfgs.devices.sketch import joined, sketch
@@ -26,13 +23,7 @@ from rfgs_core.radio import DevicePose, place_devices, preset
 from rfgs_core.radio import check as factory_check
 from rfgs_core.radio import layout as factory_layout
 
-
-@pytest.fixture(autouse=True)
-def registered() -> Iterator[None]:
-    addon_rfgs.register()
-    room()
-    yield
-    addon_rfgs.unregister()
+pytestmark = pytest.mark.usefixtures("in_room")
 
 
 @pytest.mark.parametrize("name", RADIOS)

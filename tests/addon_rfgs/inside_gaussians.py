@@ -12,6 +12,7 @@ import pytest
 from splat_files import BARE, COLUMNS, rows_of, write
 from splat_scene import FRAMES, cloud
 
+from addon_rfgs.cli import open_blend, run
 from addon_rfgs.gaussians import attributes, color_maps
 from addon_rfgs.gaussians.coloring import missing
 from addon_rfgs.gaussians.display import shown
@@ -93,6 +94,25 @@ def test_crop_box_is_an_empty_that_acts_live(settings) -> None:
     assert points_shown(item) == 40
 
 
+def test_a_crop_box_by_command(settings, tmp_path: Path, capfd: pytest.CaptureFixture) -> None:
+    out, words = tmp_path / "cropped.blend", ["import", settings.path, "--out"]
+    bounds = ["-0.5", "-0.5", "-2", "0.5", "1", "2"]
+    bpy.context.scene.unit_settings.scale_length = 0.01
+    assert run([*words, str(out), "--crop", *bounds]) == 0
+    open_blend(out)
+    found = bpy.context.scene.rfgs.gaussians
+    assert found.use_crop and found.crop_box.scale.z == pytest.approx(200)
+    bpy.context.view_layer.update()
+    inside = shown(cloud(5), found.display())
+    places = attributes.positions(cloud(5).data)
+    low, high = np.array(bounds, float).reshape(2, 3)
+    np.testing.assert_array_equal(inside, ((places > low) & (places < high)).all(axis=1))
+    assert 0 < inside.sum() < len(inside)
+    never = tmp_path / "never.blend"
+    assert run([*words, str(never), "--crop", *bounds[3:], *bounds[:3]]) == 2
+    assert "X0 < X1" in capfd.readouterr().err and not never.exists()
+
+
 def test_solid_view_gets_real_meshes_with_an_active_colour(settings) -> None:
     item = cloud(2)
     bpy.context.scene.frame_set(2)
@@ -166,13 +186,18 @@ def test_modes_without_their_numbers_say_so(tmp_path: Path) -> None:
     assert bpy.ops.rfgs.import_gaussians() == {"FINISHED"}
     grey = attributes.get(bpy.data.objects["Gaussians static"].data, "rfgs_color")
     np.testing.assert_allclose(grey[:, :3], color_maps.linear(np.array(0.5)), rtol=1e-5)
-    meshes = [bpy.data.objects["Gaussians static"].data]
-    assert missing(meshes, settings.coloring()) is None
+    assert missing([bpy.data.objects["Gaussians static"].data], settings.coloring()) is None
     for mode in ("POWER", "PHASE", "FEATURES", "ERROR", "ATTRIBUTE"):
         settings.color_by = mode
+        meshes = [bpy.data.objects["Gaussians static"].data]
         assert mode == "POWER" or missing(meshes, settings.coloring())
         with pytest.raises(RuntimeError, match="no Gaussian here"):
             bpy.ops.rfgs.update_display()
+        # A setting of the run before is no reason to refuse the next one.
+        assert bpy.ops.rfgs.import_gaussians() == {"FINISHED"}
+        again = attributes.get(bpy.data.objects["Gaussians static"].data, "rfgs_color")
+        np.testing.assert_array_equal(again, grey)
+    assert run(["import", settings.path, "--color-by", "features", "--out", "never.blend"]) == 2
 
 
 @pytest.mark.parametrize(

@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every operator, panel and property of the add-on; `test_inside_interface.py` runs this file."""
+"""Every operator, panel and property of the add-on; `test_inside_blender.py` runs this file."""
 
 from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
@@ -15,22 +14,22 @@ import addon_rfgs
 from addon_rfgs.cli import parser, run
 from addon_rfgs.path_options import RELATIVE_PATH
 
-#: Operator → the command that does the same; or, behind a dash, why there is none.
+#: Operator → the command that does the same.
 COMMANDS = {
-    "add_crop_box": "- a box to be moved by hand",
+    "add_crop_box": "import",
     "add_device": "devices add",
     "apply_guesses": "materials guess",
     "assign_material": "materials apply",
     "check_scene": "check",
     "clear_paths": "paths",
     "color_materials": "materials color",
-    "color_solid_view": "- changes a 3D view",
+    "color_solid_view": "import",
     "compare_gaussians": "import",
     "duplicate_device": "devices duplicate",
     "evaluate_run": "evaluate",
     "export_bundle": "export",
     "export_gaussians": "export-gaussians",
-    "forget_job": "- the list of jobs lives in the window",
+    "forget_job": "forget",
     "generate_dataset": "generate",
     "guess_materials": "materials guess",
     "import_gaussians": "import",
@@ -44,7 +43,7 @@ COMMANDS = {
     "render_groundtruth": "groundtruth",
     "repair_finding": "fix",
     "resume_job": "resume",
-    "select_finding": "- the selection lives in the window",
+    "select_finding": "check",
     "show_csi": "csi",
     "show_paths": "paths",
     "stop_job": "stop",
@@ -60,11 +59,7 @@ LEAVE_THE_FILE = {
 }
 
 
-@pytest.fixture(autouse=True)
-def registered() -> Iterator[None]:
-    addon_rfgs.register()
-    yield
-    addon_rfgs.unregister()
+pytestmark = pytest.mark.usefixtures("registered")
 
 
 def classes(base: type) -> list[type]:
@@ -96,8 +91,7 @@ def command_words(tree: argparse.ArgumentParser, before: str = "") -> dict[str, 
 def test_every_operator_has_a_command() -> None:
     known = command_words(parser("rfgs"))
     assert sorted(operators()) == sorted(COMMANDS)
-    wanted = {name for name in COMMANDS.values() if not name.startswith("- ")}
-    assert not wanted - set(known)
+    assert not set(COMMANDS.values()) - set(known)
     assert all(known.values()), "every command says what it does"
 
 

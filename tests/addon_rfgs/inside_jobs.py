@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Jobs outside of Blender; `test_inside_jobs.py` runs this file in a Python of its own."""
+"""Jobs outside of Blender; `test_inside_blender.py` runs this file."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ import bpy
 import pytest
 
 import addon_rfgs
+from addon_rfgs.cli import run
 from addon_rfgs.errors import AddonError
-from addon_rfgs.jobs import environment, following, queue
+from addon_rfgs.jobs import commands, environment, following, queue
 from addon_rfgs.jobs.plans import EvaluatePlan, GeneratePlan, TrainPlan, plan_of_json, plan_to_json
 from addon_rfgs.jobs.process import Process, birth
 from addon_rfgs.jobs.progress import Progress, read_log
@@ -24,6 +25,7 @@ from addon_rfgs.jobs.record import (
     log_file,
     read_record,
     record_file,
+    remember,
     remembered,
     write_record,
 )
@@ -292,23 +294,36 @@ def test_a_blender_that_does_not_start_is_a_problem() -> None:
     assert len(problems) == 1 and "/nowhere/blender does not start" in problems[0]
 
 
-def test_operators_refuse_in_one_line_what_they_cannot_do() -> None:
-    addon_rfgs.register()
-    try:
-        for name, words in (
-            ("generate_dataset", "never saved"),
-            ("test_environment", "no Python environment is set"),
-        ):
-            with pytest.raises(RuntimeError, match=words):
-                getattr(bpy.ops.rfgs, name)()
-        for name in ("stop_job", "resume_job", "forget_job", "import_result"):
-            assert not getattr(bpy.ops.rfgs, name).poll()
-        assert not bpy.app.timers.is_registered(following._tick)
-        following.follow()
-        assert bpy.app.timers.is_registered(following._tick)
-    finally:
-        addon_rfgs.unregister()
+def test_operators_refuse_in_one_line_what_they_cannot_do(registered: None) -> None:
+    for name, words in (
+        ("generate_dataset", "never saved"),
+        ("test_environment", "no Python environment is set"),
+    ):
+        with pytest.raises(RuntimeError, match=words):
+            getattr(bpy.ops.rfgs, name)()
+    for name in ("stop_job", "resume_job", "forget_job", "import_result"):
+        assert not getattr(bpy.ops.rfgs, name).poll()
     assert not bpy.app.timers.is_registered(following._tick)
+    following.follow()
+    assert bpy.app.timers.is_registered(following._tick)
+    addon_rfgs.unregister()
+    assert not bpy.app.timers.is_registered(following._tick)
+    addon_rfgs.register()
+
+
+def test_a_job_is_forgotten_by_command(
+    registered: None, tmp_path: Path, capfd: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    listed = tmp_path / "jobs.json"
+    monkeypatch.setattr(commands, "QUEUE", queue.Queue(lambda: listed))
+    running, over = plan(tmp_path, "running"), plan(tmp_path, "over")
+    write_record(Record(running, os.getpid(), birth(os.getpid())))
+    write_record(Record(over, 0, ""))
+    remember([record_file(running), record_file(over)], listed)
+    assert run(["forget", running.out]) == 2
+    assert "not over; stop it first" in capfd.readouterr().err
+    assert run(["forget", over.out]) == 0
+    assert remembered(listed) == [record_file(running)] and record_file(over).is_file()
 
 
 def test_the_log_lies_in_the_output_folder(tmp_path: Path) -> None:

@@ -1,16 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Radio materials inside Blender; `test_inside_materials.py` runs this file."""
+"""Radio materials inside Blender; `test_inside_blender.py` runs this file."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
-from build_scenes import box, room
+from build_scenes import box
 
 import addon_rfgs
 from addon_rfgs.cli import open_blend, run
@@ -23,13 +22,7 @@ from addon_rfgs.tables import MATERIALS
 from rfgs_core.radio import PRESETS
 from rfgs_core.radio.materials import MATERIALS as FACTORY
 
-
-@pytest.fixture(autouse=True)
-def registered() -> Iterator[None]:
-    addon_rfgs.register()
-    room()
-    yield
-    addon_rfgs.unregister()
+pytestmark = pytest.mark.usefixtures("in_room")
 
 
 def test_validity_is_the_factory_s() -> None:

@@ -1,19 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Ray paths as curves; `test_inside_paths.py` runs this file in a Python of its own."""
+"""Ray paths as curves; `test_inside_blender.py` runs this file."""
 
 from __future__ import annotations
 
 import io
 import json
 import zipfile
-from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 
-import addon_rfgs
+from addon_rfgs.cli import open_blend, run
 from addon_rfgs.errors import AddonError
 from addon_rfgs.paths import dataset as ours
 from rfgs_core.dataset.path_store import read_paths, write_paths
@@ -71,15 +70,13 @@ def data(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def scene(data: Path) -> Iterator[bpy.types.Scene]:
+def scene(registered: None, data: Path) -> bpy.types.Scene:
+    """Frame 1, whose paths alone are asked for."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    addon_rfgs.register()
-    try:
-        bpy.context.scene.frame_set(1)
-        bpy.context.scene.rfgs.paths.dataset = str(data)
-        yield bpy.context.scene
-    finally:
-        addon_rfgs.unregister()
+    bpy.context.scene.frame_set(1)
+    bpy.context.scene.rfgs.paths.dataset = str(data)
+    bpy.context.scene.rfgs.paths.follow = False
+    return bpy.context.scene
 
 
 def curves() -> list[bpy.types.Object]:
@@ -168,6 +165,64 @@ def test_showing_again_replaces_and_clearing_leaves_nothing(scene) -> None:
     assert bpy.ops.rfgs.clear_paths() == {"FINISHED"}
     assert {name: len(getattr(bpy.data, name)) for name in before} == before
     assert "RF-GS Paths" not in bpy.data.collections and not bpy.ops.rfgs.clear_paths.poll()
+
+
+def seen(frame: int) -> set[str]:
+    """Ends of the names of the paths that are seen at a frame."""
+    bpy.context.scene.frame_set(frame)
+    return {item.name.rpartition(", ")[2] for item in curves() if not item.hide_render}
+
+
+def test_paths_follow_the_timeline(scene, data: Path, tmp_path: Path) -> None:
+    settings = scene.rfgs.paths
+    settings.tx_device = 0
+    bpy.ops.rfgs.show_paths()
+    alone = len(curves())
+    assert seen(1) == seen(900) == {"frame 1"}, "one frame alone is there all the time"
+    settings.follow = True
+    assert bpy.ops.rfgs.show_paths() == {"FINISHED"}
+    assert len(curves()) > alone, "in place of those of one frame"
+    first, second = {"frame 1"}, {"frame 7"}
+    assert [seen(frame) for frame in (-3, 1, 6, 7, 900)] == [set(), first, first, second, second]
+    # A level is the same power in both frames.
+    levels: dict[int, list[float]] = {}
+    for item in curves():
+        for spline, power_db in zip(item.data.splines, item["power_db"], strict=True):
+            levels.setdefault(spline.material_index, []).append(power_db)
+    ends = [end for level in sorted(levels) for end in (min(levels[level]), max(levels[level]))]
+    assert ends == sorted(ends)
+    out = tmp_path / "paths.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(out))
+    bpy.ops.wm.open_mainfile(filepath=str(out))
+    assert seen(3) == {"frame 1"} and seen(8) == {"frame 7"}, "the file keeps it"
+    bpy.ops.rfgs.clear_paths()
+    assert not bpy.data.actions and not bpy.data.curves
+
+
+def test_frames_without_a_table_are_passed_over(scene, data: Path) -> None:
+    folder = data / "room" / "radio" / RADIO / "paths"
+    scene.rfgs.paths.follow = True
+    (folder / "000001.npz").unlink()
+    assert bpy.ops.rfgs.show_paths() == {"FINISHED"}
+    assert {item.name.rpartition(", ")[2] for item in curves()} == {"frame 7"}
+    (folder / "000007.npz").unlink()
+    with pytest.raises(RuntimeError, match="generate the dataset with ray paths"):
+        bpy.ops.rfgs.show_paths()
+
+
+def test_paths_by_command(scene, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "paths.blend"
+    assert run(["paths", "--tx", "0", "--rx", "1", "--out", str(out)]) == 0
+    assert "1 links of wifi, " in capfd.readouterr().out
+    assert run(["paths", "--frame", "7", "--out", str(out)]) == 0
+    open_blend(out)
+    assert {item.name.rpartition(", ")[2] for item in curves()} == {"frame 7"}, "replaced"
+    assert run(["paths", "--clear", "--out", str(out)]) == 0
+    for words in (("--count", "0"), ("--tx", "-2"), ("--range-db", "-1")):
+        assert run(["paths", *words, "--out", str(tmp_path / "never.blend")]) == 2
+        said = capfd.readouterr().err.strip()
+        assert said.startswith("error: --") and "expected" in said and "\n" not in said
+    assert not (tmp_path / "never.blend").exists()
 
 
 def test_the_dataset_of_the_jobs_is_the_default(scene, data: Path) -> None:

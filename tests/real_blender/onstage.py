@@ -112,6 +112,10 @@ class Stage:
             self.window.event_simulate(type="LEFTMOUSE", value=value, x=found[0], y=found[1])
             yield 0.2
 
+    def forget_places(self) -> None:
+        """Looks for buttons anew: they have moved."""
+        self._places.clear()
+
     def _find(self, operator: str) -> Iterator[float]:
         # Blender does not tell where buttons are, but which one is below the pointer.
         region = self.sidebar

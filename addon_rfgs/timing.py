@@ -1,43 +1,48 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which cloud is seen when: visibility is keyed, so files show it without the add-on."""
+"""What is seen when: visibility is keyed, so files show it without the add-on."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import Any
 
 import bpy
 
-from .cloud_mesh import FRAME
-
 _VISIBILITY = ("hide_viewport", "hide_render")
 
 
-def key_visibility(items: Sequence[bpy.types.Object], offset: int, interpolation: str) -> None:
-    """Keys when each cloud of a frame is visible, in place of earlier keys.
+def key_visibility(
+    scene: bpy.types.Scene,
+    items: Iterable[tuple[int, bpy.types.Object]],
+    offset: int = 0,
+    interpolation: str = "HOLD",
+) -> None:
+    """Keys when objects of recorded frames are visible, in place of earlier keys.
 
     Args:
-        items: Clouds; those that belong to no frame stay visible.
-        offset: The cloud of frame f is shown at frame f + offset.
-        interpolation: `NONE` shows a cloud at its own frame alone, `NEAREST` while no other
+        scene: Whose current frame decides what is seen now.
+        items: The frame of each object, and the object.
+        offset: What belongs to frame f is shown at frame f + offset.
+        interpolation: `NONE` shows an object at its own frame alone, `NEAREST` while no other
             recorded frame is nearer, `HOLD` until the next recorded frame.
     """
-    framed = {int(item.data[FRAME]): item for item in items if FRAME in item.data}
-    now = bpy.context.scene.frame_current
-    shown = _spans(sorted(framed), interpolation)
-    for (frame, item), (first, last) in zip(sorted(framed.items()), shown, strict=True):
+    rows = list(items)
+    frames = sorted({frame for frame, _ in rows})
+    spans = dict(zip(frames, _spans(frames, interpolation), strict=True))
+    for frame, item in rows:
+        first, last = (None if end is None else end + offset for end in spans[frame])
         _drop_keys(item)
-        keys = [] if first is None else [(first - 1 + offset, True)]
-        keys += [((frame if first is None else first) + offset, False)]
-        keys += [] if last is None else [(last + 1 + offset, True)]
+        keys = [] if first is None else [(first - 1, True)]
+        keys += [(frame + offset if first is None else first, False)]
+        keys += [] if last is None else [(last + 1, True)]
+        # Blender looks at keys of what is hidden only when the frame changes.
+        now = scene.frame_current
+        hidden_now = (first is not None and now < first) or (last is not None and now > last)
         for name in _VISIBILITY:
             for at, hidden in keys:
                 setattr(item, name, hidden)
                 item.keyframe_insert(name, frame=at)
-            # Blender looks at keys of what is hidden only when the frame changes.
-            early = first is not None and now < first + offset
-            late = last is not None and now > last + offset
-            setattr(item, name, early or late)
+            setattr(item, name, hidden_now)
 
 
 def _spans(frames: list[int], interpolation: str) -> list[tuple[int | None, int | None]]:

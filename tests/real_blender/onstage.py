@@ -184,7 +184,9 @@ def _start() -> None:
         try:
             return next(steps)
         except StopIteration:
-            bpy.ops.wm.quit_blender()
+            # A script that opened another file is left without a window, which Blender 4.3 needs.
+            with bpy.context.temp_override(window=stage.window):
+                bpy.ops.wm.quit_blender()
             return None
         except BaseException:
             traceback.print_exc()

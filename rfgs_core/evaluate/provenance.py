@@ -85,6 +85,7 @@ def conditions(scene: Scene) -> dict[str, Any]:
         "voxel_m": scene.grid.voxel_m,
         "objective": scene.run.config.get("objective"),
         "observe": scene.observe,
+        "packets": _packets(scene),
         "background": scene.background,
         "density": scene.run.config.get("density"),
         "recipe": scene.run.config.get("recipe"),
@@ -100,6 +101,11 @@ def _impairments(scene: Scene) -> str:
     chosen = asdict(scene.run.sequence.impairments(scene.radio.name).settings)
     plain = asdict(Impairments())
     return ", ".join(f"{name} {chosen[name]}" for name in chosen if chosen[name] != plain[name])
+
+
+def _packets(scene: Scene) -> str:
+    """Which packets of a frame were read."""
+    return f"{scene.packets} of {scene.radio.samples_per_frame} per frame"
 
 
 def _calibration(scene: Scene) -> str:

@@ -20,7 +20,7 @@ CONDITIONS = (
     "num_frames",
     "voxels_predicted",
     "impairments",
-    *("observe", "background"),
+    *("observe", "packets", "background"),
 )
 
 

@@ -7,7 +7,8 @@ background only: the visible part of the capture, or what was learned in its pla
 
 from __future__ import annotations
 
-from functools import partial
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from rfgs_core.evaluate.evidence import Evidence
 from rfgs_core.evaluate.geometry import reference_points
 from rfgs_core.evaluate.rf import RF_KEYS, frame_rf, pool_rf, snr_db
 from rfgs_core.evaluate.scene import Scene
+from rfgs_core.run.calibration import read_calibration
 from rfgs_core.run.static import has_static_set, read_static_set
 from rfgs_core.seeds import sub_seed
 from rfgs_core.train.background import direct_background
@@ -35,32 +37,59 @@ SURFACE_POINTS = 200_000
 Channel = Complex[np.ndarray, "tx rx subcarrier"]
 
 
-def background_metrics(scene: Scene) -> dict[str, Any] | None:
-    """`rows`, the metrics by method, and `surface_m`, distances of the set; None without a set."""
-    run = scene.run
-    if not has_static_set(run.path):
-        return None
-    static, seen = read_static_set(run.path), run.observations(run.frames[0])
-    visible = np.where(seen.links[..., None] & seen.tones, seen.static, np.nan)
-    radio = scene.radio
-    evidence = Evidence.hide(
-        *(visible, visible, scene.held_out, scene.layout, radio.freq_hz, scene.grid, scene.voxels)
-    )
-    straight, whole = direct_background(seen), static.background(seen)
-    kriged = partial(_with_residual, evidence=evidence)
+@dataclass(frozen=True)
+class Backgrounds:
+    """The empty room as a run's static set predicts it, on every link and tone."""
+
+    static: StaticSet
+    """The set."""
+    evidence: Evidence
+    """What of the background training sees, in place of the empty room."""
+    straight: Channel
+    """Direct paths alone."""
+    whole: Channel
+    """Direct paths and the set."""
+
+    @staticmethod
+    def of(scene: Scene) -> Backgrounds | None:
+        """Those of a run; None without a static set."""
+        run, layout, freq_hz = scene.run, scene.layout, scene.radio.freq_hz
+        if not has_static_set(run.path):
+            return None
+        static, seen = read_static_set(run.path), run.observations(run.frames[0])
+        turn = np.ones((), dtype=np.complex64)
+        if run.config.get("calibrate", "none") != "none":
+            # As devices with the offsets of the capture hear it, like `Run.predict`.
+            turn = read_calibration(run.path, run.frames[0]).capture.turn(layout, freq_hz)
+        visible = np.where(seen.links[..., None] & seen.tones, seen.static * turn, np.nan)
+        grid = (scene.grid, scene.voxels)
+        evidence = Evidence.hide(visible, visible, scene.held_out, layout, freq_hz, *grid)
+        straight, whole = direct_background(seen), static.background(seen)
+        parts = ((part * turn).astype(np.complex64) for part in (straight, whole))
+        return Backgrounds(static, evidence, *parts)
+
+    @cached_property
+    def best(self) -> Channel:
+        """Direct paths, the set, and what they leave of the visible background, kriged."""
+        return _with_residual(self.whole, self.evidence)
+
+
+def background_metrics(scene: Scene, own: Backgrounds) -> dict[str, Any]:
+    """`rows`, the metrics by method, and `surface_m`, distances of the set to true surfaces."""
+    evidence = own.evidence
     answers = {
-        "static_set, residual kriged": kriged(whole),
-        "static_set": whole,
-        "direct paths, residual kriged": kriged(straight),
-        "direct paths": straight,
+        "static_set, residual kriged": own.best,
+        "static_set": own.whole,
+        "direct paths, residual kriged": _with_residual(own.straight, evidence),
+        "direct paths": own.straight,
         "gaussian_process": fill(evidence.static, evidence, krige, krige_level),
         "linear": fill(evidence.static, evidence, linear, inverse_distance),
-        "zero": np.zeros_like(whole),
+        "zero": np.zeros_like(own.whole),
     }
     return {
         "rows": {name: _metrics(scene, answer) for name, answer in answers.items()},
-        "n_gaussians": len(static.gaussians),
-        "surface_m": surface_distances(static, run.sequence),
+        "n_gaussians": len(own.static.gaussians),
+        "surface_m": surface_distances(own.static, scene.run.sequence),
     }
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 from tqdm import tqdm
 
-from rfgs_core.evaluate.background import background_metrics
+from rfgs_core.evaluate.background import Backgrounds, background_metrics
 from rfgs_core.evaluate.controls import CONTROLS, ControlResult, phase_free
 from rfgs_core.evaluate.geometry import GEOMETRY_KEYS, geometry_metrics
 from rfgs_core.evaluate.image import IMAGE_KEYS
@@ -43,12 +43,12 @@ def evaluate_run(run: EvaluatedRun, *, oracle: bool = True) -> dict[str, Any]:
     """
     start_s = time.perf_counter()
     scene = Scene.of(run)
-    table = _Table()
+    table, room = _Table(), Backgrounds.of(scene)
     pictures = pictures_of(run, "test") if has_pictures(run) else []
     steps = len(run.frames) * (1 + len(CONTROLS)) + len(pictures)
     with tqdm(total=steps, desc="evaluate", unit="step") as bar:
         for frame in run.frames:
-            _evaluate_frame(scene, frame, table, bar.update)
+            _evaluate_frame(scene, frame, table, room, bar.update)
         image, image_reasons = ({}, {})
         if pictures:
             image, image_reasons = picture_metrics(run, bar.update)
@@ -58,7 +58,7 @@ def evaluate_run(run: EvaluatedRun, *, oracle: bool = True) -> dict[str, Any]:
     metrics["controls"] = groups
     metrics["reasons"] = table.reasons(image, image_reasons, bool(pictures))
     metrics["frames"] = table.frames()
-    metrics["background"] = background_metrics(scene)
+    metrics["background"] = None if room is None else background_metrics(scene, room)
     metrics |= _circumstances(scene)
     metrics["verdicts"] = verdicts(metrics)
     metrics["eval_s"] = round(time.perf_counter() - start_s, 2)
@@ -148,15 +148,25 @@ def _none(keys: tuple[str, ...]) -> Values:
     return dict.fromkeys(keys)
 
 
-def _evaluate_frame(scene: Scene, frame: int, table: _Table, on_step: Callable[[], Any]) -> None:
+def _evaluate_frame(
+    scene: Scene,
+    frame: int,
+    table: _Table,
+    room: Backgrounds | None,
+    on_step: Callable[[], Any],
+) -> None:
     """Method and controls on one frame."""
     reference, csi = scene.reference(frame), scene.csi(frame)
     score, predicted = scene.score(frame), scene.run.predict(frame)
     evidence = scene.evidence(frame, score)
     # Without phases there is no channel to compare with, and nothing is left to add.
     whole = with_residual(predicted, evidence) if scene.observe == "complex" else predicted
-    _add(scene, table, METHOD, frame, ControlResult(score, whole), reference, csi)
-    model = ControlResult(delta=predicted, reason="the method's own Gaussians without the residual")
+    # A static set brings the method's own empty room.
+    best, alone = (None, None) if room is None else (room.best, room.whole)
+    _add(scene, table, METHOD, frame, ControlResult(score, whole, best), reference, csi)
+    model = ControlResult(
+        delta=predicted, static=alone, reason="the method's own Gaussians without the residual"
+    )
     _add(scene, table, GAUSSIANS_ALONE, frame, model, reference, csi)
     on_step()
     for name, control in CONTROLS.items():

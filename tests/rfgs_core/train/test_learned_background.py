@@ -117,3 +117,13 @@ def test_taking_movers_out_in_turn_leaves_less_of_them_in_the_room(
     assert errors[1] < 0.8 * errors[0]
     keep = seen.links[..., None] & seen.tones
     assert (better[~keep] == 0).all()
+
+
+def test_where_nothing_moves_the_room_stays_as_it_is(walk: Path, quick_config, monkeypatch) -> None:
+    sequence = open_dataset(walk).sequence()
+    room = sequence.csi_static("wifi")
+    monkeypatch.setattr(Sequence, "csi_samples", lambda *_, **__: room[None])
+    monkeypatch.setattr(Sequence, "csi", lambda *_, **__: room)
+    first = learned_background(sequence, "wifi", "clean", "complex")
+    assert not observe(sequence, "wifi", 4, empty=first).changed
+    np.testing.assert_array_equal(without_movers(sequence, "wifi", first, quick_config), first)

@@ -13,7 +13,7 @@ import torch
 from scipy.spatial import KDTree
 
 from rfgs_core.errors import RfgsError, RfgsFormatError
-from rfgs_core.evaluate.background import background_metrics
+from rfgs_core.evaluate.background import Backgrounds, background_metrics
 from rfgs_core.evaluate.scene import Scene
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.gaussians.ply import cloud_of, read_ply, write_ply
@@ -196,8 +196,10 @@ def test_resuming_gives_the_same_bytes(own_run: Run, train, quick_config) -> Non
 
 
 def test_the_empty_room_is_told_better_than_by_direct_paths(own_run: Run) -> None:
-    metrics = background_metrics(Scene.of(own_run))
-    assert metrics is not None
+    scene = Scene.of(own_run)
+    own = Backgrounds.of(scene)
+    assert own is not None
+    metrics = background_metrics(scene, own)
     rows = metrics["rows"]
     assert rows["zero"]["visible_snr_db"] == pytest.approx(0.0)
     for name in ("visible_snr_db", "element_snr_db", "subcarrier_snr_db"):
@@ -236,3 +238,19 @@ def test_what_does_not_fit_is_refused(own_run: Run, train, tiny_dataset, quick_c
     (own_run.path / static_files.HEAD_FILE).write_bytes(b"no")
     with pytest.raises(RfgsFormatError, match=r"delete static_head\.npz"):
         own_run.gaussians(1)
+
+
+def test_a_calibrated_run_tells_the_room_as_its_devices_hear_it(
+    walled: Path, train, quick_config, tmp_path: Path
+) -> None:
+    config = replace(quick_config, static_set=30, calibrate="both")
+    run = train(walled, tmp_path / "run", config, [1])
+    scene = Scene.of(run)
+    own = Backgrounds.of(scene)
+    assert own is not None
+    # What the capture's offsets take out before the fit comes back afterwards.
+    visible = scene.held_out.visible
+    room = scene.csi_static[visible]
+    assert np.abs(run.observations(1).static[visible] - room).max() > 1e-3 * np.abs(room).max()
+    np.testing.assert_allclose(own.evidence.static[visible], room, atol=1e-5 * np.abs(room).max())
+    np.testing.assert_allclose(own.best[visible], room, atol=1e-4 * np.abs(room).max())

@@ -4,10 +4,13 @@
 from __future__ import annotations
 
 import atexit
+import os
 import sys
 from pathlib import Path
 
-from . import register
+import bpy
+
+from . import register, unregister
 from .cli import USER_ERROR, run
 from .scene.scripts import close_scripted_file
 
@@ -26,4 +29,11 @@ def main(arguments: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    code = main(sys.argv[1:])
+    if bpy.app.version < (4, 3, 0):
+        # As a module it frees panels at exit after Python is gone, and crashes with all work done.
+        unregister()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    sys.exit(code)

@@ -66,12 +66,13 @@ def _drop_keys(item: bpy.types.Object) -> None:
     action = item.animation_data.action if item.animation_data else None
     if action is None:
         return
-    for curves in _curve_lists(action):
+    for curves in curve_lists(action):
         for curve in [curve for curve in curves if curve.data_path in _VISIBILITY]:
             curves.remove(curve)
 
 
-def _curve_lists(action: Any) -> list[Any]:
+def curve_lists(action: Any) -> list[Any]:
+    """Every list of curves of an action."""
     if hasattr(action, "fcurves"):
         return [action.fcurves]
     # Blender 5.0 keeps curves in the channel bags of strips.

@@ -99,7 +99,7 @@ class RFGS_PG_gaussians(bpy.types.PropertyGroup):
         update=_show,
     )
     opacity_threshold: bpy.props.FloatProperty(  # type: ignore[valid-type]
-        name="Opacity threshold",
+        name="Min opacity",
         description="Gaussians below this opacity are hidden",
         default=0.005,
         min=0.0,
@@ -109,7 +109,7 @@ class RFGS_PG_gaussians(bpy.types.PropertyGroup):
         update=_show,
     )
     power_threshold_db: bpy.props.FloatProperty(  # type: ignore[valid-type]
-        name="Power threshold",
+        name="Min power",
         description="Gaussians known to reflect less power [dB] are hidden",
         default=NO_POWER_DB,
         min=NO_POWER_DB,

@@ -15,6 +15,7 @@ from splat_scene import FRAMES, cloud, only_cloud
 
 from addon_rfgs.gaussians import attributes
 from addon_rfgs.gaussians.compare import compare_with_mesh
+from addon_rfgs.timing import curve_lists
 
 pytestmark = pytest.mark.usefixtures("registered")
 
@@ -127,7 +128,7 @@ def test_distances_to_a_moving_sphere(settings) -> None:
     for frame in (1, 10):
         ball.location.x = 0.5 * frame
         ball.keyframe_insert("location", frame=frame)
-    for curve in ball.animation_data.action.fcurves:
+    for curve in (curve for rows in curve_lists(ball.animation_data.action) for curve in rows):
         for key in curve.keyframe_points:
             key.interpolation = "LINEAR"
     scene.frame_set(3)

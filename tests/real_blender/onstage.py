@@ -83,7 +83,7 @@ class Stage:
         """Photographs the `WINDOW`, the `VIEW` or only its `SIDEBAR`, as OUT/NAME.png."""
         yield from self.redraw()
         shutil.copy(self._framebuffer, self.out / f"{name}.xwd")
-        place = {"WINDOW": None, "VIEW": self.view, "SIDEBAR": self.sidebar}[part]
+        place = None if part == "WINDOW" else {"VIEW": self.view, "SIDEBAR": self.sidebar}[part]
         crop = None
         if place is not None:
             crop = [place.x, self.window.height - place.y - place.height, place.width, place.height]

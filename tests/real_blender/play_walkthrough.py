@@ -12,7 +12,8 @@ from typing import Any
 import bpy
 import mathutils
 
-FRAME = 25
+#: The frame of the pictures, and those that are traced.
+FRAME, FRAMES = 25, "17:33:4"
 
 
 def play(stage: Any) -> Iterator[float]:
@@ -26,6 +27,7 @@ def play(stage: Any) -> Iterator[float]:
     yield from jobs(stage)
     yield from gaussians(stage)
     yield from paths(stage)
+    yield from channels(stage)
 
 
 def tab(stage: Any, *panels: str) -> Iterator[float]:
@@ -82,7 +84,7 @@ def jobs(stage: Any) -> Iterator[float]:
     check = stage.part("jobs.checking").CHECK
     yield from stage.wait(lambda: bool(check.versions), "environment")
     said = bpy.context.scene.rfgs.jobs
-    said.frames, said.images, said.paths = str(FRAME), False, True
+    said.frames, said.images, said.paths, said.depth = FRAMES, False, True, 1
     bpy.ops.rfgs.generate_dataset()
     bpy.ops.rfgs.train_gaussians()
     queue = stage.part("jobs.following").QUEUE
@@ -117,3 +119,23 @@ def paths(stage: Any) -> Iterator[float]:
     said.tx_device, said.rx_device, said.count, said.radius_m = 0, 2, 40, 0.012
     bpy.ops.rfgs.show_paths()
     yield from stage.shoot("paths", "VIEW")
+
+
+def channels(stage: Any) -> Iterator[float]:
+    """What was measured of a link above what the Gaussians predict, in an Image Editor."""
+    with stage.override():
+        bpy.ops.screen.screen_full_area(use_hide_panels=True)
+    yield 0.5
+    area = next(area for area in stage.window.screen.areas if area.type == "DOPESHEET_EDITOR")
+    area.ui_type = "IMAGE_EDITOR"
+    said = bpy.context.scene.rfgs.channels
+    said.tx_device, said.rx_device = 0, 2
+    bpy.ops.rfgs.show_csi()
+    with bpy.context.temp_override(window=stage.window, area=area):
+        bpy.ops.screen.screen_full_area()
+    yield 1.0
+    area = next(area for area in stage.window.screen.areas if area.type == "IMAGE_EDITOR")
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with bpy.context.temp_override(window=stage.window, area=area, region=region):
+        bpy.ops.image.view_all(fit_view=True)
+    yield from stage.shoot("channels")

@@ -87,6 +87,9 @@ class TrainArgs:
     """Weight with which Gaussians are held to their place on the body from frame to frame."""
     settle: float = 0.0
     """Share of the steps at the end, 0 to 1, in which the rates fall to nothing."""
+    power_trust: float = 0.0
+    """Exponent, 0 to 1, of reflected powers fitted to delay–angle power without phases; 0 starts
+    from equal powers, which has served better."""
     coarse: float = 0.0
     """Share of the steps, 0 to 1, in which the channel loss widens from a quarter of the band to
     all of it; not with --observe delay_power, which has no tones."""
@@ -120,6 +123,7 @@ def run(args: TrainArgs) -> int:
         density=args.density,
         coarse_share=args.coarse,
         settle_share=args.settle,
+        power_trust=args.power_trust,
         temporal=args.temporal,
         without=args.without,
     )
@@ -131,6 +135,8 @@ def run(args: TrainArgs) -> int:
         raise RfgsError(f"--temporal {args.temporal}: expected at least 0")
     if not 0.0 <= args.settle <= 1.0:
         raise RfgsError(f"--settle {args.settle}: expected a share from 0 to 1")
+    if not 0.0 <= args.power_trust <= 1.0:
+        raise RfgsError(f"--power-trust {args.power_trust}: expected an exponent from 0 to 1")
     if not 0.0 <= args.coarse <= 1.0:
         raise RfgsError(f"--coarse {args.coarse}: expected a share from 0 to 1")
     if args.coarse and args.observe == "delay_power":

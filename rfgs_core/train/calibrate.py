@@ -89,7 +89,7 @@ def _fitted_change(
     observations: Observations, config: TrainConfig, seed: int
 ) -> Complex64[np.ndarray, "tx rx subcarrier"]:
     """What Gaussians fitted to the observations predict at the visible entries."""
-    state = start_frame(observations, replace(config, power_steps=0), seed, None)
+    state = start_frame(observations, replace(config, power_trust=0.0), seed, None)
     state = solve_reflectivity(observations, state, config)
     channel = Channel.of(observations, observations.links, observations.tones)
     change = np.zeros_like(observations.delta)

@@ -50,11 +50,8 @@ class TrainConfig:
     """Moving Gaussians at the start of the first frame."""
     bodies: int = 1
     """Moving bodies in the scene; taken from the dataset's instances."""
-    power_steps: int = 20
-    """Multiplicative steps of the phase-free fit of reflected powers."""
-    power_trust: float = 0.25
-    """Exponent of the phase-free fit against its start where the band resolves a limb (10 cm);
-    coarser bands trust it in proportion to their resolution."""
+    power_trust: float = 0.0
+    """Exponent of the phase-free fit of reflected powers against equal powers; 0: no such fit."""
     solver_steps: int = 8
     """Conjugate-gradient steps for the reflectivities."""
     iterations: int = 80
@@ -98,7 +95,6 @@ class TrainConfig:
                 recipe=recipe,
                 seed=seed,
                 iterations=10_000,
-                power_steps=0,
                 refine_levels=0,
             )
         return TrainConfig(objective=objective, recipe=recipe, seed=seed)

@@ -28,18 +28,15 @@ from rfgs_core.train.reflectivity import posterior_mean
 from rfgs_core.train.sampling import encode
 from rfgs_core.train.start import (
     START_SCALES_M,
-    draw_points,
+    StartDensity,
     gaussians_at,
-    log_density,
     nearest_axis,
     outward_normals,
 )
 from rfgs_core.train.tracks import Tracks
 
-#: Range resolution that tells limbs from a trunk [m].
-LIMB_M = 0.1
-#: A phase-free fit that would count for less than this is not made: powers stay equal.
-LEAST_TRUST = 0.05
+#: Multiplicative steps of the phase-free fit of reflected powers.
+POWER_STEPS = 20
 
 
 @dataclass(frozen=True)
@@ -91,7 +88,7 @@ def visibility(
 def fit_power(
     observations: Observations, gaussians: Gaussians, config: TrainConfig
 ) -> Float[Tensor, "M"]:
-    """Reflected powers from delay–angle maps, pulled towards equal powers.
+    """Reflected powers from delay–angle maps: equal ones, unless the phase-free fit is trusted.
 
     The gain of each map against the model is fitted first: wall bounces and the neighbours of
     an antenna lift or lower whole device pairs.
@@ -105,13 +102,10 @@ def fit_power(
         for k, (_, _, data) in enumerate(model.parts)
     ]
     seen = seen * np.array(gain, dtype=np.float32)[:, None]
-    bandwidth_hz = float(observations.freq_hz[-1] - observations.freq_hz[0])
-    resolution_m = SPEED_OF_LIGHT / (2 * bandwidth_hz)
-    trust = config.power_trust * min(1.0, LIMB_M / resolution_m)
     power = start
-    for _ in range(config.power_steps if trust > LEAST_TRUST else 0):
+    for _ in range(POWER_STEPS if config.power_trust > 0 else 0):
         power = model.update(power, seen)
-    ratio = np.maximum(power / start, 1e-6) ** trust
+    ratio = np.maximum(power / start, 1e-6) ** config.power_trust
     # The level that suits the typical pair: the median keeps shadowed pairs out of it.
     return torch.from_numpy((start * ratio * np.median(gain)).astype(np.float32))
 
@@ -176,10 +170,11 @@ def start_frame(
     maps = pair_maps(observations)
     tracks = _followed(before, maps, observations, config.bodies)
     axes_xy = tracks.axes_xy
-    points = draw_points(maps, axes_xy, observations.bounds_m, config.num_gaussians, rng)
+    density = StartDensity.of(maps, axes_xy, observations.bounds_m)
+    points = density.draw(config.num_gaussians, rng)
     track_id, goes_on = np.arange(len(points), dtype=np.int64), None
     if before is not None:
-        points, track_id = _carry_over(before, maps, axes_xy, points)
+        points, track_id = _carry_over(before, density, axes_xy, points)
         if config.density == "motion" and earlier is not None:
             wanted = wanted_counts(
                 config.num_gaussians, paces_m_s(tracks, novelty(observations, earlier))
@@ -187,7 +182,7 @@ def start_frame(
 
             def draw(body: int, count: int) -> Float64[np.ndarray, "count 3"]:
                 own = axes_xy[body : body + 1]
-                return draw_points(maps, own, observations.bounds_m, count, rng)
+                return StartDensity.of(maps, own, observations.bounds_m).draw(count, rng)
 
             points, track_id = _at_pace(before, axes_xy, wanted, points, track_id, draw)
         goes_on = np.isin(track_id, before.track_id)
@@ -212,16 +207,15 @@ def _followed(
 
 def _carry_over(
     before: FrameState,
-    maps: PairMaps,
+    density: StartDensity,
     axes_xy: Float64[np.ndarray, "body 2"],
     fresh: Float64[np.ndarray, "M 3"],
 ) -> tuple[Float64[np.ndarray, "M 3"], Int64[np.ndarray, "M"]]:
     """Moves the earlier Gaussians with their bodies; the least supported third is fresh."""
     points = before.gaussians.means.numpy().astype(np.float64)
     points[:, :2] += (axes_xy - before.tracks.axes_xy)[before.body]
-    support = log_density(maps, axes_xy, points)
     count = min(len(points) // 3, len(fresh))
-    weakest = np.argsort(support)[:count]
+    weakest = np.argsort(density.at(points))[:count]
     track_id = before.track_id.copy()
     points[weakest] = fresh[:count]
     track_id[weakest] = track_id.max() + 1 + np.arange(count)

@@ -11,8 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Float64
-from scipy.ndimage import gaussian_filter, map_coordinates
+from jaxtyping import Float, Float64, Int64
+from scipy.ndimage import map_coordinates
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import KDTree
 
@@ -21,20 +21,22 @@ from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.train.delay_maps import delay_power_map
 from rfgs_core.train.observations import Observations
 
-#: Radius of the cylinder whose visible side is scored [m].
-BODY_RADIUS_M = 0.12
+#: Radius of the cylinder whose visible side is scored [m]: trunk and arms together.
+BODY_RADIUS_M = 0.18
 #: Height range of the cylinder [m].
 BODY_HEIGHTS_M = (0.15, 1.65)
 #: Steepness of the step from the lit to the dark side, per unit of cosine.
 SHARPNESS = 6.0
 #: Distance of neighbouring places that are tried [m].
 GROUND_STEP_M = 0.04
-#: A single body is looked for this far around the strongest column of the map [m].
-FIRST_REACH_M = 0.8
-#: Two bodies stand at least this far apart [m].
+#: A body is looked for this far around where it is expected [m].
+NEAR_M = 0.8
+#: The peaks of two bodies are at least this far apart [m].
 SEPARATION_M = 0.4
-#: A body's score is the highest this far around it [m].
+#: A peak's score is the highest this far around it, and its body stands at the mean place [m] …
 PEAK_RADIUS_M = 0.2
+#: … if weights fall by e for this much of the score: speckle alone moves the highest one.
+SCORE_SCALE = 0.1
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,19 @@ class PairMaps:
         return np.stack(
             [map_coordinates(pair, index, order=1, mode="nearest") for pair in self.power]
         )
+
+    def upright(
+        self, places: Float[np.ndarray, "P 2"], heights_m: Float[np.ndarray, "H"]
+    ) -> Float[np.ndarray, "pair P"]:
+        """Mean of `at` over the heights above each place on the ground."""
+        z = np.clip((heights_m - self.origin_m[2]) / self.spacing_m, 0, self.power.shape[3] - 1)
+        below = np.minimum(z.astype(int), max(self.power.shape[3] - 2, 0))
+        above = np.minimum(below + 1, self.power.shape[3] - 1)
+        part = z - below
+        # Trilinear reading is linear along z, so the mean over heights can be taken first.
+        column = ((1 - part) * self.power[..., below] + part * self.power[..., above]).mean(axis=3)
+        index = ((places - self.origin_m[:2]) / self.spacing_m).T
+        return np.stack([map_coordinates(pair, index, order=1, mode="nearest") for pair in column])
 
 
 def pair_maps(observations: Observations) -> PairMaps:
@@ -97,54 +112,30 @@ def pair_maps(observations: Observations) -> PairMaps:
     return PairMaps(power, points[0, 0, 0], spacing_m, tx_xyz, rx_xyz)
 
 
-def _column_peak(maps: PairMaps) -> Float64[np.ndarray, "2"]:
-    """Ground position whose upright column holds most of all pairs' amplitude."""
-    heights = maps.origin_m[2] + maps.spacing_m * np.arange(maps.power.shape[3])
-    body = (heights > 0.1) & (heights < 1.75)
-    column = np.sqrt(maps.power[..., body]).mean(axis=(0, 3))
-    column = gaussian_filter(column, BODY_RADIUS_M / maps.spacing_m)
-    index = np.unravel_index(int(column.argmax()), column.shape)
-    return maps.origin_m[:2] + maps.spacing_m * np.array(index)
-
-
 def _visible_side_score(
     maps: PairMaps, ground: Float[np.ndarray, "P 2"], floor_m: float
 ) -> Float64[np.ndarray, "P"]:
     """Mean log power of the side of a cylinder that each pair sees, per ground position."""
     angle = np.arange(16) * np.pi / 8
     normal = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    heights = floor_m + np.arange(*BODY_HEIGHTS_M, 0.12)
-    points = np.zeros((len(ground), len(angle), len(heights), 3))
-    points[..., :2] = (ground[:, None] + BODY_RADIUS_M * normal)[:, :, None]
-    points[..., 2] = heights
-    power = maps.at(points.reshape(-1, 3)).reshape(-1, *points.shape[:3]).mean(axis=3)
+    side = (ground[:, None] + BODY_RADIUS_M * normal).reshape(-1, 2)
+    power = maps.upright(side, floor_m + np.arange(*BODY_HEIGHTS_M, 0.12))
     score = np.zeros(len(ground))
-    for pair in range(len(power)):
+    for pair, around in enumerate(power.reshape(-1, len(ground), len(angle))):
         seen = np.ones((len(ground), len(angle)))
         for antenna in (maps.tx_xyz[pair], maps.rx_xyz[pair]):
             towards = antenna[:2] - ground
             towards /= np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), 1e-9)
             seen /= 1 + np.exp(-SHARPNESS * towards @ normal.T)
-        level = (seen * power[pair]).sum(axis=1) / (seen.sum(axis=1) + 0.2)
+        level = (seen * around).sum(axis=1) / (seen.sum(axis=1) + 0.2)
         score += np.log(level + 0.05)
     return score / len(power)
 
 
-def _sharpened(
-    maps: PairMaps, place: Float64[np.ndarray, "2"], bounds_m: Float64[np.ndarray, "2 3"]
-) -> Float64[np.ndarray, "2"]:
-    """The best place in the cell of a grid point."""
-    offset = np.linspace(-0.5 * GROUND_STEP_M, 0.5 * GROUND_STEP_M, 5)
-    around = place + np.stack(np.meshgrid(offset, offset, indexing="ij"), axis=-1).reshape(-1, 2)
-    inner = bounds_m[:, :2] + np.array([[BODY_RADIUS_M], [-BODY_RADIUS_M]])
-    around = np.clip(around, *inner)
-    return around[int(_visible_side_score(maps, around, float(bounds_m[0, 2])).argmax())]
-
-
 def _separate_peaks(
     ground: Float64[np.ndarray, "P 2"], score: Float64[np.ndarray, "P"], count: int
-) -> Float64[np.ndarray, "count 2"]:
-    """The best places that are apart from each other, peaks of the score before its slopes.
+) -> Int64[np.ndarray, "count"]:
+    """Rows of the best places that are apart from each other, peaks before slopes.
 
     The slope of a strong body's peak may be higher than the peak of a weak body.
     """
@@ -158,8 +149,24 @@ def _separate_peaks(
         among = free & is_peak if (free & is_peak).any() else free
         taken.append(int(np.where(among, score, -np.inf).argmax()))
         apart = np.linalg.norm(ground - ground[taken[-1]], axis=1)
-        free &= apart >= SEPARATION_M + 2 * GROUND_STEP_M
-    return ground[taken]
+        free &= apart >= SEPARATION_M
+    return np.array(taken)
+
+
+def _means_around(
+    ground: Float64[np.ndarray, "P 2"],
+    score: Float64[np.ndarray, "P"],
+    peaks: Int64[np.ndarray, "count"],
+) -> Float64[np.ndarray, "count 2"]:
+    """Mean place around each peak, weighed by score; a place counts for the nearest peak only."""
+    apart = np.linalg.norm(ground[:, None] - ground[peaks], axis=2)
+    nearest = apart.argmin(axis=1)
+    means = np.zeros((len(peaks), 2))
+    for row, peak in enumerate(peaks):
+        around = (nearest == row) & (apart[:, row] <= PEAK_RADIUS_M)
+        weight = np.exp((score[around] - score[peak]) / SCORE_SCALE)
+        means[row] = weight @ ground[around] / weight.sum()
+    return means
 
 
 def locate_bodies(
@@ -167,7 +174,7 @@ def locate_bodies(
     bounds_m: Float64[np.ndarray, "2 3"],
     count: int = 1,
     near: Float[np.ndarray, "count 2"] | None = None,
-    reach_m: Float[np.ndarray, "count"] | float = FIRST_REACH_M,
+    reach_m: Float[np.ndarray, "count"] | float = NEAR_M,
 ) -> Float64[np.ndarray, "count 2"]:
     """Ground positions of upright bodies.
 
@@ -188,17 +195,13 @@ def locate_bodies(
     low, high = bounds_m[:, :2] + np.array([[BODY_RADIUS_M], [-BODY_RADIUS_M]])
     axes = [np.arange(low[k], high[k] + 1e-9, GROUND_STEP_M) for k in range(2)]
     ground = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-    around = near
-    if around is None and count == 1:
-        around = _column_peak(maps)[None]
-    if around is not None:
-        apart = np.linalg.norm(ground[:, None] - around, axis=2)
-        # Of a reach that holds no ground, the nearest point of it. Cells lie within the reach.
-        within = np.maximum(np.asarray(reach_m) - GROUND_STEP_M, apart.min(axis=0))
+    if near is not None:
+        apart = np.linalg.norm(ground[:, None] - near, axis=2)
+        # Of a reach that holds no ground, the nearest point of it.
+        within = np.maximum(reach_m, apart.min(axis=0))
         ground = ground[(apart <= within).any(axis=1)]
     score = _visible_side_score(maps, ground, float(bounds_m[0, 2]))
-    taken = _separate_peaks(ground, score, count)
-    found = np.array([_sharpened(maps, place, bounds_m) for place in taken])
+    found = _means_around(ground, score, _separate_peaks(ground, score, count))
     if near is None:
         return found
     body, place = linear_sum_assignment(np.sum((near[:, None] - found) ** 2, axis=2))

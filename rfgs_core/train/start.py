@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -19,6 +20,11 @@ PRIOR_RADIUS_M = 0.20
 PRIOR_HEIGHT_M, PRIOR_HEIGHT_FALL_M = 1.6, 0.08
 #: Exponent of the matched filter against the prior, chosen on a room that is not in the demo.
 EVIDENCE_EXPONENT = 0.25
+#: How much of that moves Gaussians from one height to another: what is below or above the
+#: antennas mirrors waves away from them, and answers weaker than a trunk of the same surface.
+HEIGHT_EVIDENCE = 0.1
+#: Edge of the cells in which the density is taken as even [m].
+CELL_M = 0.04
 #: Standard deviation of a new Gaussian along the surface and across it [m].
 START_SCALES_M = (0.04, 0.04, 0.025)
 #: Layers that the new Gaussians put on a body's silhouette. The shadow model multiplies
@@ -26,17 +32,6 @@ START_SCALES_M = (0.04, 0.04, 0.025)
 START_COVERAGE = 1.5
 #: Silhouette of a standing body [m²].
 SILHOUETTE_M2 = 0.75
-
-
-def log_density(
-    maps: PairMaps, axes_xy: Float[np.ndarray, "body 2"], points: Float[np.ndarray, "N 3"]
-) -> Float64[np.ndarray, "N"]:
-    """Unnormalised log density of moving surface at `points`, given the bodies' axes."""
-    radius = np.linalg.norm(points[:, None, :2] - axes_xy[None], axis=2).min(axis=1)
-    above = np.clip(points[:, 2] - PRIOR_HEIGHT_M, 0.0, None)
-    prior = -0.5 * (radius / PRIOR_RADIUS_M) ** 2 - 0.5 * (above / PRIOR_HEIGHT_FALL_M) ** 2
-    evidence = np.log(maps.at(points) + 1e-3).mean(axis=0)
-    return prior + EVIDENCE_EXPONENT * evidence
 
 
 def nearest_axis(
@@ -55,25 +50,70 @@ def outward_normals(
     return np.concatenate([flat, np.zeros((len(points), 1))], axis=1)
 
 
-def draw_points(
-    maps: PairMaps,
-    axes_xy: Float[np.ndarray, "body 2"],
-    bounds_m: Float64[np.ndarray, "2 3"],
-    count: int,
-    rng: np.random.Generator,
-) -> Float64[np.ndarray, "count 3"]:
-    """Draws positions from the density of `log_density`, on a jittered 4 cm grid."""
-    step, reach = 0.04, 4 * PRIOR_RADIUS_M
-    low = np.maximum([*(axes_xy.min(axis=0) - reach), bounds_m[0, 2]], bounds_m[0])
-    high = np.minimum([*(axes_xy.max(axis=0) + reach), bounds_m[0, 2] + 2.1], bounds_m[1])
-    axes = [np.arange(low[k] + step / 2, high[k], step) for k in range(3)]
-    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    density = log_density(maps, axes_xy, grid)
-    share = np.exp(density - density.max())
-    chosen = rng.choice(len(grid), size=count, p=share / share.sum())
-    points = grid[chosen] + rng.uniform(-step / 2, step / 2, (count, 3))
-    # The last cell along an axis may stick out of the scene.
-    return np.clip(points, low, high)
+@dataclass(frozen=True)
+class StartDensity:
+    """Where new Gaussians are drawn: body-sized prior times matched filter, in cubic cells.
+
+    All bodies get equally many Gaussians, and heights about what the prior gives them. The
+    matched filter decides where within a height, and to a small part between heights.
+    """
+
+    share: Float64[np.ndarray, "x y z"]
+    """Probability of each cell."""
+    low_m: Float64[np.ndarray, "3"]
+    """Lower corner of the first cell [m]."""
+    high_m: Float64[np.ndarray, "3"]
+    """Upper corner that nothing is drawn beyond [m]."""
+
+    @staticmethod
+    def of(
+        maps: PairMaps,
+        axes_xy: Float[np.ndarray, "body 2"],
+        bounds_m: Float64[np.ndarray, "2 3"],
+    ) -> StartDensity:
+        """The density around bodies at `axes_xy`."""
+        reach_m = 4 * PRIOR_RADIUS_M
+        low = np.maximum([*(axes_xy.min(axis=0) - reach_m), bounds_m[0, 2]], bounds_m[0])
+        high = np.minimum([*(axes_xy.max(axis=0) + reach_m), bounds_m[0, 2] + 2.1], bounds_m[1])
+        axes = [np.arange(low[k] + CELL_M / 2, high[k], CELL_M) for k in range(3)]
+        cells = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+        points = cells.reshape(-1, 3)
+        prior = np.exp(log_prior(points, axes_xy)).reshape(cells.shape[:3])
+        evidence = np.log(maps.at(points) + 1e-3).mean(axis=0).reshape(cells.shape[:3])
+        share = prior * np.exp(EVIDENCE_EXPONENT * (evidence - evidence.max()))
+        body = nearest_axis(points, axes_xy).reshape(cells.shape[:3])
+        for index in range(len(axes_xy)):
+            mine = body == index
+            got = np.where(mine, share, 0).sum(axis=(0, 1))
+            wanted = np.where(mine, prior, 0).sum(axis=(0, 1))
+            lift = (wanted / np.maximum(got, 1e-300)) ** (1 - HEIGHT_EVIDENCE)
+            level = lift / max((lift * got).sum(), 1e-300)
+            share = np.where(mine, share * level, share)
+        return StartDensity(share / share.sum(), low, high)
+
+    def draw(self, count: int, rng: np.random.Generator) -> Float64[np.ndarray, "count 3"]:
+        """Positions [m]: cells by chance, anywhere within them."""
+        cell = rng.choice(self.share.size, size=count, p=self.share.ravel())
+        index = np.stack(np.unravel_index(cell, self.share.shape), axis=1)
+        points = self.low_m + (index + rng.uniform(0, 1, (count, 3))) * CELL_M
+        # The last cell along an axis may stick out of the scene.
+        return np.clip(points, self.low_m, self.high_m)
+
+    def at(self, points: Float[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N"]:
+        """Probability of the cells that points lie in, zero outside of all."""
+        index = np.floor((points - self.low_m) / CELL_M).astype(int)
+        inside = ((index >= 0) & (index < self.share.shape)).all(axis=1)
+        index = np.where(inside[:, None], index, 0)
+        return np.where(inside, self.share[tuple(index.T)], 0.0)
+
+
+def log_prior(
+    points: Float[np.ndarray, "N 3"], axes_xy: Float[np.ndarray, "body 2"]
+) -> Float64[np.ndarray, "N"]:
+    """Unnormalised log density of the surface of upright bodies."""
+    radius = np.linalg.norm(points[:, None, :2] - axes_xy[None], axis=2).min(axis=1)
+    above = np.clip(points[:, 2] - PRIOR_HEIGHT_M, 0.0, None)
+    return -0.5 * (radius / PRIOR_RADIUS_M) ** 2 - 0.5 * (above / PRIOR_HEIGHT_FALL_M) ** 2
 
 
 def quats_from_normals(normals: Float[np.ndarray, "N 3"]) -> Float[Tensor, "N 4"]:

@@ -108,7 +108,6 @@ def quick_config() -> TrainConfig:
     """Few Gaussians and steps."""
     return TrainConfig(
         num_gaussians=40,
-        power_steps=3,
         solver_steps=3,
         iterations=4,
         batch_entries=256,

@@ -11,7 +11,14 @@ import pytest
 
 from rfgs_core.radio import preset
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
-from rfgs_core.train.localise import PairMaps, _separate_peaks, locate_bodies, pair_maps
+from rfgs_core.train.localise import (
+    BODY_RADIUS_M,
+    GROUND_STEP_M,
+    PairMaps,
+    _separate_peaks,
+    locate_bodies,
+    pair_maps,
+)
 from rfgs_core.train.observations import Observations
 
 ROOM_M = np.array([[0.0, 0.0, 0.0], [3.6, 3.2, 2.2]])
@@ -101,15 +108,35 @@ def test_what_is_expected_restricts_the_search_and_tells_bodies_apart(maps_of) -
     # Expected outside of the room, a body is taken to stand at its edge.
     outside = np.array([[9.0, 1.5]])
     found = locate_bodies(maps, ROOM_M, count=1, near=outside, reach_m=np.array([0.5]))
-    assert found[0, 0] > ROOM_M[1, 0] - 0.12 - 0.04 - 1e-9
+    assert found[0, 0] > ROOM_M[1, 0] - BODY_RADIUS_M - GROUND_STEP_M - 1e-9
 
 
 def test_bodies_do_not_stand_in_walls_or_in_each_other(maps_of) -> None:
     found = locate_bodies(maps_of((2.1, 1.3)), ROOM_M, count=3)
-    assert (found >= 0.12 - 1e-9).all()
-    assert (found <= ROOM_M[1, :2] - 0.12 + 1e-9).all()
+    assert (found >= BODY_RADIUS_M - 1e-9).all()
+    assert (found <= ROOM_M[1, :2] - BODY_RADIUS_M + 1e-9).all()
     apart = np.linalg.norm(found[:, None] - found, axis=2)
     assert apart[np.triu_indices(3, 1)].min() >= 0.4
+
+
+def test_reading_a_column_is_the_mean_of_reading_its_points(maps_of) -> None:
+    """Also above the uppermost grid point, where the border value continues."""
+    maps = maps_of((2.1, 1.3))
+    places = np.random.default_rng(0).uniform(-0.2, 3.4, (40, 2))
+    heights_m = np.array([-0.3, 0.02, 0.9, 1.234, 2.15, 2.9])
+    points = np.concatenate([np.column_stack([places, np.full(len(places), z)]) for z in heights_m])
+    plain = maps.at(points).reshape(len(maps.power), len(heights_m), -1).mean(axis=1)
+    np.testing.assert_allclose(maps.upright(places, heights_m), plain, rtol=1e-5)
+
+
+def test_a_body_is_found_where_the_loudest_column_stands_elsewhere(maps_of) -> None:
+    """One pair may hear a thing louder than all pairs together hear the body."""
+    maps = maps_of((2.1, 1.3))
+    power = maps.power.copy()
+    ghost = np.round((np.array([0.8, 2.4]) - maps.origin_m[:2]) / maps.spacing_m).astype(int)
+    power[0, ghost[0] - 2 : ghost[0] + 3, ghost[1] - 2 : ghost[1] + 3] += 40 * power[0].max()
+    found = locate_bodies(replace(maps, power=power), ROOM_M)
+    assert np.linalg.norm(found[0] - [2.1, 1.3]) < 0.06
 
 
 def test_maps_have_mean_one_and_read_between_grid_points(maps_of) -> None:
@@ -140,6 +167,6 @@ def test_a_weak_body_is_not_lost_to_the_slope_of_a_strong_one() -> None:
     score = 4.0 * np.exp(-((apart[0] / 0.9) ** 2)) + np.exp(-((apart[1] / 0.3) ** 2))
     # Half a metre away the strong one still scores three times as much as the weak one.
     assert 4.0 * np.exp(-((0.5 / 0.9) ** 2)) > 2.5
-    found = _separate_peaks(ground, score, 2)
+    found = ground[_separate_peaks(ground, score, 2)]
     assert np.linalg.norm(found - [strong, weak], axis=1).max() < 0.05
-    assert len(np.unique(_separate_peaks(ground, score, 4), axis=0)) == 4
+    assert len(np.unique(_separate_peaks(ground, score, 4))) == 4

@@ -12,9 +12,12 @@ import torch
 from rfgs_core.gaussians.model import rotation_matrices
 from rfgs_core.train.localise import PairMaps
 from rfgs_core.train.start import (
-    draw_points,
+    CELL_M,
+    HEIGHT_EVIDENCE,
+    StartDensity,
     gaussians_at,
-    log_density,
+    log_prior,
+    nearest_axis,
     outward_normals,
     quats_from_normals,
 )
@@ -50,28 +53,64 @@ def test_normals_point_away_from_the_nearest_axis() -> None:
     np.testing.assert_allclose(normals, [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, 0, 0]], atol=1e-12)
 
 
-def test_density_is_a_body_where_the_maps_tell_nothing() -> None:
+def test_the_prior_is_a_body() -> None:
     """Gaussian of 0.2 m around the axis; a half Gaussian of 0.08 m above 1.6 m."""
     axes = np.array([[0.7, 0.7]])
     places = np.array([[0.7, 0.7, 1.0], [0.9, 0.7, 1.0], [0.7, 0.3, 0.2], [0.7, 0.7, 1.76]])
-    got = log_density(flat_maps(), axes, places)
+    got = log_prior(places, axes)
     np.testing.assert_allclose(got - got[0], [0, -0.5, -2.0, -2.0], atol=1e-6)
 
 
-def test_density_follows_the_maps_with_a_quarter_power() -> None:
-    power = np.ones((2, 8, 8, 10), np.float32)
-    power[0, 3:5] = math.exp(8.0)
+def test_without_evidence_the_density_is_the_prior() -> None:
     axes = np.array([[0.7, 0.7]])
-    got = log_density(flat_maps(power), axes, np.array([[0.7, 0.7, 1.0]]))
-    plain = log_density(flat_maps(), axes, np.array([[0.7, 0.7, 1.0]]))
+    density = StartDensity.of(flat_maps(), axes, BOUNDS_M)
+    covered_m = density.low_m + CELL_M * np.array(density.share.shape)
+    places = np.random.default_rng(0).uniform(density.low_m, covered_m, (200, 3))
+    cells = density.low_m + (np.floor((places - density.low_m) / CELL_M) + 0.5) * CELL_M
+    prior = np.exp(log_prior(cells, axes))
+    got = density.at(places)
+    np.testing.assert_allclose(got / got.sum(), prior / prior.sum(), rtol=1e-6)
+    assert density.share.sum() == pytest.approx(1.0)
+    assert density.at(BOUNDS_M - 5.0).tolist() == [0.0, 0.0]
+
+
+def test_within_a_height_density_follows_the_maps_with_a_quarter_power() -> None:
+    power = np.ones((2, 8, 8, 10), np.float32)
+    power[0, 4:] = math.exp(8.0)
+    axes = np.array([[0.7, 0.7]])
+    loud = StartDensity.of(flat_maps(power), axes, BOUNDS_M).share
+    plain = StartDensity.of(flat_maps(), axes, BOUNDS_M).share
+    lift = np.log(loud / plain)
     # Mean of the two maps' logarithms, 8 and 0, times a quarter.
-    assert (got - plain).item() == pytest.approx(1.0, abs=1e-3)
+    np.testing.assert_allclose(lift[-1] - lift[0], 1.0, atol=1e-3)
+
+
+def test_between_heights_it_follows_them_far_less() -> None:
+    power = np.full((2, 8, 8, 10), 1.0, np.float32)
+    power[:, :, :, 5:] = math.exp(8.0)
+    axes = np.array([[0.7, 0.7]])
+    loud = StartDensity.of(flat_maps(power), axes, BOUNDS_M).share.sum(axis=(0, 1))
+    plain = StartDensity.of(flat_maps(), axes, BOUNDS_M).share.sum(axis=(0, 1))
+    lift = np.log(loud / plain)
+    assert lift[-1] - lift[0] == pytest.approx(0.25 * 8.0 * HEIGHT_EVIDENCE, abs=1e-3)
+
+
+def test_a_loud_body_gets_no_more_gaussians_than_a_quiet_one() -> None:
+    bounds_m = np.array([[0.0, 0.0, 0.0], [4.0, 2.0, 2.0]])
+    power = np.ones((2, 20, 10, 10), np.float32)
+    power[:, :10] = 100.0
+    axes = np.array([[1.0, 1.0], [3.0, 1.0]])
+    points = StartDensity.of(flat_maps(power), axes, bounds_m).draw(
+        20_000, np.random.default_rng(3)
+    )
+    counts = np.bincount(nearest_axis(points, axes))
+    assert counts[0] == pytest.approx(10_000, abs=5 * math.sqrt(5000))
 
 
 @pytest.mark.parametrize("axis", [(0.75, 0.7), (0.13, 0.13), (1.4, 1.34)])
 def test_drawn_points_stay_in_bounds(axis: tuple[float, float]) -> None:
     rng = np.random.default_rng(1)
-    points = draw_points(flat_maps(), np.array([axis]), BOUNDS_M, 4000, rng)
+    points = StartDensity.of(flat_maps(), np.array([axis]), BOUNDS_M).draw(4000, rng)
     assert points.shape == (4000, 3)
     assert (points >= BOUNDS_M[0]).all()
     assert (points <= BOUNDS_M[1]).all()
@@ -82,7 +121,7 @@ def test_drawn_points_stay_in_bounds(axis: tuple[float, float]) -> None:
 def test_drawn_points_follow_the_density() -> None:
     bounds_m = np.array([[-2.0, -2.0, 0.0], [2.0, 2.0, 2.5]])
     rng = np.random.default_rng(2)
-    points = draw_points(flat_maps(), np.array([[0.1, -0.2]]), bounds_m, 20_000, rng)
+    points = StartDensity.of(flat_maps(), np.array([[0.1, -0.2]]), bounds_m).draw(20_000, rng)
     radius = points[:, :2] - [0.1, -0.2]
     # 5 standard errors; cells of 4 cm widen a standard deviation of 0.2 m by 0.2 %.
     error = 5 * 0.2 / math.sqrt(2 * 20_000)
@@ -99,7 +138,7 @@ def test_drawn_points_follow_the_density() -> None:
 def test_the_draw_is_that_of_its_seed() -> None:
     axes = np.array([[0.7, 0.7]])
     draws = [
-        draw_points(flat_maps(), axes, BOUNDS_M, 50, np.random.default_rng(seed))
+        StartDensity.of(flat_maps(), axes, BOUNDS_M).draw(50, np.random.default_rng(seed))
         for seed in (0, 0, 1)
     ]
     np.testing.assert_array_equal(draws[0], draws[1])

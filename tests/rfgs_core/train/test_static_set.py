@@ -12,6 +12,7 @@ import pytest
 import torch
 from scipy.spatial import KDTree
 
+from rfgs_core.cli import main
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.evaluate.background import Backgrounds, background_metrics
 from rfgs_core.evaluate.scene import Scene
@@ -254,3 +255,19 @@ def test_a_calibrated_run_tells_the_room_as_its_devices_hear_it(
     assert np.abs(run.observations(1).static[visible] - room).max() > 1e-3 * np.abs(room).max()
     np.testing.assert_allclose(own.evidence.static[visible], room, atol=1e-5 * np.abs(room).max())
     np.testing.assert_allclose(own.best[visible], room, atol=1e-4 * np.abs(room).max())
+
+
+def test_predict_hears_the_room_where_there_is_one(own_run: Run, tmp_path: Path, capsys) -> None:
+    out = tmp_path / "new.npz"
+    command = ["predict", str(own_run.path), "--tx", "0.5,0.5,1.0", "--rx", "2.6,0.4,1.5"]
+    command += ["--room", "--out", str(out)]
+    assert main(command) == 0
+    assert "what the static Gaussians scatter" in capsys.readouterr().out
+    with np.load(out, allow_pickle=False) as stored:
+        parts = stored["csi_scatter"] + stored["csi_direct"]
+        np.testing.assert_allclose(stored["csi"], parts + stored["csi_room"], rtol=1e-5)
+        assert np.abs(stored["csi_room"]).max() > 0
+        assert "guess it elsewhere" in str(stored["note"])
+    (own_run.path / static_files.HEAD_FILE).unlink()
+    assert main(command) != 0
+    assert "has no static Gaussians; train it with --static-set" in capsys.readouterr().err

@@ -25,7 +25,7 @@ _PASSING = {
     # Many, and nothing to an add-on that does not render when a button is pressed.
     *("tool_settings", "view_layers", "eevee", "cycles", "cycles_curves", "render", "display"),
 }
-_DEEPEST = 3
+_DEEPEST = 4
 _SIMPLE = {"BOOLEAN", "INT", "FLOAT", "STRING", "ENUM"}
 
 
@@ -103,7 +103,9 @@ def _digest(rows: Any, field: str, width: int, kind: type = np.float32) -> str:
 
 
 def _struct(item: Any, depth: int) -> Any:
-    free = isinstance(item, bpy.types.ID | bpy.types.NodesModifier)
+    # Before 5.2 the inputs of geometry nodes are free properties of their modifier.
+    inputs = isinstance(item, bpy.types.NodesModifier) and not hasattr(item, "properties")
+    free = inputs or isinstance(item, bpy.types.ID)
     row: dict[str, Any] = {"custom": _custom(item)} if free else {}
     if depth > _DEEPEST:
         return row

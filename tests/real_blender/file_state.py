@@ -22,7 +22,8 @@ _PASSING = {
     *("rna_type", "original", "preview", "depsgraph", "is_evaluated", "session_uid", "users"),
     *("is_embedded_data", "is_runtime_data", "execution_time", "asset_data", "id_data"),
     *("is_missing", "tag", "bl_system_properties", "bindings"),
-    # Many, and nothing to an add-on that does not render when a button is pressed.
+    # Many, and nothing to an add-on whose buttons neither render nor pose.
+    *("pose", "bones", "edit_bones", "parent_bone"),
     *("tool_settings", "view_layers", "eevee", "cycles", "cycles_curves", "render", "display"),
 }
 _DEEPEST = 4

@@ -13,7 +13,6 @@ import numpy as np
 from ..errors import AddonError
 from ..files import replacing
 from .ply_header import TYPES, Element, Header, read_header
-from .text_numbers import plain_numbers
 
 #: Vertices by property, in file order; the type is the file's own, in this machine's byte order.
 Columns = dict[str, np.ndarray]
@@ -104,12 +103,6 @@ def _read_text(path: Path, header: Header, length: int) -> Columns:
     with path.open("rb") as stream:
         stream.seek(header.size)
         body = stream.read()
-    names = [name for name, _ in header.vertex.fields]
-    shape = header.vertex.count, len(names)
-    if header.last and {kind for _, kind in header.vertex.fields} == {"f4"}:
-        plain = plain_numbers(body, wanted)
-        if plain is not None:
-            return _split(names, plain[skipped:].reshape(shape))
     # The zero behind the last number is only reached if nothing before it is no number.
     numbers = _numbers(path, body + b"\n0", wanted + 1 if not header.last else -1)
     spare = len(numbers) - wanted - 1
@@ -120,7 +113,9 @@ def _read_text(path: Path, header: Header, length: int) -> Columns:
         )
     if spare > 0:
         raise AddonError(f"{path}: holds {spare} numbers too many")
-    found = _split(names, numbers[skipped:wanted].reshape(shape))
+    names = [name for name, _ in header.vertex.fields]
+    table = numbers[skipped:wanted].reshape(header.vertex.count, len(names))
+    found = _split(names, table)
     return {name: _typed(path, name, found[name], kind) for name, kind in header.vertex.fields}
 
 

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import itertools
 import struct
 import tracemalloc
 import zipfile
@@ -15,7 +14,7 @@ import pytest
 from splat_files import BARE, COLUMNS, FORMATS, REST, rows_of, write, write_run
 
 from addon_rfgs.errors import AddonError
-from addon_rfgs.gaussians import cloud_mesh, features, ply, splats, text_numbers
+from addon_rfgs.gaussians import cloud_mesh, features, ply, splats
 from addon_rfgs.gaussians.clouds import Inspection, import_gaussians
 
 pytestmark = pytest.mark.usefixtures("registered")
@@ -37,73 +36,11 @@ def test_gaussians_written_by_plyfile_are_read_with_activations(tmp_path: Path) 
     np.testing.assert_allclose(cloud.colors[:, 2], expected, rtol=1e-6)
 
 
-@pytest.mark.parametrize("form", FORMATS)
-@pytest.mark.parametrize("faces", [0, 3])
-@pytest.mark.parametrize(
-    ("names", "kinds"),
-    [
-        (BARE, {}),
-        (COLUMNS, {}),
-        ([*COLUMNS, *REST], {}),
-        ([*COLUMNS, "red", "label", "time"], {"red": "u1", "label": "i4", "time": "f8"}),
-        (["label", *COLUMNS[::-1]], {"label": "u4", "x": "f8"}),
-    ],
-    ids=["bare", "usual", "rest", "extra", "shuffled"],
-)
-def test_every_property_of_every_format_is_read_as_plyfile_wrote_it(
-    tmp_path: Path, form: str, faces: int, names: list[str], kinds: dict[str, str]
-) -> None:
-    rows = rows_of(names, 20, **kinds)
-    if "label" in kinds:
-        rows["label"][0] = np.iinfo(rows["label"].dtype).max
-    columns = ply.read_columns(write(tmp_path / "a.ply", rows, form, faces))
-    assert list(columns) == names
-    for name in names:
-        assert columns[name].dtype == rows[name].dtype.newbyteorder("=")
-        assert columns[name].tobytes() == rows[name].tobytes(), name
-    again = tmp_path / "again.ply"
-    ply.write_columns(again, columns)
-    assert again.read_bytes() == write(tmp_path / "b.ply", rows).read_bytes()
-
-
-@pytest.mark.parametrize("form", ["%.18g", "%.9g", "%g", "%.7f", "%d", "%.9f", "%.17g"])
-def test_numbers_of_a_text_are_pythons_own(form: str) -> None:
-    rng = np.random.default_rng(8)
-    values = rng.normal(size=30_000) * 10.0 ** rng.integers(-3, 6, 30_000)
-    halves = np.float32(values[:50]).astype(np.float64) * (1 + 2.0**-24)  # between two floats
-    words = [form % value for value in [*values, *halves, -0.0, 0.0]]
-    text = "".join(word + separator for word, separator in zip(words, itertools.cycle(" \n\t ")))
-    found = text_numbers.plain_numbers(text.encode(), len(words))
-    expected = np.array([float(word) for word in words]).astype(np.float32)
-    assert found is not None and found.tobytes() == expected.tobytes()
-    assert text_numbers.plain_numbers(text.encode(), len(words) - 1) is None
-
-
-def test_mutated_texts_are_read_as_python_reads_them_or_left_alone() -> None:
-    rng = np.random.default_rng(9)
-    words = [f"{value:.7g}" for value in rng.normal(size=300)]
-    plain = 0
-    for _ in range(400):
-        text = bytearray(" ".join(words).encode())
-        for _ in range(int(rng.integers(1, 4))):
-            text[int(rng.integers(len(text)))] = rng.choice(list(b"0123456789..--+e  \n_xn\x00"))
-        said = bytes(text).split()
-        found = text_numbers.plain_numbers(bytes(text), len(said))
-        if found is not None:
-            plain += 1
-            with np.errstate(over="ignore"):
-                expected = np.array([float(word) for word in said]).astype(np.float32)
-            assert found.tobytes() == expected.tobytes(), text
-    assert 100 < plain < 390
-
-
 def test_text_and_binary_of_one_cloud_are_the_same(tmp_path: Path) -> None:
     rows = rows_of([*COLUMNS, *REST], 3000, seed=4)
     binary = ply.read_columns(write(tmp_path / "binary.ply", rows))
     text = ply.read_columns(write(tmp_path / "text.ply", rows, "text"))
     assert all(text[name].tobytes() == binary[name].tobytes() for name in binary)
-    body = (tmp_path / "text.ply").read_bytes().partition(b"end_header\n")[2]
-    assert text_numbers.plain_numbers(body, 3000 * len(binary)) is not None, "the quick way"
 
 
 def test_elements_before_the_vertices_are_passed_over(tmp_path: Path) -> None:

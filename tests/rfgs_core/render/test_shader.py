@@ -15,6 +15,7 @@ from rfgs_core.gaussians.ply import cloud_of, write_ply
 from rfgs_core.render.shader import Shader, ShaderConfig, fit_shader
 from rfgs_core.render.view import (
     SHADER_FILE,
+    STATIC_FILE,
     camera_of,
     color_run_files,
     colored_cloud,
@@ -163,10 +164,18 @@ def test_only_colours_change_in_the_files_of_a_run(hand_made_run) -> None:
 def test_static_gaussians_come_before_the_moving_ones(hand_made_run, gaussians) -> None:
     moving = hand_made_run.clouds[1]
     attributes = hand_made_run.attributes(1)
-    hand_made_run.clouds[1] = Gaussians.join(gaussians([[9.0, 9.0, 9.0]]), moving)
+    still = gaussians([[9.0, 9.0, 9.0]])
+    hand_made_run.clouds[1] = Gaussians.join(still, moving)
     hand_made_run.attributes = lambda frame: attributes
     assert torch.equal(moving_gaussians(hand_made_run, 1).means, moving.means)
-    # Reflected power is known of the moving ones alone, so the joined file does not claim it.
+    (hand_made_run.path / STATIC_FILE).parent.mkdir(parents=True, exist_ok=True)
+    power_db = np.array([-20.0], np.float32)
+    write_ply(hand_made_run.path / STATIC_FILE, cloud_of(still, rf_power_db=power_db))
+    joined = colored_cloud(hand_made_run, 1, None)
+    np.testing.assert_allclose(joined.means[0], 9.0)
+    np.testing.assert_array_equal(joined.rf_power_db, [-20.0, *attributes["rf_power_db"]])
+    # Where it is not known of the static ones, the joined file does not claim it.
+    write_ply(hand_made_run.path / STATIC_FILE, cloud_of(still))
     assert colored_cloud(hand_made_run, 1, None).rf_power_db is None
 
 

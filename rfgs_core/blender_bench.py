@@ -44,10 +44,10 @@ def bench_blender(
         loop_points: Points of the loop it is compared with, whose time is scaled up.
 
     Returns:
-        `import_s` with the first evaluation, `import_loop_s` of a loop over points and their
-        ratio; `points_fps`, `ellipsoids_fps` and `solid_fps` (real meshes for the Solid view),
-        frame changes with evaluation of every cloud for the first time, `loop_fps` of writing
-        positions point by point and `points_ratio`.
+        `import_s` with the first evaluation, `import_loop_s` of a loop over points, each the
+        quickest of several, and their ratio; `points_fps`, `ellipsoids_fps` and `solid_fps` (real
+        meshes for the Solid view), frame changes with evaluation of every cloud for the first
+        time, `loop_fps` of writing positions point by point and `points_ratio`.
 
     Raises:
         MissingToolError: There is no such Blender, or no add-on beside this package.

@@ -6,6 +6,7 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
+import numpy as np
 
 from .coloring import COLOR_ATTRIBUTE
 from .look import material
@@ -79,8 +80,11 @@ def _build_group() -> Any:
     shown = build.switch(build.either(build.input("Ellipsoids"), solid), points, shapes)
     real = _real(build, lean, shapes)
     build.link(build.switch(solid, shown, real), output.inputs["Geometry"])
-    for index, node in enumerate(group.nodes):
-        node.location = (220 * (index % 8), -260 * (index // 8))
+    # All at once: the group is updated after every single assignment.
+    index = np.arange(len(group.nodes))
+    group.nodes.foreach_set(
+        "location", np.stack([220 * (index % 8), -260 * (index // 8)], 1).ravel().astype(np.float32)
+    )
     return group
 
 
@@ -241,7 +245,7 @@ def _real(build: _Builder, cloud: Any, shapes: Any) -> Any:
     build.link(build.compare("GREATER_THAN", index, 0, "INT"), rest.inputs["Selection"])
     join = build.nodes.new("GeometryNodeJoinGeometry")
     for part in (shapes, rest.outputs[0]):
-        build.link(_without(build, part, *_USED), join.inputs[0])
+        build.link(part, join.inputs[0])
     real = build.nodes.new("GeometryNodeRealizeInstances")
-    build.link(join.outputs[0], real.inputs["Geometry"])
+    build.link(_without(build, join.outputs[0], *_USED), real.inputs["Geometry"])
     return build.material(real.outputs[0], "GEOMETRY")

@@ -104,13 +104,16 @@ def fitted_shader(run: TrainedRun) -> Shader | None:
 
 def moving_gaussians(run: TrainedRun, frame: int) -> Gaussians:
     """The Gaussians of a frame without the static ones."""
-    return run.gaussians(frame).select(~static_rows(run, frame)).detach()
+    everything = run.gaussians(frame).detach()
+    return everything.select(~static_rows(everything, run.attributes(frame)))
 
 
-def static_rows(run: TrainedRun, frame: int) -> Bool[torch.Tensor, "M"]:
-    """Which of a frame's Gaussians stand still."""
-    count = len(run.gaussians(frame))
-    return torch.arange(count) < count - len(run.attributes(frame)["features"])
+def static_rows(
+    everything: Gaussians, attributes: Mapping[str, np.ndarray]
+) -> Bool[torch.Tensor, "M"]:
+    """Which of a frame's Gaussians stand still: those without attributes, which come first."""
+    count = len(everything)
+    return torch.arange(count) < count - len(attributes["features"])
 
 
 def render_view(run: TrainedRun, camera: str | Camera, frame: int) -> View:
@@ -130,7 +133,9 @@ def render_view(run: TrainedRun, camera: str | Camera, frame: int) -> View:
     eye = camera if isinstance(camera, Camera) else camera_of(run.sequence, camera)
     file = run.sequence.files.image_empty(eye.name)
     if not file.is_file():
-        return _render(run, run.gaussians(frame).detach(), eye, MID_GREY, static_rows(run, frame))
+        everything = run.gaussians(frame).detach()
+        still = static_rows(everything, run.attributes(frame))
+        return _render(run, everything, eye, MID_GREY, still)
     empty = _colors(run.sequence.image_empty(eye.name), eye, file)
     return _render(run, moving_gaussians(run, frame), eye, torch.from_numpy(empty))
 
@@ -189,7 +194,7 @@ def color_run_files(run: TrainedRun, shader: Shader | None) -> None:
     """
     first = run.frames[0]
     everything = run.gaussians(first).detach()
-    static = static_rows(run, first)
+    static = static_rows(everything, run.attributes(first))
     sets = {"point_cloud.ply": everything}
     for frame in run.frames:
         sets[f"gaussians/{frame:06d}.ply"] = moving_gaussians(run, frame)
@@ -212,10 +217,10 @@ def colored_cloud(run: TrainedRun, frame: int, shader: Shader | None) -> Gaussia
 
     The reflected power is added where the run knows it for every Gaussian.
     """
-    attributes = run.attributes(frame)
-    moving, rows = moving_gaussians(run, frame), static_rows(run, frame)
+    everything, attributes = run.gaussians(frame).detach(), run.attributes(frame)
+    still = static_rows(everything, attributes)
+    moving, static = everything.select(~still), cloud_of(everything.select(still))
     rgb = _shade(shader, moving).numpy()
-    static = cloud_of(run.gaussians(frame).detach().select(rows))
     if len(static):
         static = replace(static, rf_power_db=read_ply(run.path / STATIC_FILE).rf_power_db)
     return GaussianCloud.join(static, cloud_of(moving, rgb, attributes.get("rf_power_db")))

@@ -7,10 +7,13 @@ import base64
 import io
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float, UInt8
+
+from rfgs_core.files import replacing
 
 if TYPE_CHECKING:
     from matplotlib.colors import LinearSegmentedColormap
@@ -56,6 +59,15 @@ def power_colours() -> LinearSegmentedColormap:
     from matplotlib.colors import LinearSegmentedColormap
 
     return LinearSegmentedColormap.from_list("power", ["#7aa6c2", "#d9a03c", "#d6331f"])
+
+
+def write_picture(figure: Figure, path: Path) -> None:
+    """Writes a figure as a PNG file on white: not every viewer puts a page below it."""
+    with replacing(path) as temporary:
+        # Without this entry the version of matplotlib would change the bytes.
+        figure.savefig(
+            temporary, format="png", dpi=110, facecolor="white", metadata={"Software": None}
+        )
 
 
 def figure_uri(figure: Figure) -> str:

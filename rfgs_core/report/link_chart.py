@@ -10,10 +10,9 @@ import numpy as np
 from jaxtyping import Complex64
 
 from rfgs_core.errors import RfgsError
-from rfgs_core.files import replacing
 from rfgs_core.radio import Radio
 from rfgs_core.radio.levels import decibels
-from rfgs_core.report.charts import new_figure
+from rfgs_core.report.charts import new_figure, write_picture
 from rfgs_core.report.radio_charts import RANGE_DB, delay_profile, path_lengths_m
 from rfgs_core.run import Run
 
@@ -72,7 +71,6 @@ def write_link_chart(path: Path, link: LinkChannels) -> None:
     mhz, length_m = link.radio.freq_hz / 1e6, path_lengths_m(link.radio)
     shown = length_m <= link.longest_m
     with new_figure(10.0, 6.0) as figure:
-        figure.set_facecolor("white")
         axes = figure.subplots(2, 2)
         for column, (values, ends, label) in enumerate(
             (
@@ -103,6 +101,4 @@ def write_link_chart(path: Path, link: LinkChannels) -> None:
                 axis.set_xticks(range(0, len(link.frames), step), link.frames[::step])
                 axis.set(title=f"{who}, H − H static [dB]", xlabel="frame", ylabel=label)
                 figure.colorbar(image, ax=axis, shrink=0.8).outline.set_visible(False)  # type: ignore[operator]
-        with replacing(path) as temporary:
-            # Without this entry the version of matplotlib would change the bytes.
-            figure.savefig(temporary, format="png", dpi=110, metadata={"Software": None})
+        write_picture(figure, path)

@@ -9,12 +9,9 @@ import numpy as np
 from jaxtyping import Float64
 
 from rfgs_core.dataset import Sequence
-from rfgs_core.files import replacing
-from rfgs_core.report.charts import INK, METHOD, TRUTH, new_figure
+from rfgs_core.report.charts import INK, METHOD, TRUTH, new_figure, write_picture
 from rfgs_core.run.motion import Motion, read_motion, speeds_between
 
-#: The page the picture is drawn on.
-PAPER = "white"
 #: Curves of fewer frames show nothing.
 LEAST_FRAMES = 3
 
@@ -34,17 +31,14 @@ def write_motion_chart(path: Path, run: Path, sequence: Sequence, frames: list[i
     motion = read_motion(run, frames) if len(frames) >= LEAST_FRAMES else None
     if motion is None:
         return False
-    with new_figure(10.5, 3.6) as figure, replacing(path) as temporary:
-        figure.set_facecolor(PAPER)
+    with new_figure(10.5, 3.6) as figure:
         above, below = figure.subplots(2, 1, sharex=True)
         above.step(motion.time_s, motion.count, where="mid", color=METHOD, lw=2)
         above.set(ylabel="moving Gaussians", ylim=(0, 1.1 * motion.count.max()))
         _draw_speeds(below, motion, _true_speeds(sequence, frames, motion))
         for axis in (above, below):
             axis.grid(axis="y", color=INK, alpha=0.25, lw=0.6)
-        figure.savefig(
-            temporary, format="png", dpi=110, facecolor=PAPER, metadata={"Software": None}
-        )
+        write_picture(figure, path)
     return True
 
 

@@ -8,14 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from rfgs_core.files import replacing
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
-from rfgs_core.report.charts import INK, METHOD, TRUTH, new_figure, power_colours
+from rfgs_core.report.charts import INK, METHOD, TRUTH, new_figure, power_colours, write_picture
 
 #: Powers this far below the strongest are not drawn [dB].
 RANGE_DB = 40.0
-#: The page the picture is drawn on.
-PAPER = "white"
 
 
 def write_prediction_chart(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
@@ -27,16 +24,11 @@ def write_prediction_chart(path: Path, arrays: Mapping[str, np.ndarray]) -> None
     """
     count = len(arrays["rx_xyz"])
     with new_figure(10.0, 2.9 * count) as figure:
-        figure.set_facecolor(PAPER)
         axes = figure.subplots(count, 2, squeeze=False, width_ratios=(3, 4))
         for index, (left, right) in enumerate(axes):
             _draw_profile(left, arrays, index)
             _draw_spectrum(right, arrays, index)
-        with replacing(path) as temporary:
-            # Without this entry the version of matplotlib would change the bytes.
-            figure.savefig(
-                temporary, format="png", dpi=110, facecolor=PAPER, metadata={"Software": None}
-            )
+        write_picture(figure, path)
 
 
 def _draw_profile(axes, arrays: Mapping[str, np.ndarray], index: int) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from rfgs_core.arrays import Shape, load_arrays, save_arrays
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.gaussians import FEATURE_DIM, Gaussians
-from rfgs_core.gaussians.ply import cloud_of, read_ply, write_ply
+from rfgs_core.gaussians.ply import GaussianCloud, cloud_of, read_ply, write_ply
 from rfgs_core.train.config import TrainConfig
 from rfgs_core.train.head import HEAD_SHAPES, RadioHead
 from rfgs_core.train.static_set import StaticSet
@@ -75,7 +75,7 @@ def read_static_set(run: Path) -> StaticSet:
     head = RadioHead.of_arrays(load_arrays(run / HEAD_FILE, _REMEDY, HEAD_SHAPES))
     path = static_ply(run).with_suffix(".features.npz")
     features = load_arrays(path, _REMEDY, _SHAPES)["features"]
-    cloud = read_ply(static_ply(run))
+    cloud = static_cloud(run)
     if len(cloud) != len(features):
         raise RfgsFormatError(
             f"{static_ply(run)}: holds {len(cloud)} Gaussians, but there are features of "
@@ -88,7 +88,20 @@ def static_gaussians(run: Path) -> Gaussians:
     """Static Gaussians of a run; those of a foreign PLY have features of zero."""
     if has_static_set(run):
         return read_static_set(run).gaussians
-    if not static_ply(run).exists():
-        return Gaussians.none()
-    cloud = read_ply(static_ply(run))
+    cloud = static_cloud(run)
     return cloud.to_gaussians(np.zeros((len(cloud), FEATURE_DIM), dtype=np.float32))
+
+
+def static_cloud(run: Path) -> GaussianCloud:
+    """Static Gaussians as their PLY holds them; none where a run without a set has no such file.
+
+    Raises:
+        RfgsFormatError: The file is damaged, or the run has a set and the file is missing.
+    """
+    path = static_ply(run)
+    if not has_static_set(run):
+        return read_ply(path) if path.exists() else cloud_of(Gaussians.none())
+    try:
+        return read_ply(path)
+    except RfgsError as error:
+        raise RfgsFormatError(f"{error}; {_REMEDY}") from error

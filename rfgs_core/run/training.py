@@ -32,7 +32,13 @@ from rfgs_core.run.encoders import (
 )
 from rfgs_core.run.folder import BACKGROUND_FILE, SCHEMA, Run, open_run, relative_dataset
 from rfgs_core.run.log import Scalars, TrainingLog
-from rfgs_core.run.static import has_static_set, need_phases, static_ply, write_static_set
+from rfgs_core.run.static import (
+    has_static_set,
+    need_phases,
+    static_cloud,
+    static_ply,
+    write_static_set,
+)
 from rfgs_core.seeds import sub_seed
 from rfgs_core.threads import one_torch_thread
 from rfgs_core.train.calibrate import calibrate
@@ -259,5 +265,5 @@ def _write_point_cloud(run: Run) -> None:
     """Static Gaussians and those of the first frame in one file, for any splat viewer."""
     write_ply(
         run.path / "point_cloud.ply",
-        GaussianCloud.join(read_ply(static_ply(run.path)), read_ply(run.ply_path(run.frames[0]))),
+        GaussianCloud.join(static_cloud(run.path), read_ply(run.ply_path(run.frames[0]))),
     )

@@ -37,6 +37,9 @@ def test_it_writes_one_picture(small_run: Run, tmp_path: Path, capsys) -> None:
     assert str(out) in capsys.readouterr().out
     with Image.open(out) as picture:
         assert np.asarray(picture.convert("L")).std() > 10
+        pixels = np.asarray(picture.convert("RGBA"))
+    assert (pixels[..., 3] == 255).all(), "opaque: Blender shows a checkerboard where it is not"
+    assert (pixels[0, 0] == 255).all()
     first = out.read_bytes()
     assert main(arguments) == 0 and out.read_bytes() == first
     assert [path.name for path in out.parent.iterdir()] == ["link.png"]

@@ -241,6 +241,26 @@ def test_what_does_not_fit_is_refused(own_run: Run, train, tiny_dataset, quick_c
         own_run.gaussians(1)
 
 
+def test_a_lost_file_of_the_set_is_named_with_what_to_do(own_run: Run, train, quick_config) -> None:
+    ply, dataset = own_run.path / "gaussians/static.ply", own_run.path.parent / "dataset"
+    config = replace(quick_config, static_set=60)
+    ply.unlink()
+    for read in (lambda: own_run.gaussians(1), lambda: train(dataset, own_run.path, config)):
+        with pytest.raises(RfgsFormatError, match=r"static\.ply: no such file.*delete static_head"):
+            read()
+    (own_run.path / static_files.HEAD_FILE).unlink()
+    assert len(train(dataset, own_run.path, config).gaussians(1)) > 60
+
+
+def test_a_run_without_a_set_needs_no_file_of_one(
+    own_dataset, tmp_path, train, quick_config
+) -> None:
+    run = train(own_dataset, tmp_path / "run", quick_config, [1])
+    (run.path / "gaussians/static.ply").unlink()
+    train(own_dataset, run.path, quick_config, [1])
+    assert len(read_ply(run.path / "point_cloud.ply")) == len(run.moving(1))
+
+
 def test_a_calibrated_run_tells_the_room_as_its_devices_hear_it(
     walled: Path, train, quick_config, tmp_path: Path
 ) -> None:

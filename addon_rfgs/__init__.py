@@ -10,11 +10,12 @@ import bpy
 
 from . import command, properties, registration
 from .channels import waiting
+from .check import aging
 from .devices import overlay
 from .gaussians import file_menu
 from .jobs import following
 
-_MODULES = (properties, registration, overlay, command, following, waiting, file_menu)
+_MODULES = (properties, registration, overlay, command, following, waiting, aging, file_menu)
 
 
 def register() -> None:

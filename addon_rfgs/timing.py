@@ -16,6 +16,7 @@ def key_visibility(
     items: Iterable[tuple[int, bpy.types.Object]],
     offset: int = 0,
     interpolation: str = "HOLD",
+    recorded: Iterable[int] = (),
 ) -> None:
     """Keys when objects of recorded frames are visible, in place of earlier keys.
 
@@ -25,9 +26,10 @@ def key_visibility(
         offset: What belongs to frame f is shown at frame f + offset.
         interpolation: `NONE` shows an object at its own frame alone, `NEAREST` while no other
             recorded frame is nearer, `HOLD` until the next recorded frame.
+        recorded: Frames that were recorded as well, with nothing to show.
     """
     rows = list(items)
-    frames = sorted({frame for frame, _ in rows})
+    frames = sorted({*recorded, *(frame for frame, _ in rows)})
     spans = dict(zip(frames, _spans(frames, interpolation), strict=True))
     for frame, item in rows:
         first, last = (None if end is None else end + offset for end in spans[frame])

@@ -17,6 +17,7 @@ def fill(context: bpy.types.Context) -> str:
     check = context.window_manager.rfgs.check
     found = repairs.findings(context.scene)
     check.rows.clear()
+    check.outdated = False
     for finding in found:
         row = check.rows.add()
         row.severity = finding.severity.upper()
@@ -51,7 +52,8 @@ class _OnFinding(Reporting):
         description="Row of the list; -1 for the active one",
         default=-1,
         min=-1,
-        options={"SKIP_SAVE"},
+        # Hidden, as after a repair the list is another one: adjusting it would mean other rows.
+        options={"SKIP_SAVE", "HIDDEN"},
     )
 
     @classmethod
@@ -91,6 +93,14 @@ class RFGS_OT_repair_finding(_OnFinding, bpy.types.Operator):
     bl_idname = "rfgs.repair_finding"
     bl_label = "Fix"
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """There is a list, and it is about the scene as it is."""
+        outdated = context.window_manager.rfgs.check.outdated
+        if outdated:
+            cls.poll_message_set("Undo or Redo changed the scene; check it again")
+        return not outdated and super().poll(context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Asks before everything changes its size."""

@@ -45,10 +45,14 @@ class RFGS_PT_check(Tab, bpy.types.Panel):
         """Shows the button, the list, and the active finding in full."""
         layout, check = self.layout, context.window_manager.rfgs.check
         layout.operator("rfgs.check_scene", icon="VIEWZOOM")
-        if check.summary:
+        if check.outdated:
+            layout.label(text="Out of date: check again", icon="ERROR")
+        elif check.summary:
             layout.label(text=check.summary)
         if not check.rows:
             return
+        layout = layout.column()
+        layout.active = not check.outdated
         layout.template_list("RFGS_UL_findings", "", check, "rows", check, "active", rows=5)
         if check.active >= len(check.rows):
             return

@@ -53,3 +53,6 @@ class RFGS_PG_check(bpy.types.PropertyGroup):
     summary: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Summary", description="How many findings of each kind there are"
     )
+    outdated: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Out of Date", description="Whether Undo or Redo changed the scene since the check"
+    )

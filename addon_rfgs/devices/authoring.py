@@ -101,7 +101,7 @@ def mirror_devices(
 ) -> list[bpy.types.Object]:
     """Mirrors devices, or copies of them, at the middle of the scene across x (0) or y (1)."""
     bounds, _ = scene_space(scene)
-    twins = [empties.duplicate(item) if copy else item for item in items]
+    twins = [empties.duplicate(scene, item) if copy else item for item in items]
     for twin in twins:
         # A fresh copy has no world matrix before the scene is evaluated.
         bpy.context.view_layer.update()

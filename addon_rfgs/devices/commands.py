@@ -189,7 +189,7 @@ def _preset(options: argparse.Namespace) -> str:
 def _duplicate(options: argparse.Namespace) -> str:
     scene = bpy.context.scene
     unit, item = unit_scale(scene), empties.named_device(scene, options.device)
-    twin = empties.duplicate(item)
+    twin = empties.duplicate(scene, item)
     pose = empties.pose_of(item, unit)
     pose[:3, 3] += options.offset
     empties.set_pose(twin, pose, unit)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import bpy
@@ -117,16 +117,27 @@ def add_device(
     return item
 
 
-def duplicate(item: bpy.types.Object) -> bpy.types.Object:
-    """A copy of a device in the same place and in the same collections."""
+def duplicate(scene: bpy.types.Scene, item: bpy.types.Object) -> bpy.types.Object:
+    """A copy of a device in the same place and in the same collections.
+
+    Of a device whose collections are all linked from another file the copy joins the scene's own.
+    """
+    homes = [row for row in item.users_collection if row.library is None]
     twin = item.copy()
-    for collection in item.users_collection:
+    for collection in homes or [own_collection(scene, COLLECTION)]:
         collection.objects.link(twin)
     return twin
 
 
-def remove(items: Iterable[bpy.types.Object]) -> None:
-    """Removes devices, and collections of devices that are empty then."""
+def remove(items: Sequence[bpy.types.Object]) -> None:
+    """Removes devices, and collections of devices that are empty then.
+
+    Raises:
+        AddonError: One stands in a collection of another file; nothing has changed then.
+    """
+    for item in items:
+        for collection in item.users_collection:
+            need_own(collection)
     for item in items:
         bpy.data.objects.remove(item)
     drop_empty(COLLECTION)

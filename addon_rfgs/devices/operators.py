@@ -208,7 +208,7 @@ class RFGS_OT_duplicate_device(Reporting, bpy.types.Operator):
 
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
         """Copies what is chosen."""
-        twins = [empties.duplicate(item) for item in _chosen(context, self.device)]
+        twins = [empties.duplicate(context.scene, item) for item in _chosen(context, self.device)]
         context.view_layer.update()
         for twin in twins:
             matrix = twin.matrix_world.copy()

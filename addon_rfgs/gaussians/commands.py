@@ -115,8 +115,8 @@ def _import(options: argparse.Namespace, out: TextIO) -> str:
     settings.use_crop = options.crop_box is not None
     if options.crop:
         low, high = np.array(options.crop).reshape(2, 3) / unit_scale(bpy.context.scene)
-        if not (low < high).all():
-            raise AddonError("--crop: expected X0 < X1, Y0 < Y1 and Z0 < Z1")
+        if not (np.isfinite([low, high]).all() and (low < high).all()):
+            raise AddonError("--crop: expected numbers with X0 < X1, Y0 < Y1 and Z0 < Z1")
         crop_to(bpy.context.scene, low, high)
     settings.color_by, settings.color_attribute = options.color_by.upper(), options.attribute
     settings.use_range = options.range is not None

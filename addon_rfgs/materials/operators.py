@@ -64,13 +64,16 @@ class RFGS_OT_guess_materials(Reporting, bpy.types.Operator):
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
         """Fills the table."""
         table = context.window_manager.rfgs.guesses
-        found = settable(guesses(context.scene))
+        every = guesses(context.scene)
+        found = settable(every)
         table.rows.clear()
         table.active = 0
         for row in found:
             item = table.rows.add()
             item.material, item.radio_material = row.material, row.radio_material
             item.why = row.why
+        if every and not found:
+            return f"{len(every)} materials are linked; label them in their own files"
         return f"{len(found)} guesses to confirm" if found else "Every material in use is labelled"
 
 

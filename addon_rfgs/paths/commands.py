@@ -40,7 +40,8 @@ def add_paths(commands: Any) -> None:
 def _paths(options: argparse.Namespace, out: TextIO) -> str:
     scene = bpy.context.scene
     if options.clear:
-        told = f"removed the paths of {clear_paths()} links"
+        _, links = clear_paths()
+        told = f"removed the paths of {links} links"
     else:
         if options.frame is not None:
             scene.frame_set(options.frame)

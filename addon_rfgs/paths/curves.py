@@ -134,7 +134,10 @@ def show_paths(
         item.data.name = item.name
         collection.objects.link(item)
     if len(tables) > 1:
-        key_visibility(scene, [(frame, item) for frame, item in made if frame is not None])
+        # A frame in which a link is blocked has no object, and ends what was seen before it.
+        recorded = [frame for frame in tables if frame is not None]
+        framed = [(frame, item) for frame, item in made if frame is not None]
+        key_visibility(scene, framed, recorded=recorded)
     return [item for _, item in made]
 
 
@@ -143,19 +146,20 @@ def _levels(paths: Paths, top_db: float, choice: Choice) -> np.ndarray:
     return np.clip(share * _LEVELS, 0, _LEVELS - 1).astype(int)
 
 
-def clear_paths() -> int:
+def clear_paths() -> tuple[int, int]:
     """Removes every path with its curves and materials.
 
     Returns:
-        How many objects there were.
+        How many objects there were, and of how many links.
     """
     items = [item for row in collections_of(COLLECTION) for item in row.objects if LINK in item]
+    links = {item[LINK] for item in items}
     _remove(items)
     drop_empty(COLLECTION)
     for material in [row for row in bpy.data.materials if row.name.startswith(MATERIAL + " ")]:
         if not material.users:
             bpy.data.materials.remove(material)
-    return len(items)
+    return len(items), len(links)
 
 
 def _remove(items: list[bpy.types.Object]) -> None:

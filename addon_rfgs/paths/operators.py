@@ -39,7 +39,8 @@ class RFGS_OT_clear_paths(Reporting, bpy.types.Operator):
 
     def work(self, _context: bpy.types.Context, _progress: Progress) -> str:
         """Removes objects, curves and materials."""
-        return f"Removed the paths of {clear_paths()} links"
+        _, links = clear_paths()
+        return f"Removed the paths of {links} links"
 
 
 def show_settings(scene: bpy.types.Scene, progress: Progress | None = None) -> str:

@@ -27,7 +27,7 @@ def remove_data() -> tuple[int, int]:
     Returns:
         How many objects went, and how many things lost a property.
     """
-    count = clear_paths()
+    count, _ = clear_paths()
     restore()
     remove_images()
     for item in _objects():

@@ -275,6 +275,27 @@ def test_findings_are_not_saved(tmp_path: Path) -> None:
     assert len(bpy.context.window_manager.rfgs.check.rows) == 0
 
 
+def test_undo_makes_the_list_old_until_it_is_made_again() -> None:
+    check, point = bpy.context.window_manager.rfgs.check, bpy.data.objects["ap"]
+    point.location = (-5, 1, 1.2)
+    bpy.ops.ed.undo_push(message="outside")
+    point.location = (0, 0, 1.2)
+    bpy.ops.ed.undo_push(message="inside")
+    bpy.ops.ed.undo()
+    assert not check.outdated, "nothing was checked yet"
+    bpy.context.view_layer.update()
+    bpy.ops.rfgs.check_scene()
+    index = [row.kind for row in check.rows].index("device_outside")
+    assert not check.outdated and bpy.ops.rfgs.repair_finding.poll()
+    bpy.ops.ed.redo()
+    assert check.outdated and bpy.ops.rfgs.select_finding.poll()
+    with pytest.raises(RuntimeError, match="Undo or Redo changed the scene; check it again"):
+        bpy.ops.rfgs.repair_finding(index=index)
+    assert tuple(bpy.data.objects["ap"].location) == pytest.approx((0, 0, 1.2)), "left as it is"
+    bpy.ops.rfgs.check_scene()
+    assert not check.outdated and "device_outside" not in [row.kind for row in check.rows]
+
+
 def test_fix_by_command(tmp_path: Path, capfd: pytest.CaptureFixture) -> None:
     bpy.data.objects["ap"].location = (-5, 1, 1.2)
     bpy.data.objects["body"].data.flip_normals()

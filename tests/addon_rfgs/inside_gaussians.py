@@ -109,8 +109,9 @@ def test_a_crop_box_by_command(settings, tmp_path: Path, capfd: pytest.CaptureFi
     np.testing.assert_array_equal(inside, ((places > low) & (places < high)).all(axis=1))
     assert 0 < inside.sum() < len(inside)
     never = tmp_path / "never.blend"
-    assert run([*words, str(never), "--crop", *bounds[3:], *bounds[:3]]) == 2
-    assert "X0 < X1" in capfd.readouterr().err and not never.exists()
+    for wrong in ([*bounds[3:], *bounds[:3]], [*bounds[:5], "inf"]):
+        assert run([*words, str(never), "--crop", *wrong]) == 2
+        assert "X0 < X1" in capfd.readouterr().err and not never.exists()
 
 
 def test_solid_view_gets_real_meshes_with_an_active_colour(settings) -> None:

@@ -57,6 +57,22 @@ def linked_objects(library: Path) -> None:
     bpy.context.view_layer.objects.active = bpy.data.objects["ap"]
 
 
+def linked_collection(library: Path) -> None:
+    room()
+    home = bpy.data.collections.new("Furniture")
+    for item in bpy.context.scene.objects:
+        home.objects.link(item)
+    bpy.data.libraries.write(str(library), {home})
+    empty_file(library)
+    with bpy.data.libraries.load(str(library), link=True) as (theirs, ours):
+        ours.collections = list(theirs.collections)
+    bpy.context.scene.collection.children.link(ours.collections[0])
+    bpy.context.scene.frame_end = 5
+    bpy.context.view_layer.update()
+    bpy.context.view_layer.objects.active = bpy.data.objects["ap"]
+    bpy.data.objects["ap"].select_set(True)
+
+
 def linked_scene(library: Path) -> None:
     empty_file(library)
     with bpy.data.libraries.load(str(library), link=True) as (theirs, ours):
@@ -85,7 +101,7 @@ def all_selected(library: Path) -> None:
 @pytest.mark.parametrize(
     "situation",
     [
-        *(empty_file, startup_file, linked_objects, linked_scene),
+        *(empty_file, startup_file, linked_objects, linked_collection, linked_scene),
         *(edit_mode, pose_mode, all_selected),
     ],
 )
@@ -261,11 +277,34 @@ def test_senseless_arrays_do_not_halt_the_view(registered: None) -> None:
     assert run([*words, "--rx", "99x99"]) == 2
 
 
-def test_linked_materials_are_not_offered_for_a_guess(library: Path) -> None:
+def test_linked_materials_are_not_offered_for_a_guess(
+    library: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     linked_objects(library)
     bpy.ops.rfgs.guess_materials()
     assert len(bpy.context.window_manager.rfgs.guesses.rows) == 0
+    assert "materials are linked; label them in their own files" in capfd.readouterr().out
     addon_rfgs.properties._forget(None)
+
+
+def test_copies_of_linked_devices_are_the_files_own(library: Path) -> None:
+    linked_collection(library)
+    scene = bpy.context.scene
+    for change in (
+        lambda: bpy.ops.rfgs.remove_device(device="ap"),
+        lambda: bpy.ops.rfgs.place_radio(radio="wifi"),
+    ):
+        with pytest.raises(RuntimeError, match="'Furniture' is linked from") as caught:
+            change()
+        assert "\n" not in str(caught.value).strip()
+        assert len(empties.devices(scene)) == 1
+    place = bpy.data.objects["ap"].matrix_world.translation.copy()
+    assert bpy.ops.rfgs.duplicate_device(device="ap", offset=(0, 0, 1)) == {"FINISHED"}
+    assert bpy.ops.rfgs.mirror_device(device="ap", copy=True) == {"FINISHED"}
+    first, second = (item for item in empties.devices(scene) if item.library is None)
+    for twin in (first, second):
+        assert [home.name for home in twin.users_collection] == [empties.COLLECTION]
+    assert first.matrix_world.translation.z == pytest.approx(place.z + 1)
 
 
 def test_what_is_linked_is_repaired_where_it_is(library: Path) -> None:

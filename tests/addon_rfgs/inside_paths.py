@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import io
 import json
+import shutil
 import zipfile
 from pathlib import Path
 
@@ -15,6 +16,7 @@ import pytest
 from addon_rfgs.cli import open_blend, run
 from addon_rfgs.errors import AddonError
 from addon_rfgs.paths import dataset as ours
+from addon_rfgs.removal.contents import remove_data
 from rfgs_core.dataset.path_store import read_paths, write_paths
 from rfgs_core.radio import images
 from rfgs_core.radio.path_table import PathTable
@@ -199,6 +201,19 @@ def test_paths_follow_the_timeline(scene, data: Path, tmp_path: Path) -> None:
     assert not bpy.data.actions and not bpy.data.curves
 
 
+def test_a_blocked_link_shows_nothing_until_it_is_heard_again(scene, data: Path) -> None:
+    """Frame 7 has a table, but no path of the link that is shown; frame 9 has some."""
+    folder, info = data / "room" / "radio" / RADIO / "paths", data / "room" / "sequence.json"
+    info.write_text(info.read_text().replace("[1, 7]", "[1, 7, 9]"))
+    shutil.copy(folder / "000001.npz", folder / "000009.npz")
+    blocked = read_paths(folder / "000007.npz")
+    write_paths(folder / "000007.npz", blocked.select(blocked.tx_device != 0))
+    settings = scene.rfgs.paths
+    settings.tx_device, settings.follow = 0, True
+    assert bpy.ops.rfgs.show_paths() == {"FINISHED"}
+    assert [seen(frame) for frame in (6, 7, 8, 9)] == [{"frame 1"}, set(), set(), {"frame 9"}]
+
+
 def test_frames_without_a_table_are_passed_over(scene, data: Path) -> None:
     folder = data / "room" / "radio" / RADIO / "paths"
     scene.rfgs.paths.follow = True
@@ -210,6 +225,14 @@ def test_frames_without_a_table_are_passed_over(scene, data: Path) -> None:
         bpy.ops.rfgs.show_paths()
 
 
+def test_removing_all_data_counts_every_object(scene) -> None:
+    scene.rfgs.paths.follow, scene.rfgs.paths.range_db = True, 120.0
+    bpy.ops.rfgs.show_paths()
+    shown = len(curves())
+    assert len({item["rfgs_link"] for item in curves()}) < shown
+    assert remove_data()[0] == shown
+
+
 def test_paths_by_command(scene, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "paths.blend"
     assert run(["paths", "--tx", "0", "--rx", "1", "--out", str(out)]) == 0
@@ -217,7 +240,13 @@ def test_paths_by_command(scene, tmp_path: Path, capfd: pytest.CaptureFixture[st
     assert run(["paths", "--frame", "7", "--out", str(out)]) == 0
     open_blend(out)
     assert {item.name.rpartition(", ")[2] for item in curves()} == {"frame 7"}, "replaced"
+    bpy.context.scene.rfgs.paths.follow = True
+    assert run(["paths", "--range-db", "120", "--out", str(out)]) == 0
+    links = {item["rfgs_link"] for item in curves()}
+    assert len(links) < len(curves())
+    capfd.readouterr()
     assert run(["paths", "--clear", "--out", str(out)]) == 0
+    assert f"removed the paths of {len(links)} links" in capfd.readouterr().out
     for words in (("--count", "0"), ("--tx", "-2"), ("--range-db", "-1")):
         assert run(["paths", *words, "--out", str(tmp_path / "never.blend")]) == 2
         said = capfd.readouterr().err.strip()

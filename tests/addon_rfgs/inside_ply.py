@@ -36,6 +36,35 @@ def test_gaussians_written_by_plyfile_are_read_with_activations(tmp_path: Path) 
     np.testing.assert_allclose(cloud.colors[:, 2], expected, rtol=1e-6)
 
 
+@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("faces", [0, 3])
+@pytest.mark.parametrize(
+    ("names", "kinds"),
+    [
+        (BARE, {}),
+        (COLUMNS, {}),
+        ([*COLUMNS, *REST], {}),
+        ([*COLUMNS, "red", "label", "time"], {"red": "u1", "label": "i4", "time": "f8"}),
+        (["label", *COLUMNS[::-1]], {"label": "u4", "x": "f8"}),
+    ],
+    ids=["bare", "usual", "rest", "extra", "shuffled"],
+)
+def test_every_property_of_every_format_is_read_as_plyfile_wrote_it(
+    tmp_path: Path, form: str, faces: int, names: list[str], kinds: dict[str, str]
+) -> None:
+    rows = rows_of(names, 20, **kinds)
+    if "label" in kinds:
+        rows["label"][0] = np.iinfo(rows["label"].dtype).max
+    columns = ply.read_columns(write(tmp_path / "a.ply", rows, form, faces))
+    assert list(columns) == names
+    for name in names:
+        assert columns[name].dtype == rows[name].dtype.newbyteorder("=")
+        assert columns[name].tobytes() == rows[name].tobytes(), name
+    again = tmp_path / "again.ply"
+    ply.write_columns(again, columns)
+    assert again.read_bytes() == write(tmp_path / "b.ply", rows).read_bytes()
+
+
 def test_text_and_binary_of_one_cloud_are_the_same(tmp_path: Path) -> None:
     rows = rows_of([*COLUMNS, *REST], 3000, seed=4)
     binary = ply.read_columns(write(tmp_path / "binary.ply", rows))

@@ -132,7 +132,11 @@ class Stage:
 
     def _hover(self, x: int, y: int) -> Iterator[float]:
         self.window.event_simulate(type="MOUSEMOVE", value="NOTHING", x=x, y=y)
-        yield 0.02
+        # One turn of Blender's loop leaves a button, the next enters another; until the sidebar is
+        # drawn again, the button that was left still passes for the one below the pointer.
+        self.sidebar.tag_redraw()
+        for _ in range(2):
+            yield 0.02
         return self._below_pointer()
 
     def _below_pointer(self) -> str:

@@ -50,6 +50,24 @@ def play(stage: Any) -> Iterator[float]:
         bpy.ops.ed.undo()
     yield 0.5
     assert bpy.context.scene.objects["access_point_1"].location.x > 7, "repairs can be undone"
+    yield from list_ages(stage)
+
+
+def list_ages(stage: Any) -> Iterator[float]:
+    """The list says that it is of before Undo, and is not repaired by, until it is made again."""
+    check = bpy.context.window_manager.rfgs.check
+    assert check.outdated and "device_outside" not in [row.kind for row in check.rows]
+    assert not bpy.ops.rfgs.repair_finding.poll() and bpy.ops.rfgs.select_finding.poll()
+    yield from stage.shoot("outdated")
+    yield from press(stage, "rfgs.check_scene")
+    assert not check.outdated and "device_outside" in [row.kind for row in check.rows]
+    assert bpy.ops.rfgs.repair_finding.poll()
+    yield from stage.shoot("checked_again")
+    with stage.override():
+        bpy.ops.ed.redo()
+    yield 0.5
+    assert bpy.context.scene.objects["access_point_1"].location.x < 7, "and done again"
+    assert check.outdated
 
 
 def press(stage: Any, operator: str) -> Iterator[float]:

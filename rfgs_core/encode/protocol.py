@@ -33,6 +33,11 @@ class FrameChannel(Protocol):
         ...
 
     @property
+    def monostatic(self) -> bool:
+        """Whether every visible link stays within one device (a radar)."""
+        ...
+
+    @property
     def links(self) -> Bool[np.ndarray, "tx rx"]:
         """Links that may be read."""
         ...

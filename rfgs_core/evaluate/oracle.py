@@ -19,7 +19,8 @@ from rfgs_core.run.encoders import run_encoder
 from rfgs_core.seeds import sub_seed
 from rfgs_core.threads import one_torch_thread
 from rfgs_core.train.config import TrainConfig
-from rfgs_core.train.frame import FrameState, fit_power, new_head, solve_reflectivity
+from rfgs_core.train.first_powers import fit_power, new_head
+from rfgs_core.train.frame import FrameState, solve_reflectivity
 from rfgs_core.train.observations import Observations
 from rfgs_core.train.refine import refine
 from rfgs_core.train.sampling import encode

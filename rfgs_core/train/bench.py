@@ -19,7 +19,8 @@ from rfgs_core.seeds import sub_seed
 from rfgs_core.train.channel import Channel
 from rfgs_core.train.comparison import comparison_of
 from rfgs_core.train.config import TrainConfig
-from rfgs_core.train.frame import FrameState, noise_per_link, solve_reflectivity, start_frame
+from rfgs_core.train.first_powers import noise_per_link
+from rfgs_core.train.frame import FrameState, solve_reflectivity, start_frame
 from rfgs_core.train.losses import channel_loss
 from rfgs_core.train.observations import Observations, observe
 from rfgs_core.train.refine import refine

@@ -62,27 +62,22 @@ def calibrate(
         RfgsError: The links do not connect the devices, as in a radio that hears only itself.
     """
     frame = observations.delta + observations.static
-    drift = _likeliest(CrossSpectra.of(observations, frame, observations.static), config, 1e-3)
+    drift = _likeliest(config, CrossSpectra.of(observations, frame, observations.static))
     if known is not None:
         return Calibration(known, drift)
     aligned = Calibration(Offsets.none(observations.layout), drift).undone(observations)
     straight = CrossSpectra.of(observations, observations.static, direct_channel(observations))
-    capture = _likeliest(straight, config, config.unexplained)
+    capture = _likeliest(config, straight, pooled=True)
     for _ in range(TURNS):
         change = _fitted_change(capture.undone(aligned), config, seed)
         scattered = CrossSpectra.of(observations, aligned.delta, change)
-        both = CrossSpectra.join(straight, scattered)
-        capture = _likeliest(both, config, config.unexplained)
+        capture = _likeliest(config, straight, scattered, pooled=True)
     return Calibration(capture, drift)
 
 
-def _likeliest(spectra: CrossSpectra, config: TrainConfig, least_noise: float) -> Offsets:
-    return estimate_offsets(
-        spectra,
-        phase=config.calibrate != "timing",
-        timing=config.calibrate != "phase",
-        least_noise=least_noise,
-    )
+def _likeliest(config: TrainConfig, *models: CrossSpectra, pooled: bool = False) -> Offsets:
+    phase, timing = config.calibrate != "timing", config.calibrate != "phase"
+    return estimate_offsets(*models, phase=phase, timing=timing, pooled=pooled)
 
 
 def _fitted_change(

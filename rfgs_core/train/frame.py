@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,29 +13,25 @@ from torch import Tensor
 from rfgs_core.encode import MATCHED_FILTER, Encoder
 from rfgs_core.errors import RfgsError
 from rfgs_core.gaussians import Gaussians
-from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.seeds import sub_seed
+from rfgs_core.train.apart import tell_apart
 from rfgs_core.train.channel import Channel
 from rfgs_core.train.comparison import comparison_of
 from rfgs_core.train.config import TrainConfig
-from rfgs_core.train.delay_power import DelayPowerModel
 from rfgs_core.train.density.motion import kept, novelty, paces_m_s, wanted_counts
-from rfgs_core.train.head import SHARPNESS, RadioHead
+from rfgs_core.train.first_powers import fit_power, new_head, noise_per_link
+from rfgs_core.train.head import RadioHead
 from rfgs_core.train.localise import PairMaps, locate_bodies, pair_maps
 from rfgs_core.train.observations import Observations
 from rfgs_core.train.reflectivity import posterior_mean
 from rfgs_core.train.sampling import encode
 from rfgs_core.train.start import (
-    START_SCALES_M,
     StartDensity,
     gaussians_at,
     nearest_axis,
     outward_normals,
 )
 from rfgs_core.train.tracks import Tracks
-
-#: Multiplicative steps of the phase-free fit of reflected powers.
-POWER_STEPS = 20
 
 
 @dataclass(frozen=True)
@@ -67,72 +62,6 @@ class FrameState:
     def gamma(self) -> Complex[Tensor, "M"]:
         """Complex reflectivity of each Gaussian [m]."""
         return self.head.gamma(self.gaussians.features)
-
-
-def visibility(
-    points: Float[np.ndarray, "M 3"], normals: Float[np.ndarray, "M 3"], model: DelayPowerModel
-) -> Float[np.ndarray, "map M"]:
-    """How much of a Gaussian each map's antennas see, by the propagation model's own rule."""
-    rows = []
-    for entry in model.maps:
-        seen = np.ones(len(points))
-        for antenna in (entry.tx_xyz.mean(axis=0), entry.rx_xyz.mean(axis=0)):
-            towards = antenna - points
-            towards /= np.linalg.norm(towards, axis=1, keepdims=True)
-            seen /= 1 + np.exp(-SHARPNESS * np.sum(normals * towards, axis=1))
-        # Squared: visibility scales the amplitude.
-        rows.append(seen**2)
-    return np.array(rows, dtype=np.float32)
-
-
-def fit_power(
-    observations: Observations, gaussians: Gaussians, config: TrainConfig
-) -> Float[Tensor, "M"]:
-    """Reflected powers from delay–angle maps: equal ones, unless the phase-free fit is trusted.
-
-    The gain of each map against the model is fitted first: wall bounces and the neighbours of
-    an antenna lift or lower whole device pairs.
-    """
-    points = gaussians.means.numpy().astype(np.float64)
-    model = DelayPowerModel(observations, points)
-    seen = visibility(points, gaussians.rotations[:, :, 2].numpy(), model)
-    start = model.scaled(np.ones(len(points), dtype=np.float32), seen)
-    gain = [
-        data.sum() / max(float(model.expected(k, start * seen[k]).sum()), 1e-30)
-        for k, (_, _, data) in enumerate(model.parts)
-    ]
-    seen = seen * np.array(gain, dtype=np.float32)[:, None]
-    power = start
-    for _ in range(POWER_STEPS if config.power_trust > 0 else 0):
-        power = model.update(power, seen)
-    ratio = np.maximum(power / start, 1e-6) ** config.power_trust
-    # The level that suits the typical pair: the median keeps shadowed pairs out of it.
-    return torch.from_numpy((start * ratio * np.median(gain)).astype(np.float32))
-
-
-def noise_per_link(
-    observations: Observations, target: Tensor, share: float
-) -> Float[Tensor, "link"]:
-    """Variance per link: a share of the mean power of its device pair."""
-    pair, names = observations.pairs
-    index = pair[observations.links]
-    power = (target.abs() ** 2).mean(dim=1).numpy()
-    mean = np.bincount(index, power, len(names)) / np.bincount(index, minlength=len(names))
-    floor = 1e-3 * mean.max() if len(mean) else 0.0
-    return torch.from_numpy((share * np.maximum(mean, floor * 1e-3))[index].astype(np.float32))
-
-
-def new_head(
-    observations: Observations, config: TrainConfig, power: Float[Tensor, "M"]
-) -> RadioHead:
-    """A head scaled so that typical reflectivities are features of about one."""
-    wavelength_m = SPEED_OF_LIGHT / observations.centre_hz
-    return RadioHead.create(
-        sub_seed(config.seed, "head"),
-        wavelength_m,
-        START_SCALES_M[0],
-        float(power.mean().sqrt().clamp(min=1e-9)),
-    )
 
 
 def start_frame(
@@ -168,7 +97,7 @@ def start_frame(
         )
     rng = np.random.default_rng(seed)
     maps = pair_maps(observations)
-    tracks = _followed(before, maps, observations, config.bodies)
+    tracks = _followed(before, maps, observations, config, seed)
     axes_xy = tracks.axes_xy
     density = StartDensity.of(maps, axes_xy, observations.bounds_m)
     points = density.draw(config.num_gaussians, rng)
@@ -176,15 +105,12 @@ def start_frame(
     if before is not None:
         points, track_id = _carry_over(before, density, axes_xy, points)
         if config.density == "motion" and earlier is not None:
-            wanted = wanted_counts(
-                config.num_gaussians, paces_m_s(tracks, novelty(observations, earlier))
+            pace_m_s = paces_m_s(tracks, novelty(observations, earlier))
+            wanted = wanted_counts(config.num_gaussians, pace_m_s)
+            points, track_id = _at_pace(
+                *(before, maps, observations.bounds_m, axes_xy),
+                *(wanted, points, track_id, rng),
             )
-
-            def draw(body: int, count: int) -> Float64[np.ndarray, "count 3"]:
-                own = axes_xy[body : body + 1]
-                return StartDensity.of(maps, own, observations.bounds_m).draw(count, rng)
-
-            points, track_id = _at_pace(before, axes_xy, wanted, points, track_id, draw)
         goes_on = np.isin(track_id, before.track_id)
     gaussians = gaussians_at(points, outward_normals(points, axes_xy))
     power = fit_power(observations, gaussians, config)
@@ -195,14 +121,21 @@ def start_frame(
 
 
 def _followed(
-    before: FrameState | None, maps: PairMaps, observations: Observations, bodies: int
+    before: FrameState | None,
+    maps: PairMaps,
+    observations: Observations,
+    config: TrainConfig,
+    seed: int,
 ) -> Tracks:
     """Finds the bodies, anywhere in a first frame, where they are expected in a later one."""
     bounds_m, time_s = observations.bounds_m, observations.time_s
     if before is None:
-        return Tracks.begun(locate_bodies(maps, bounds_m, bodies), time_s)
+        axes_xy = locate_bodies(maps, bounds_m, config.bodies)
+        return Tracks.begun(tell_apart(observations, maps, axes_xy, config, seed), time_s)
     near, reach_m = before.tracks.expected(time_s)
-    return before.tracks.moved(locate_bodies(maps, bounds_m, bodies, near, reach_m), time_s)
+    axes_xy = locate_bodies(maps, bounds_m, config.bodies, near, reach_m)
+    axes_xy = tell_apart(observations, maps, axes_xy, config, seed, near, reach_m)
+    return before.tracks.moved(axes_xy, time_s)
 
 
 def _carry_over(
@@ -224,11 +157,13 @@ def _carry_over(
 
 def _at_pace(
     before: FrameState,
+    maps: PairMaps,
+    bounds_m: Float64[np.ndarray, "2 3"],
     axes_xy: Float64[np.ndarray, "body 2"],
     wanted: Int64[np.ndarray, "body"],
     points: Float64[np.ndarray, "M 3"],
     track_id: Int64[np.ndarray, "M"],
-    draw: Callable[[int, int], np.ndarray],
+    rng: np.random.Generator,
 ) -> tuple[Float64[np.ndarray, "N 3"], Int64[np.ndarray, "N"]]:
     """Drops each body's weakest Gaussians, or draws some, until there are as many as wanted."""
     # What came anew has not reflected anything yet.
@@ -236,7 +171,11 @@ def _at_pace(
     keep = kept(nearest_axis(points, axes_xy), power, wanted)
     points, track_id = points[keep], track_id[keep]
     have = np.bincount(nearest_axis(points, axes_xy), minlength=len(wanted))
-    more = [draw(body, int(count)) for body, count in enumerate(wanted - have) if count > 0]
+    more = [
+        StartDensity.of(maps, axes_xy[body : body + 1], bounds_m).draw(int(count), rng)
+        for body, count in enumerate(wanted - have)
+        if count > 0
+    ]
     points = np.concatenate([points, *more])
     unused = max(track_id.max(initial=-1), before.track_id.max()) + 1
     fresh = unused + np.arange(len(points) - len(track_id))

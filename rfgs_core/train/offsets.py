@@ -14,6 +14,7 @@ enter, so an error of the model that is the same both ways (reciprocity) cancels
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,6 +29,8 @@ from rfgs_core.train.observations import Observations
 OVERSAMPLING = 16
 #: Rounds of weighting pairs by what the offsets explain of them.
 REWEIGHTED = 3
+#: Share of its power that is noise to any model, at least.
+LEAST_NOISE = 1e-3
 #: Rounds of reweighting that keep single wrong delays out of the first guess.
 ROUNDS = 20
 
@@ -119,46 +122,44 @@ class CrossSpectra:
             index=np.flatnonzero(tones),
         )
 
-    def weighted(self, offsets: Offsets, least_noise: float) -> CrossSpectra:
+    def weighted(self, offsets: Offsets, pooled: bool) -> CrossSpectra:
         """Spectra in units of what offsets leave unexplained of each pair.
 
         With ρ the coherence of a pair once its offsets are taken out, a share 1 − ρ² of its
-        power is noise to this model.
+        power is noise to this model; pooled, the mean share of all pairs.
         """
         lag = offsets.delay_s[self.first] - offsets.delay_s[self.second]
         turned = np.sum(self.value * np.exp(1j * np.outer(lag, self.baseband)), axis=1)
-        noise = 1 - np.abs(turned) ** 2
-        return replace(self, value=self.value / np.maximum(noise, least_noise)[:, None])
+        noise = np.maximum(1 - np.abs(turned) ** 2, LEAST_NOISE)
+        if pooled:
+            noise = np.full_like(noise, noise.mean())
+        return replace(self, value=self.value / noise[:, None])
 
     @staticmethod
-    def join(first: CrossSpectra, second: CrossSpectra) -> CrossSpectra:
-        """Both sets of the same tones, for offsets that have to suit both."""
+    def join(parts: Sequence[CrossSpectra]) -> CrossSpectra:
+        """All pairs of parts with the same tones, for offsets that have to suit them all."""
         names = ("value", "first", "second")
-        return replace(
-            first, **{n: np.concatenate([getattr(first, n), getattr(second, n)]) for n in names}
-        )
+        rows = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+        return replace(parts[0], **rows)
 
 
 def estimate_offsets(
-    spectra: CrossSpectra,
-    *,
-    phase: bool = True,
-    timing: bool = True,
-    least_noise: float = 1e-3,
+    *models: CrossSpectra, phase: bool = True, timing: bool = True, pooled: bool = False
 ) -> Offsets:
     """The likeliest offsets, device 0 being the reference.
 
     Args:
-        spectra: Cross spectra of channels and their model.
+        models: Cross spectra of channels, beside one model or several.
         phase: Whether oscillators may differ; without, phases are estimated all the same, as
             a nuisance, and left out of the result.
         timing: Whether clocks may differ; without, they are taken to agree.
-        least_noise: Share of a pair's power that counts as noise at least; larger where the
-            model lacks something that is alike in all of a pair's entries.
+        pooled: Whether all pairs of a model count as equally noisy. A model that lacks something
+            is off by a phase that a pair's own coherence need not show; that of all pairs does.
     """
-    found = _likeliest(spectra, phase=phase, timing=timing)
+    found = _likeliest(CrossSpectra.join(models), phase=phase, timing=timing)
     for _ in range(REWEIGHTED):
-        found = _likeliest(spectra.weighted(found, least_noise), phase=phase, timing=timing)
+        weighted = CrossSpectra.join([model.weighted(found, pooled) for model in models])
+        found = _likeliest(weighted, phase=phase, timing=timing)
     return found
 
 

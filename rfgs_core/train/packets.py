@@ -85,13 +85,13 @@ def doppler_spectrum(
     return np.where(heard, power - noise, 0.0)
 
 
-def least_squares(
+def wiener_estimate(
     cells: Complex[np.ndarray, "packet cell"],
     spectrum: Float[np.ndarray, "doppler cell"],
     noise: float,
     received: Bool[np.ndarray, "packet"],
 ) -> Complex64[np.ndarray, "packet cell"]:
-    """Least-squares estimate of each cell's packets, lost ones included, see the module."""
+    """Wiener's estimate of each cell's packets, lost ones included, see the module."""
     estimate = np.zeros(cells.shape, dtype=np.complex64)
     every, (rows,) = np.arange(len(cells)), np.nonzero(received)
     (heard,) = np.nonzero(spectrum.any(axis=0))
@@ -126,7 +126,7 @@ def _pair_estimate(
     noise *= float(tones.mean())
     spectrum = doppler_spectrum(cells, noise, int(received.sum()))
     flat = cells.reshape(len(cells), -1), spectrum.reshape(len(spectrum), -1)
-    estimate = least_squares(*flat, noise, received).reshape(cells.shape)
+    estimate = wiener_estimate(*flat, noise, received).reshape(cells.shape)
     antennas = np.fft.ifftn(estimate, axes=(1, 2, 3), norm="ortho")
     return np.fft.fft(antennas, axis=4, norm="ortho")
 
@@ -153,7 +153,8 @@ def change_of_packets(
     for index in range(len(names)):
         tx, rx = (np.unique(axis) for axis in np.nonzero(pair == index))
         rx, rows = _columns(layout.rx_column, rx)
-        block = np.where(tones, change[:, tx[:, None], rx], 0)
+        visible = links[tx[:, None], rx][..., None] & tones
+        block = np.where(visible, change[:, tx[:, None], rx], 0)
         received = np.isfinite(block).all(axis=(1, 2, 3))
         block[~received] = 0
         shape = (*block.shape[:2], -1, rows, len(tones))

@@ -30,7 +30,8 @@ from rfgs_core.train.density import (
     StandardDensity,
     StandardRule,
 )
-from rfgs_core.train.frame import FrameState, noise_per_link
+from rfgs_core.train.first_powers import noise_per_link
+from rfgs_core.train.frame import FrameState
 from rfgs_core.train.last_good import LastGood
 from rfgs_core.train.losses import SamplePoints, channel_loss, paper_loss
 from rfgs_core.train.observations import Observations

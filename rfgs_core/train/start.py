@@ -23,6 +23,9 @@ EVIDENCE_EXPONENT = 0.25
 #: How much of that moves Gaussians from one height to another: what is below or above the
 #: antennas mirrors waves away from them, and answers weaker than a trunk of the same surface.
 HEIGHT_EVIDENCE = 0.1
+#: Cross-section of a trunk [m²]. Heights and bodies are compared by their likeliest cells of that
+#: area: where the matched filter is blurred, equal sums would be too thin to stand out.
+CROSS_SECTION_M2 = 0.06
 #: Edge of the cells in which the density is taken as even [m].
 CELL_M = 0.04
 #: Standard deviation of a new Gaussian along the surface and across it [m].
@@ -54,8 +57,9 @@ def outward_normals(
 class StartDensity:
     """Where new Gaussians are drawn: body-sized prior times matched filter, in cubic cells.
 
-    All bodies get equally many Gaussians, and heights about what the prior gives them. The
-    matched filter decides where within a height, and to a small part between heights.
+    The densest part of a body is about as dense as the prior makes it, in all bodies alike and at
+    all heights. The matched filter decides where within a height, and to a small part between
+    heights.
     """
 
     share: Float64[np.ndarray, "x y z"]
@@ -84,11 +88,10 @@ class StartDensity:
         body = nearest_axis(points, axes_xy).reshape(cells.shape[:3])
         for index in range(len(axes_xy)):
             mine = body == index
-            got = np.where(mine, share, 0).sum(axis=(0, 1))
-            wanted = np.where(mine, prior, 0).sum(axis=(0, 1))
-            lift = (wanted / np.maximum(got, 1e-300)) ** (1 - HEIGHT_EVIDENCE)
-            level = lift / max((lift * got).sum(), 1e-300)
-            share = np.where(mine, share * level, share)
+            own = np.where(mine, share, 0)
+            wanted = _densest(np.where(mine, prior, 0))
+            own *= (wanted / np.maximum(_densest(own), 1e-300)) ** (1 - HEIGHT_EVIDENCE)
+            share = np.where(mine, own * wanted.sum() / max(_densest(own).sum(), 1e-300), share)
         return StartDensity(share / share.sum(), low, high)
 
     def draw(self, count: int, rng: np.random.Generator) -> Float64[np.ndarray, "count 3"]:
@@ -105,6 +108,13 @@ class StartDensity:
         inside = ((index >= 0) & (index < self.share.shape)).all(axis=1)
         index = np.where(inside[:, None], index, 0)
         return np.where(inside, self.share[tuple(index.T)], 0.0)
+
+
+def _densest(share: Float64[np.ndarray, "x y z"]) -> Float64[np.ndarray, "z"]:
+    """Mean of the likeliest cells of each height, as many as a trunk's cross-section covers."""
+    cells = share.reshape(-1, share.shape[2])
+    count = min(round(CROSS_SECTION_M2 / CELL_M**2), len(cells))
+    return np.partition(cells, len(cells) - count, axis=0)[len(cells) - count :].mean(axis=0)
 
 
 def log_prior(

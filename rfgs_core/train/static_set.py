@@ -25,7 +25,7 @@ from rfgs_core.seeds import sub_seed
 from rfgs_core.train.background import direct_background
 from rfgs_core.train.channel import Channel
 from rfgs_core.train.comparison import with_entries
-from rfgs_core.train.frame import noise_per_link
+from rfgs_core.train.first_powers import noise_per_link
 from rfgs_core.train.head import RadioHead
 from rfgs_core.train.localise import PairMaps, pair_maps
 from rfgs_core.train.observations import Observations

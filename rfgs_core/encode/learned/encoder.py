@@ -89,7 +89,7 @@ class LearnedEncoder:
         if kind == "doppler" and seen.packets is None:
             raise RfgsError(
                 "the doppler network expects several packets per frame, one is read; generate them "
-                "with --packets-per-frame, or use --network cube"
+                "with --packets-per-frame, leave out --packets first, or use --network cube"
             )
         return LearnedEncoder(kind, EncoderModel(kind, seed), radio)
 

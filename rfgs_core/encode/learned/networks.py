@@ -233,8 +233,6 @@ def network_for(seen: FrameChannel) -> NetworkKind:
     freq_hz = seen.freq_hz
     if (freq_hz[-1] - freq_hz[0]) / freq_hz.mean() > ULTRA_WIDE_BAND:
         return "range"
-    tx, rx = seen.links.nonzero()
-    radar = bool((seen.layout.tx_device[tx] == seen.layout.rx_device[rx]).all())
-    if radar:
+    if seen.monostatic:
         return "cube" if seen.packets is None else "doppler"
     return "csi"

@@ -63,7 +63,7 @@ def calibrated(
 
 def enough(config: TrainConfig) -> TrainConfig:
     """As many Gaussians as it takes to tell offsets by them."""
-    return replace(config, calibrate="both", num_gaussians=1600, solver_steps=8)
+    return replace(config, calibrate="both", num_gaussians=400, solver_steps=8)
 
 
 def copy_of(run: Run, name: str) -> Run:
@@ -72,12 +72,13 @@ def copy_of(run: Run, name: str) -> Run:
 
 
 def test_injected_offsets_are_found_and_kept(calibrated: Run) -> None:
-    """Drift: the ball changes what stands still by a percent. Capture: Gaussians of a standing
-    body stand for a ball heard through; that error of the model is 5 % of 1/B = 6.25 ns."""
+    """Drift: the ball changes what stands still by a percent. Capture: the room has direct paths
+    only, which outweigh the Gaussians' error of the model: heard from one side, they stand for a
+    ball heard through."""
     for frame, drift in DRIFT.items():
         found = read_calibration(calibrated.path, frame)
         for got, true, degrees, seconds in (
-            (found.capture, CAPTURE, 6.0, 310e-12),
+            (found.capture, CAPTURE, 1.0, 20e-12),
             (found.drift, drift, 1.0, 80e-12),
         ):
             wrong = np.angle(np.exp(1j * (got.phase_rad - true.phase_rad)))
@@ -113,8 +114,8 @@ def test_the_offsets_stand_among_the_conditions(calibrated: Run, trained_run: Ru
     text = conditions(Scene.of(calibrated))["calibration"]
     found = re.match(r"against device 0, device 1: ([-\d.]+)°, ([-\d.]+) ns, device 2: ", text)
     assert found is not None
-    assert float(found[1]) == pytest.approx(np.rad2deg(2.5), abs=6)
-    assert float(found[2]) == pytest.approx(4.0, abs=0.31)
+    assert float(found[1]) == pytest.approx(np.rad2deg(2.5), abs=1)
+    assert float(found[2]) == pytest.approx(4.0, abs=0.02)
     assert "frames differ from the empty room by up to" in text
     assert conditions(Scene.of(trained_run))["calibration"] == "none"
 

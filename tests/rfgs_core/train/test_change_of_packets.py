@@ -33,8 +33,8 @@ from rfgs_core.train.packets import (
     DOPPLER_GRID,
     change_of_packets,
     doppler_spectrum,
-    least_squares,
     noise_power,
+    wiener_estimate,
 )
 
 COUNT, INTERVAL_S = 16, 0.25e-3
@@ -95,7 +95,7 @@ def test_the_filter_errs_as_little_as_theory_allows() -> None:
     heard = np.arange(COUNT) != 5
     seen = np.where(heard[:, None], true + noise(true.shape, level, 2), 0)
     spectrum = np.broadcast_to(power[:, None], (len(power), cells))
-    found = least_squares(seen.astype(np.complex64), spectrum, level, heard)[0]
+    found = wiener_estimate(seen.astype(np.complex64), spectrum, level, heard)[0]
     basis = tone[heard] * np.sqrt(power / len(power))
     covariance = basis @ basis.conj().T
     towards = basis @ (np.sqrt(power / len(power)) * tone[0]).conj()
@@ -112,7 +112,7 @@ def test_who_stands_still_gains_the_number_of_packets() -> None:
     seen = true + noise((COUNT, cells), level, 4)
     spectrum = np.zeros((DOPPLER_GRID * COUNT, cells))
     spectrum[0] = DOPPLER_GRID * COUNT
-    found = least_squares(seen.astype(np.complex64), spectrum, level, np.ones(COUNT, bool))[7]
+    found = wiener_estimate(seen.astype(np.complex64), spectrum, level, np.ones(COUNT, bool))[7]
     error = np.mean(np.abs(found - true) ** 2)
     assert error == pytest.approx(level / (COUNT + level), rel=0.03)
 
@@ -135,6 +135,22 @@ def test_an_echo_comes_out_of_noise_and_noise_alone_stays_out() -> None:
     lost[0] = np.nan
     late = change_of_packets(lost, own, tones, elements)
     assert np.mean(np.abs(late[0] - change[0])[visible] ** 2) < 10.0 / 20
+
+
+def test_links_that_may_not_be_read_are_not() -> None:
+    """Also one among the visible links of its device pair, and whatever it holds."""
+    change, own, tones = passing(1.0)
+    elements = layout(RADAR, place_devices(RADAR, BOUNDS_M))
+    dirty = change + noise(change.shape, 10.0, 7).astype(np.complex64)
+    links = own.copy()
+    tx, rx = np.argwhere(own)[3]
+    links[tx, rx] = False
+    found = []
+    for value in (0.0, 1e3, np.nan):
+        dirty[:, tx, rx] = value
+        found.append(change_of_packets(dirty, links, tones, elements))
+        np.testing.assert_array_equal(found[-1], found[0])
+    assert found[0].any() and not found[0][:, tx, rx].any()
 
 
 def test_without_noise_packets_stay_as_they_are() -> None:

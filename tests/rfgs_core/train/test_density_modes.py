@@ -23,7 +23,8 @@ from rfgs_core.train.density import (
     StandardDensity,
     StandardRule,
 )
-from rfgs_core.train.frame import FrameState, noise_per_link
+from rfgs_core.train.first_powers import noise_per_link
+from rfgs_core.train.frame import FrameState
 from rfgs_core.train.head import RadioHead
 from rfgs_core.train.observations import Observations
 from rfgs_core.train.parameters import LearningRates, TrainableGaussians

@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from lit_bodies import lit
 
 from rfgs_core.radio import preset
-from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.train.localise import (
     BODY_RADIUS_M,
     GROUND_STEP_M,
@@ -19,38 +19,8 @@ from rfgs_core.train.localise import (
     locate_bodies,
     pair_maps,
 )
-from rfgs_core.train.observations import Observations
 
 ROOM_M = np.array([[0.0, 0.0, 0.0], [3.6, 3.2, 2.2]])
-
-
-def cylinder(xy: tuple[float, float], count: int, rng: np.random.Generator) -> tuple:
-    """Points on a body's surface and their normals."""
-    angle = rng.uniform(0, 2 * np.pi, count)
-    normals = np.stack([np.cos(angle), np.sin(angle), np.zeros(count)], axis=1)
-    points = 0.13 * normals
-    points[:, :2] += xy
-    points[:, 2] = rng.uniform(0.1, 1.7, count)
-    return points, normals
-
-
-def lit(observations: Observations, bodies: list[tuple[float, float]], seed: int) -> Observations:
-    """Random scatterers on each body; an antenna behind the tangent plane sees nothing."""
-    rng = np.random.default_rng(seed)
-    delta = np.zeros(observations.delta.shape, np.complex128)
-    k = 2 * np.pi * observations.freq_hz / SPEED_OF_LIGHT
-    for xy in bodies:
-        points, normals = cylinder(xy, 150, rng)
-        strength = rng.standard_normal(150) + 1j * rng.standard_normal(150)
-        for point, normal, gamma in zip(points, normals, strength, strict=True):
-            ends = []
-            for xyz in (observations.layout.tx_xyz, observations.layout.rx_xyz):
-                away = xyz - point
-                distance = np.linalg.norm(away, axis=1)
-                seen = (away @ normal > 0) / distance
-                ends.append(seen[:, None] * np.exp(-1j * k * distance[:, None]))
-            delta += gamma * ends[0][:, None] * ends[1][None]
-    return observations.with_delta(delta * observations.layout.measured[..., None])
 
 
 @pytest.fixture(scope="module")

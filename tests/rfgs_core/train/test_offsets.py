@@ -111,6 +111,42 @@ def test_a_pair_without_a_straight_way_does_not_mislead(make_observations) -> No
     np.testing.assert_allclose(found.delay_s, DELAY_S, atol=30e-12)
 
 
+def test_models_count_by_what_all_their_pairs_leave_unexplained(make_observations) -> None:
+    """Two models that contradict each other by a small phase meet at the mean of weight ρ/(1 − ρ²).
+
+    A pair that follows its model exactly has no more weight than the others of that model.
+    """
+    observations = make_observations()
+    layout, model = observations.layout, direct_channel(observations)
+    model = model / np.abs(model)
+    between = layout.tx_device[:, None] != layout.rx_device
+    exact = (layout.tx_device[:, None] + layout.rx_device == 3)[..., None]
+    apart = np.deg2rad(3.0) * np.array([0.0, 1.0, -1.0, 0.5])
+    coherences, spectra = (0.9, 0.6), []
+    for ahead, coherence in zip((0 * apart, apart), coherences, strict=True):
+        turn = Offsets(PHASE_RAD + ahead, np.zeros(4)).turn(layout, observations.freq_hz)
+        # Signs that alternate from tone to tone are orthogonal to the model.
+        other = np.sqrt(1 - coherence**2) * (-1.0) ** np.arange(turn.shape[2])
+        share = np.where(exact, 1.0, coherence + other) * between[..., None]
+        spectra.append(CrossSpectra.of(observations, model * turn * share, model))
+    found = estimate_offsets(*spectra, timing=False, pooled=True)
+    # Of the twelve pairs of four devices, (0, 3), (1, 2) and their reverses are exact.
+    noise = [(1 - value**2) * 8 / 12 for value in coherences]
+    pairs = {True: [1 / n for n in noise]}
+    pairs[False] = [value / n for value, n in zip(coherences, noise, strict=True)]
+    laplacian, wanted = np.zeros((4, 4)), np.zeros(4)
+    for a in range(4):
+        for b in set(range(4)) - {a}:
+            first, second = pairs[a + b == 3]
+            laplacian[a, a] += first + second
+            laplacian[a, b] -= first + second
+            wanted[a] += second * (apart[a] - apart[b])
+    expected = np.linalg.lstsq(laplacian[1:, 1:], wanted[1:], rcond=None)[0]
+    got = np.angle(np.exp(1j * (found.phase_rad - PHASE_RAD)))[1:]
+    np.testing.assert_allclose(got, expected, atol=np.deg2rad(0.01))
+    assert np.abs(expected).max() > np.deg2rad(0.3)
+
+
 def test_undoing_gives_the_clean_observations_back(make_observations) -> None:
     clean = make_observations()
     rng = np.random.default_rng(1)

@@ -15,7 +15,8 @@ from rfgs_core.train import refine as refine_module
 from rfgs_core.train.channel import Channel
 from rfgs_core.train.comparison import comparison_of
 from rfgs_core.train.config import TrainConfig
-from rfgs_core.train.frame import FrameState, noise_per_link
+from rfgs_core.train.first_powers import noise_per_link
+from rfgs_core.train.frame import FrameState
 from rfgs_core.train.head import RadioHead
 from rfgs_core.train.losses import channel_loss
 from rfgs_core.train.observations import Observations

@@ -13,6 +13,7 @@ from rfgs_core.gaussians.model import rotation_matrices
 from rfgs_core.train.localise import PairMaps
 from rfgs_core.train.start import (
     CELL_M,
+    CROSS_SECTION_M2,
     HEIGHT_EVIDENCE,
     StartDensity,
     gaussians_at,
@@ -93,6 +94,18 @@ def test_between_heights_it_follows_them_far_less() -> None:
     plain = StartDensity.of(flat_maps(), axes, BOUNDS_M).share.sum(axis=(0, 1))
     lift = np.log(loud / plain)
     assert lift[-1] - lift[0] == pytest.approx(0.25 * 8.0 * HEIGHT_EVIDENCE, abs=1e-3)
+
+
+def test_heights_seen_sharply_do_not_outshine_blurred_ones() -> None:
+    """Of the cells that a body fills, as many lie where the maps are flat as where they peak."""
+    power = np.ones((2, 8, 8, 10), np.float32)
+    power[:, 3:5, 3:5, 5:] = math.exp(8.0)
+    share = StartDensity.of(flat_maps(power), np.array([[0.7, 0.7]]), BOUNDS_M).share
+    top = round(1.6 / CELL_M)
+    body = np.sort(share[:, :, :top].ravel())[-round(CROSS_SECTION_M2 / CELL_M**2) * top :]
+    filled = (share >= body[0])[:, :, :top].sum(axis=(0, 1))
+    flat, sharp = filled[: top // 2].mean(), filled[-top // 2 :].mean()
+    assert flat == pytest.approx(sharp, rel=0.25)
 
 
 def test_a_loud_body_gets_no_more_gaussians_than_a_quiet_one() -> None:

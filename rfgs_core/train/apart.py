@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Several bodies told apart: each is sought in what the others leave of the channel.
+
+The map of one body has slopes on which the next one is lost, the more so the fewer hertz there
+are. As in RELAX (Li and Stoica, IEEE Trans. Signal Process. 44(2), 1996) the echoes of all bodies
+are fitted together, those of all but one are taken off, and that one is sought anew, in turn.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import torch
+from jaxtyping import Complex64, Float64
+
+from rfgs_core.seeds import sub_seed
+from rfgs_core.train.channel import Channel
+from rfgs_core.train.config import TrainConfig
+from rfgs_core.train.first_powers import fit_power, new_head, noise_per_link
+from rfgs_core.train.localise import NEAR_M, SEPARATION_M, PairMaps, locate_bodies, pair_maps
+from rfgs_core.train.observations import Observations
+from rfgs_core.train.reflectivity import posterior_mean
+from rfgs_core.train.start import StartDensity, gaussians_at, nearest_axis, outward_normals
+
+#: Gaussians that stand for each body.
+GAUSSIANS_PER_BODY = 1500
+#: Conjugate-gradient steps of the fit of all echoes.
+SOLVER_STEPS = 6
+#: Times that every body is sought anew.
+ROUNDS = 2
+
+
+def tell_apart(
+    observations: Observations,
+    maps: PairMaps,
+    axes_xy: Float64[np.ndarray, "body 2"],
+    config: TrainConfig,
+    seed: int,
+    near: Float64[np.ndarray, "body 2"] | None = None,
+    reach_m: Float64[np.ndarray, "body"] | float = NEAR_M,
+) -> Float64[np.ndarray, "body 2"]:
+    """Ground positions of bodies, better than those that were found in the map of all.
+
+    Args:
+        observations: The frame; without phases, or of one body, nothing is changed.
+        maps: Its matched-filter maps.
+        axes_xy: Where the bodies were found together [m].
+        config: How reflectivities are fitted.
+        seed: Seed of the Gaussians that stand for bodies.
+        near: Where each body is expected [m]; None in a first frame, where all but the first
+            are sought anew.
+        reach_m: How far around to look [m].
+
+    Returns:
+        Positions [m], in the same order.
+    """
+    count = len(axes_xy)
+    if count < 2 or observations.kind != "complex":
+        return axes_xy
+    found, reach_m = axes_xy.copy(), np.broadcast_to(reach_m, count)
+    if near is None:
+        for body in range(1, count):
+            echoes = _echoes(observations, maps, found[:body], config, seed)
+            (found[body],) = _sought(observations, echoes.sum(axis=0))
+    for _ in range(ROUNDS):
+        for body in range(count):
+            echoes = _echoes(observations, maps, found, config, seed)
+            others = echoes.sum(axis=0) - echoes[body]
+            where = None if near is None else near[[body]]
+            (place,) = _sought(observations, others, where, reach_m[body])
+            apart = np.linalg.norm(np.delete(found, body, axis=0) - place, axis=1)
+            if apart.min() >= SEPARATION_M:
+                found[body] = place
+    return found
+
+
+def _sought(
+    observations: Observations,
+    echoes: Complex64[np.ndarray, "tx rx subcarrier"],
+    near: Float64[np.ndarray, "1 2"] | None = None,
+    reach_m: float = NEAR_M,
+) -> Float64[np.ndarray, "1 2"]:
+    """The loudest body of what remains without some echoes."""
+    rest = observations.with_delta((observations.delta - echoes).astype(np.complex64))
+    return locate_bodies(pair_maps(rest), observations.bounds_m, 1, near, reach_m)
+
+
+def _echoes(
+    observations: Observations,
+    maps: PairMaps,
+    axes_xy: Float64[np.ndarray, "body 2"],
+    config: TrainConfig,
+    seed: int,
+) -> Complex64[np.ndarray, "body tx rx subcarrier"]:
+    """What each body reflects at the visible entries, all fitted together, shadows left aside."""
+    rng = np.random.default_rng(sub_seed(seed, "apart"))
+    density = StartDensity.of(maps, axes_xy, observations.bounds_m)
+    points = density.draw(GAUSSIANS_PER_BODY * len(axes_xy), rng)
+    gaussians = gaussians_at(points, outward_normals(points, axes_xy))
+    power = fit_power(observations, gaussians, replace(config, power_trust=0.0))
+    head = new_head(observations, config, power)
+    channel = Channel.of(observations, observations.links, observations.tones)
+    tone = np.flatnonzero(observations.tones)
+    visible = (channel.tx[:, None], channel.rx[:, None], tone)
+    target = torch.from_numpy(observations.delta[visible])
+    noise = noise_per_link(observations, target, config.unexplained)
+    gamma = posterior_mean(channel, head, gaussians, target, noise, power, SOLVER_STEPS)
+    body = nearest_axis(points, axes_xy)
+    echoes = np.zeros((len(axes_xy), *observations.delta.shape), dtype=np.complex64)
+    with torch.no_grad():
+        for index in range(len(axes_xy)):
+            own = torch.from_numpy(body == index)
+            part = channel.scattered(head, gaussians.select(own), gamma[own])
+            echoes[index][visible] = part.numpy()
+    return echoes

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 import pytest
 from jaxtyping import install_import_hook
 
+import rfgs_core  # noqa: F401  before torch, as programs do: it tells OpenMP how threads wait
+
 if TYPE_CHECKING:
     from rfgs_core.run import Run
 

@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Threads of compiled kernels sleep between their calls."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+#: Fifty short kernels on four threads, 10 ms of sleep after each; prints the processor time.
+_CODE = """
+import time
+import rfgs_core, torch, numba
+import numpy as np
+
+@numba.njit(parallel=True)
+def kernel(values):
+    for i in numba.prange(len(values)):
+        values[i] += 1
+
+values = np.zeros(1000)
+kernel(values)
+start = time.process_time()
+for _ in range(50):
+    kernel(values)
+    time.sleep(0.01)
+print(time.process_time() - start)
+"""
+
+
+def _processor_s(**env: str) -> float:
+    kept = {name: value for name, value in os.environ.items() if name != "OMP_WAIT_POLICY"}
+    env = {**kept, "NUMBA_NUM_THREADS": "4", "NUMBA_THREADING_LAYER": "omp", **env}
+    done = subprocess.run(
+        [sys.executable, "-c", _CODE], env=env, capture_output=True, text=True, check=True
+    )
+    return float(done.stdout)
+
+
+def test_threads_sleep_between_kernels_unless_told_otherwise() -> None:
+    """Spinning threads take the half second of pauses on every core that they find."""
+    assert _processor_s() < 0.2 < _processor_s(OMP_WAIT_POLICY="ACTIVE")

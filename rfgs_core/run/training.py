@@ -60,6 +60,7 @@ _CHECKPOINT: dict[str, Shape] = {
     "velocity_xy": ("body", 2),
     "time_s": (),
     "track_id": ("M",),
+    "next_track": (),
     **{f"head.{name}": shape for name, shape in HEAD_SHAPES.items()},
 }
 
@@ -139,11 +140,14 @@ def train_sequence(
                 bar.update(config.iterations + 2)
             before = state
     if config.static_set and not has_static_set(out):
+        begin = time.perf_counter()
         # Of a calibrated run the background has no offsets only once a frame is fitted.
         seed = sub_seed(config.seed, sequence.name, radio, "static set")
         observations = run.observations(frames[0])
         with one_torch_thread():
             write_static_set(out, fit_static_set(observations, config.static_set, seed))
+        spent += time.perf_counter() - begin
+        write_json(out / "config.json", {**settings, "train_s": round(spent, 2)})
     _write_point_cloud(run)
     return Run(out, read_json(out / "config.json"))
 
@@ -165,8 +169,10 @@ def fit_frame(
     earlier = None
     if config.density == "motion" and before is not None:
         earlier = run.observations(run.frames[run.frames.index(frame) - 1])
+    bar.set_postfix_str(f"frame {frame}, finding bodies")
     state = start_frame(observations, config, seed, before, encoder, earlier)
     bar.update(1)
+    bar.set_postfix_str(f"frame {frame}, solving reflectivities")
     if config.objective != "paper":
         state = solve_reflectivity(observations, state, config)
     bar.update(1)
@@ -240,6 +246,7 @@ def _store(run: Run, frame: int, state: FrameState) -> None:
     save_arrays(run.path / "radio_head.npz", head)
     arrays = {name: value.numpy() for name, value in state.gaussians.items()}
     arrays |= {"power": state.power.numpy(), "track_id": state.track_id}
+    arrays["next_track"] = np.array(state.unused_track)
     arrays |= {name: np.asarray(value) for name, value in asdict(state.tracks).items()}
     save_arrays(_state_path(run, frame), {**arrays, **{f"head.{k}": v for k, v in head.items()}})
     (run.path / "checkpoints" / f"{frame:06d}.partial.npz").unlink(missing_ok=True)
@@ -258,6 +265,7 @@ def _finished(run: Run, frame: int) -> FrameState | None:
         head=RadioHead.of_arrays(arrays, "head."),
         tracks=Tracks(arrays["axes_xy"], arrays["velocity_xy"], float(arrays["time_s"])),
         track_id=arrays["track_id"],
+        next_track=int(arrays["next_track"]),
     )
 
 

@@ -16,6 +16,7 @@ from jaxtyping import Complex64, Float64
 
 from rfgs_core.seeds import sub_seed
 from rfgs_core.train.channel import Channel
+from rfgs_core.train.comparison import comparison_of
 from rfgs_core.train.config import TrainConfig
 from rfgs_core.train.first_powers import fit_power, new_head, noise_per_link
 from rfgs_core.train.localise import NEAR_M, SEPARATION_M, PairMaps, locate_bodies, pair_maps
@@ -62,17 +63,26 @@ def tell_apart(
     if near is None:
         for body in range(1, count):
             echoes = _echoes(observations, maps, found[:body], config, seed)
-            (found[body],) = _sought(observations, echoes.sum(axis=0))
+            _move(found, body, found[:body], _sought(observations, echoes.sum(axis=0)))
     for _ in range(ROUNDS):
         for body in range(count):
             echoes = _echoes(observations, maps, found, config, seed)
             others = echoes.sum(axis=0) - echoes[body]
             where = None if near is None else near[[body]]
-            (place,) = _sought(observations, others, where, reach_m[body])
-            apart = np.linalg.norm(np.delete(found, body, axis=0) - place, axis=1)
-            if apart.min() >= SEPARATION_M:
-                found[body] = place
+            place = _sought(observations, others, where, reach_m[body])
+            _move(found, body, np.delete(found, body, axis=0), place)
     return found
+
+
+def _move(
+    found: Float64[np.ndarray, "body 2"],
+    body: int,
+    others: Float64[np.ndarray, "other 2"],
+    place: Float64[np.ndarray, "1 2"],
+) -> None:
+    """Puts a body where it was sought, unless another one stands there."""
+    if np.linalg.norm(others - place, axis=1).min() >= SEPARATION_M:
+        found[body] = place[0]
 
 
 def _sought(
@@ -101,16 +111,14 @@ def _echoes(
     power = fit_power(observations, gaussians, replace(config, power_trust=0.0))
     head = new_head(observations, config, power)
     channel = Channel.of(observations, observations.links, observations.tones)
-    tone = np.flatnonzero(observations.tones)
-    visible = (channel.tx[:, None], channel.rx[:, None], tone)
-    target = torch.from_numpy(observations.delta[visible])
+    target = comparison_of(observations).measured()
     noise = noise_per_link(observations, target, config.unexplained)
     gamma = posterior_mean(channel, head, gaussians, target, noise, power, SOLVER_STEPS)
     body = nearest_axis(points, axes_xy)
-    echoes = np.zeros((len(axes_xy), *observations.delta.shape), dtype=np.complex64)
+    echoes = []
     with torch.no_grad():
         for index in range(len(axes_xy)):
             own = torch.from_numpy(body == index)
             part = channel.scattered(head, gaussians.select(own), gamma[own])
-            echoes[index][visible] = part.numpy()
-    return echoes
+            echoes.append(observations.with_entries(part.numpy()).delta)
+    return np.stack(echoes)

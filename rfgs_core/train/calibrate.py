@@ -87,9 +87,6 @@ def _fitted_change(
     state = start_frame(observations, replace(config, power_trust=0.0), seed, None)
     state = solve_reflectivity(observations, state, config)
     channel = Channel.of(observations, observations.links, observations.tones)
-    change = np.zeros_like(observations.delta)
     with torch.no_grad():
-        predicted = channel.change(state.head, state.gaussians).numpy()
-    tone = np.flatnonzero(observations.tones)
-    change[channel.tx[:, None], channel.rx[:, None], tone] = predicted
-    return change
+        predicted = channel.change(state.head, state.gaussians)
+    return observations.with_entries(predicted.numpy()).delta

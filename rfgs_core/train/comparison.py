@@ -70,18 +70,7 @@ class ComplexComparison:
         self, observations: Observations, change: Complex[Tensor, "link subcarrier"]
     ) -> Observations:
         """The residual channel."""
-        return with_entries(observations, (self.target - change).numpy())
-
-
-def with_entries(
-    observations: Observations, entries: Complex[np.ndarray, "link tone"]
-) -> Observations:
-    """The observations with other visible entries of the change."""
-    delta = np.zeros_like(observations.delta)
-    tx, rx = np.nonzero(observations.links)
-    tones = np.flatnonzero(observations.tones)
-    delta[tx[:, None], rx[:, None], tones] = entries
-    return observations.with_delta(delta)
+        return observations.with_entries((self.target - change).numpy())
 
 
 @dataclass(frozen=True)
@@ -132,7 +121,7 @@ class PowerComparison:
         left = self.target - self.predicted(change, np.arange(len(self.target)))
         wave = direct_wave(observations.layout, observations.freq_hz)
         wave = wave[observations.links][:, observations.tones]
-        return with_entries(observations, left.numpy() * wave)
+        return observations.with_entries(left.numpy() * wave)
 
 
 @dataclass(frozen=True)

@@ -52,6 +52,14 @@ class FrameState:
     goes_on: Bool[np.ndarray, "M"] | None = None
     """Which Gaussians were there in the frame before; None in a first frame."""
 
+    next_track: int = 0
+    """Numbers below it were given out, some of them to Gaussians that are gone."""
+
+    @property
+    def unused_track(self) -> int:
+        """The first number that no Gaussian has had."""
+        return max(self.next_track, int(self.track_id.max(initial=-1)) + 1)
+
     @property
     def body(self) -> Int64[np.ndarray, "M"]:
         """Body that each Gaussian belongs to: the one whose axis is nearest."""
@@ -101,7 +109,7 @@ def start_frame(
     axes_xy = tracks.axes_xy
     density = StartDensity.of(maps, axes_xy, observations.bounds_m)
     points = density.draw(config.num_gaussians, rng)
-    track_id, goes_on = np.arange(len(points), dtype=np.int64), None
+    track_id, goes_on, next_track = np.arange(len(points), dtype=np.int64), None, 0
     if before is not None:
         points, track_id = _carry_over(before, density, axes_xy, points)
         if config.density == "motion" and earlier is not None:
@@ -111,13 +119,13 @@ def start_frame(
                 *(before, maps, observations.bounds_m, axes_xy),
                 *(wanted, points, track_id, rng),
             )
-        goes_on = np.isin(track_id, before.track_id)
+        goes_on, next_track = np.isin(track_id, before.track_id), before.unused_track
     gaussians = gaussians_at(points, outward_normals(points, axes_xy))
     power = fit_power(observations, gaussians, config)
     head = before.head if before is not None else new_head(observations, config, power)
     features = head.without_readings(encode(observations, points, encoder).features)
     gaussians = replace(gaussians, features=features)
-    return FrameState(gaussians, power, head, tracks, track_id, goes_on)
+    return FrameState(gaussians, power, head, tracks, track_id, goes_on, next_track)
 
 
 def _followed(
@@ -151,7 +159,7 @@ def _carry_over(
     weakest = np.argsort(density.at(points))[:count]
     track_id = before.track_id.copy()
     points[weakest] = fresh[:count]
-    track_id[weakest] = track_id.max() + 1 + np.arange(count)
+    track_id[weakest] = before.unused_track + np.arange(count)
     return points, track_id
 
 
@@ -177,7 +185,7 @@ def _at_pace(
         if count > 0
     ]
     points = np.concatenate([points, *more])
-    unused = max(track_id.max(initial=-1), before.track_id.max()) + 1
+    unused = max(track_id.max(initial=-1) + 1, before.unused_track)
     fresh = unused + np.arange(len(points) - len(track_id))
     return points, np.concatenate([track_id, fresh])
 

@@ -26,7 +26,6 @@ from rfgs_core.errors import RfgsError
 from rfgs_core.seeds import sub_seed
 from rfgs_core.threads import one_torch_thread
 from rfgs_core.train.channel import Channel
-from rfgs_core.train.comparison import with_entries
 from rfgs_core.train.config import Observe, Packets, TrainConfig
 from rfgs_core.train.frame import FrameState, solve_reflectivity, start_frame
 from rfgs_core.train.observations import (
@@ -140,7 +139,7 @@ def _explained(
     channel = Channel.of(observations, observations.links, observations.tones)
     with torch.no_grad():
         change = channel.change(state.head, state.gaussians).numpy()
-    return with_entries(observations, change).delta
+    return observations.with_entries(change).delta
 
 
 def _median(rows: np.ndarray) -> Complex64[np.ndarray, "tx rx tone"]:

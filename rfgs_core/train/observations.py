@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from jaxtyping import Bool, Complex64, Float32, Float64, Int64
+from jaxtyping import Bool, Complex, Complex64, Float32, Float64, Int64
 
 from rfgs_core.dataset.observed import Observed, observed_packets
 from rfgs_core.encode.matched_filter import device_pairs
@@ -85,6 +85,13 @@ class Observations:
     def with_delta(self, delta: Complex64[np.ndarray, "tx rx subcarrier"]) -> Observations:
         """The same observations with another channel change, for example a residual."""
         return replace(self, delta=delta.astype(np.complex64), packets=None, packet_interval_s=0.0)
+
+    def with_entries(self, entries: Complex[np.ndarray, "link tone"]) -> Observations:
+        """The same observations with other visible entries of the change, zero where hidden."""
+        delta = np.zeros_like(self.delta)
+        tx, rx = np.nonzero(self.links)
+        delta[tx[:, None], rx[:, None], np.flatnonzero(self.tones)] = entries
+        return self.with_delta(delta)
 
 
 def _visible(

@@ -262,27 +262,27 @@ def _with_gaussians(
     gaussians = trained.gaussians.detach()
     if not trained.edited:
         return replace(state, gaussians=gaussians)
+    origin = trained.origin
+    unused = state.unused_track
+    tracks = {"track_id": _tracks(state.track_id, origin.numpy(), unused), "next_track": unused}
     if config.objective == "paper":
         strength = torch.linalg.norm(gaussians.features, dim=1) ** 2 * gaussians.opacities
         power = strength * state.head.gamma_scale_m**2
-        return replace(state, gaussians=gaussians, power=power, track_id=np.arange(len(gaussians)))
-    origin = trained.origin
+        return replace(state, gaussians=gaussians, power=power, **tracks)
     known = origin >= 0
     shares = torch.bincount(origin[known], minlength=len(state.power)).clamp(min=1)
     inherited = (state.power / shares)[origin.clamp(min=0)]
     power = torch.where(known, inherited, state.head.gamma(gaussians.features).abs() ** 2)
-    return replace(
-        state, gaussians=gaussians, power=power, track_id=_tracks(state.track_id, origin.numpy())
-    )
+    return replace(state, gaussians=gaussians, power=power, **tracks)
 
 
 def _tracks(
-    before: Int64[np.ndarray, "start"], origin: Int64[np.ndarray, "M"]
+    before: Int64[np.ndarray, "start"], origin: Int64[np.ndarray, "M"], unused: int
 ) -> Int64[np.ndarray, "M"]:
     """Track numbers of rows: the first that stems from an earlier one goes on, others are new."""
     track_id = np.full(len(origin), -1, dtype=np.int64)
     earlier, first = np.unique(origin, return_index=True)
     track_id[first[earlier >= 0]] = before[earlier[earlier >= 0]]
     fresh = track_id < 0
-    track_id[fresh] = before.max(initial=-1) + 1 + np.arange(int(fresh.sum()))
+    track_id[fresh] = unused + np.arange(int(fresh.sum()))
     return track_id

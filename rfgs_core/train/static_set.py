@@ -24,7 +24,6 @@ from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.seeds import sub_seed
 from rfgs_core.train.background import direct_background
 from rfgs_core.train.channel import Channel
-from rfgs_core.train.comparison import with_entries
 from rfgs_core.train.first_powers import noise_per_link
 from rfgs_core.train.head import RadioHead
 from rfgs_core.train.localise import PairMaps, pair_maps
@@ -108,7 +107,7 @@ def fit_static_set(observations: Observations, count: int, seed: int) -> StaticS
     gaussians, scattered = Gaussians.none(), torch.zeros_like(target)
     gamma = torch.zeros(0, dtype=torch.complex64)
     for part in tqdm(np.array_split(np.arange(count), ROUNDS), desc="static set", unit="round"):
-        residual = with_entries(rest, (target - scattered).numpy())
+        residual = rest.with_entries((target - scattered).numpy())
         gaussians = Gaussians.join(gaussians, _drawn(residual, len(part), rng))
         power = _level(channel, head, gaussians, target, noise, rng)
         gamma = posterior_mean(channel, head, gaussians, target, noise, power, SOLVER_STEPS)

@@ -127,3 +127,20 @@ def test_later_frames_move_the_earlier_gaussians(tiny_dataset: Path, quick_confi
     np.testing.assert_allclose(moved[:, 2], 0, atol=1e-6)
     assert second.head is first.head
     assert np.abs(shift).max() <= 0.8 + 1e-9
+
+
+def test_the_number_of_a_gaussian_that_is_gone_is_not_given_again(
+    tiny_dataset: Path, quick_config
+) -> None:
+    sequence = open_dataset(tiny_dataset).sequence()
+    first = start_frame(observe(sequence, "wifi", 1), quick_config, 3, None)
+    left = replace(
+        first,
+        gaussians=first.gaussians.select(torch.arange(40) < 39),
+        power=first.power[:39],
+        track_id=first.track_id[:39],
+        next_track=first.unused_track,
+    )
+    second = start_frame(observe(sequence, "wifi", 2), quick_config, 4, left)
+    assert second.track_id[~second.goes_on].min() == 40
+    assert second.unused_track == 40 + 13

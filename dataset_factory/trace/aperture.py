@@ -69,13 +69,15 @@ class ApertureTracer(BaseTracer):
         self._flush()
         paths = self._paths_at(vertices)
         self._bodies.move(vertices)
-        points, outlines = self._bodies.points(vertices), self._bodies.outlines(vertices)
+        points = self._bodies.points(vertices)
         gamma = self._bodies.gamma(self._radio.freq_hz) if points is not None else {}
         channels = []
         for place, own in enumerate(paths):
             passed = None
             if points is not None:
                 with self._timed("shadow"):
+                    scene = self._environment.scene
+                    outlines = self._bodies.outlines(vertices, own.vertices, scene)
                     elements = self._layouts[place]
                     passed = transmission(own, elements, outlines, self._nodes, self._shadow)
             with self._timed("environment"):

@@ -7,6 +7,7 @@ import numpy as np
 import sionna.rt as rt
 
 from dataset_factory.bundle import Bundle
+from dataset_factory.trace.beside import beside
 from dataset_factory.trace.direct import PosedPoints
 from dataset_factory.trace.movers import split_movers
 from dataset_factory.trace.points import SurfacePoints, surface_points
@@ -18,7 +19,7 @@ from dataset_factory.trace.scene import (
     move_meshes,
     move_vehicles,
 )
-from dataset_factory.trace.shadow import coarse_mesh
+from dataset_factory.trace.shadow import Outline, coarse_mesh
 from rfgs_core.radio import Radio
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
@@ -77,10 +78,19 @@ class Bodies:
         """The scattering points on the mesh of people; None if there are none."""
         return self._points
 
-    def outlines(self, vertices: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Vertices [m] and triangles that cast the shadow of each person, in that pose."""
+    def outlines(self, vertices: np.ndarray, corners: np.ndarray, scene: rt.Scene) -> list[Outline]:
+        """What casts the shadow of each person.
+
+        Args:
+            vertices: The bundle's vertices [m], shape (V, 3).
+            corners: Corners of the paths to be shaded [m], shape (path, corner, 3).
+            scene: What hides people from paths, everything in it in place.
+        """
         posed = self.people.posed(vertices)
-        return [(posed[kept], faces) for kept, faces in self._outlines]
+        return [
+            Outline(posed[kept], faces, beside(scene.mi_scene, corners, posed[kept]))
+            for kept, faces in self._outlines
+        ]
 
     def gamma(self, freq_hz: np.ndarray) -> dict[int, np.ndarray]:
         """Reflection coefficients of all materials that scatter from points, by material index."""

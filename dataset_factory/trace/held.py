@@ -14,6 +14,7 @@ import numpy as np
 
 from dataset_factory.trace.direct import PosedPoints
 from dataset_factory.trace.paths import PathSet
+from dataset_factory.trace.shadow import Outline
 from rfgs_core.radio.images import SCATTERING
 
 
@@ -25,6 +26,8 @@ class Trace:
     """Channel of the environment, shadows included, shape (tx, rx, subcarrier)."""
     paths: PathSet
     """Paths of the environment, without shadows."""
+    outlines: list[Outline]
+    """What shades those paths."""
     points: PosedPoints | None = None
     """Scattering points; None if there are none."""
     seen: np.ndarray | None = None

@@ -213,17 +213,17 @@ def euler_angles(quat_wxyz: tuple[float, float, float, float]) -> tuple[float, f
 
 
 def visible(mi_scene: Any, origins: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Whether nothing stands between points and one place.
+    """Whether nothing stands between points and one place, or a place each.
 
     Args:
         mi_scene: Mitsuba scene to test in.
         origins: Starting points [m], shape (point, 3).
-        target: End point [m], shape (3,).
+        target: End point [m], shape (3,) or (point, 3).
 
     Returns:
         True where the segment is free, bool, shape (point,).
     """
-    way = target[None, :] - origins
+    way = target - origins
     length = np.linalg.norm(way, axis=1)
     way = way / length[:, None]
     o = origins.astype(np.float32)

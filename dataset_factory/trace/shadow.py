@@ -10,6 +10,7 @@ it by where their own line crosses the plane.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal
 
 import numba
@@ -21,6 +22,19 @@ from rfgs_core.radio import Layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
 Shadow = Literal["kirchhoff", "hard"]
+
+
+@dataclass(frozen=True)
+class Outline:
+    """What casts a shadow, and on what."""
+
+    vertices: np.ndarray
+    """Vertices [m], shape (V, 3)."""
+    faces: np.ndarray
+    """Triangles, shape (T, 3)."""
+    beside: np.ndarray
+    """Which segments of the paths it may shade, bool, shape (path, segment)."""
+
 
 #: Detail of the mesh that casts shadows [m]; far below the first Fresnel zone of any preset.
 DETAIL_M = 0.015
@@ -72,7 +86,7 @@ def _reach(paths: PathSet) -> np.ndarray:
 def transmission(
     paths: PathSet,
     layout: Layout,
-    bodies: list[tuple[np.ndarray, np.ndarray]],
+    outlines: list[Outline],
     nodes_hz: np.ndarray,
     mode: Shadow,
 ) -> np.ndarray:
@@ -81,7 +95,7 @@ def transmission(
     Args:
         paths: Environment paths.
         layout: Antenna elements; every site has equally many.
-        bodies: Vertices [m] and triangles of each body.
+        outlines: Everybody's, for these paths.
         nodes_hz: Frequencies of the factors [Hz], shape (node,).
         mode: "kirchhoff", or "hard" for all or nothing.
 
@@ -98,14 +112,15 @@ def transmission(
     unfolded = _unfold(paths)
     tx = tx_places[paths.tx] - paths.vertices[:, :1]
     rx = rx_places[paths.rx] - paths.vertices[:, -1:]
-    for vertices, faces in bodies:
+    for outline in outlines:
         _shade(
             paths.vertices,
+            outline.beside,
             (*unfolded, _reach(paths)),
             np.ascontiguousarray(tx),
             np.ascontiguousarray(rx),
-            np.ascontiguousarray(vertices, dtype=np.float64),
-            np.ascontiguousarray(faces, dtype=np.int64),
+            np.ascontiguousarray(outline.vertices, dtype=np.float64),
+            np.ascontiguousarray(outline.faces, dtype=np.int64),
             SPEED_OF_LIGHT / np.asarray(nodes_hz, dtype=np.float64),
             silhouette.FRESNEL,
             mode == "hard",
@@ -164,6 +179,7 @@ def _reflections(paths: PathSet, k: np.ndarray) -> np.ndarray:
 @numba.njit(cache=True, parallel=True)
 def _shade(
     corners: np.ndarray,
+    beside: np.ndarray,
     unfolded: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray],
     tx_offset: np.ndarray,
     rx_offset: np.ndarray,
@@ -181,7 +197,7 @@ def _shade(
         for i in range(corners.shape[1] - 1):
             way = corners[p, i + 1] - corners[p, i]
             length = np.sqrt((way * way).sum())
-            if length < 1e-6:
+            if length < 1e-6 or not beside[p, i]:
                 continue
             xy, between, plane, scale, axes = silhouette.project(
                 vertices, corners[p, i], corners[p, i + 1], before[p, i], after[p, i]

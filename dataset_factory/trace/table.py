@@ -21,7 +21,7 @@ from dataset_factory.trace.patches import (
 )
 from dataset_factory.trace.paths import PathSet, empty, merged
 from dataset_factory.trace.scene import centres, owners
-from dataset_factory.trace.shadow import Shadow, transmission
+from dataset_factory.trace.shadow import Outline, Shadow, transmission
 from rfgs_core.radio import Layout, Radio
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.images import SCATTERING
@@ -65,7 +65,7 @@ class TableMaker:
         self,
         paths: PathSet,
         met: Met,
-        bodies: list[tuple[np.ndarray, np.ndarray]],
+        outlines: list[Outline],
         vehicles: tuple[np.ndarray, np.ndarray] | None = None,
     ) -> PathTable:
         """Rows of the environment, shadows included.
@@ -73,14 +73,14 @@ class TableMaker:
         Args:
             paths: Paths of `Environment`.
             met: What they met.
-            bodies: Vertices [m] and triangles of what casts shadows.
+            outlines: What casts shadows on them.
             vehicles: Where the vehicles' vertices are [m] and how fast they move [m/s].
         """
         if not len(paths):
             return self._table(paths, np.zeros((0, 0), np.int32), np.zeros(0))
         amplitude = paths.amplitude * (self._radio.centre_hz / self._nodes)
-        if bodies:
-            passed = transmission(paths, self._centres, bodies, self._nodes, self._shadow)
+        if outlines:
+            passed = transmission(paths, self._centres, outlines, self._nodes, self._shadow)
             amplitude = amplitude * passed[:, 0, 0, None, :]
         turns = np.zeros(len(paths))
         if vehicles is not None:

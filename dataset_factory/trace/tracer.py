@@ -19,7 +19,7 @@ from dataset_factory.trace.environment import (
 from dataset_factory.trace.held import Trace, follow, mixed
 from dataset_factory.trace.met import Met
 from dataset_factory.trace.paths import PathSet
-from dataset_factory.trace.shadow import Shadow, transmission
+from dataset_factory.trace.shadow import Outline, Shadow, transmission
 from dataset_factory.trace.steering import steer
 from dataset_factory.trace.table import TableMaker
 from rfgs_core.radio import Radio, frame_samples, layout, pose_span_s
@@ -97,8 +97,7 @@ class Tracer(BaseTracer):
         vehicles = None
         if len(bodies.vehicles):
             vehicles = bodies.vehicles.posed(frame.vertices), bodies.vehicles.posed(velocity)
-        outlines = bodies.outlines(frame.vertices)
-        parts = [self._tables.environment(trace.paths, self._met, outlines, vehicles)]
+        parts = [self._tables.environment(trace.paths, self._met, trace.outlines, vehicles)]
         if trace.points is not None:
             met = Met(self._bundle, bodies.scene, bodies.vehicles)
             parts.append(self._tables.people(trace, bodies, met, velocity, vehicles))
@@ -165,11 +164,12 @@ class Tracer(BaseTracer):
         """
         vertices = vertices.astype(np.float32)
         paths = self._paths_at(vertices)
-        environment = self._environment_of(paths, vertices)
+        outlines = self._outlines(paths, vertices)
+        environment = self._environment_of(paths, outlines)
         self._flush()
         points = self._bodies.points(vertices)
         if points is None:
-            return Trace(environment, paths)
+            return Trace(environment, paths, outlines)
         self._bodies.move(vertices)
         with self._timed("people_direct"):
             seen = in_sight(self._bodies.scene.mi_scene, points, self._layout)
@@ -177,18 +177,23 @@ class Tracer(BaseTracer):
         if self._bounces is not None:
             with self._timed("people_bounces"):
                 bounced = self._bounces.paths(points)
-        return Trace(environment, paths, points, seen, bounced)
+        return Trace(environment, paths, outlines, points, seen, bounced)
 
     def _environment_at(self, vertices: np.ndarray) -> np.ndarray:
         """Channel of everything but people's echoes, complex128, (tx, rx, subcarrier)."""
         vertices = vertices.astype(np.float32)
-        return self._environment_of(self._paths_at(vertices), vertices)
+        paths = self._paths_at(vertices)
+        return self._environment_of(paths, self._outlines(paths, vertices))
 
-    def _environment_of(self, paths: PathSet, vertices: np.ndarray) -> np.ndarray:
-        """Channel of the environment's paths past what stands at places [m], shape (V, 3)."""
+    def _outlines(self, paths: PathSet, vertices: np.ndarray) -> list[Outline]:
+        """What shades paths that were just traced, people at places [m], shape (V, 3)."""
+        with self._timed("shadow"):
+            return self._bodies.outlines(vertices, paths.vertices, self._environment.scene)
+
+    def _environment_of(self, paths: PathSet, outlines: list[Outline]) -> np.ndarray:
+        """Channel of the environment's paths past what casts shadows."""
         passed = None
-        if self._bodies.scatter:
-            outlines = self._bodies.outlines(vertices)
+        if outlines:
             with self._timed("shadow"):
                 passed = transmission(paths, self._layout, outlines, self._nodes, self._shadow)
         with self._timed("environment"):

@@ -6,7 +6,7 @@ import pytest
 import trimesh
 
 from dataset_factory.trace.paths import PathSet
-from dataset_factory.trace.shadow import coarse_mesh, transmission
+from dataset_factory.trace.shadow import Outline, coarse_mesh, transmission
 from rfgs_core.radio import Layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
@@ -38,10 +38,17 @@ def screen(low: float, high: float) -> tuple[np.ndarray, np.ndarray]:
     return vertices, np.array([[0, 1, 2], [0, 2, 3]])
 
 
+def shaded(
+    paths: PathSet, layout: Layout, body: tuple[np.ndarray, np.ndarray], mode: str = "kirchhoff"
+) -> np.ndarray:
+    everywhere = np.ones((len(paths), paths.vertices.shape[1] - 1), bool)
+    return transmission(paths, layout, [Outline(*body, everywhere)], FREQ_HZ, mode)
+
+
 def factor(body: tuple[np.ndarray, np.ndarray], mode: str = "kirchhoff") -> complex:
     ends = np.zeros(3), np.array([D_1 + D_2, 0.0, 0.0])
     paths, layout = line_of_sight(*ends, np.zeros((1, 3)))
-    return complex(transmission(paths, layout, [body], FREQ_HZ, mode)[0, 0, 0, 0])
+    return complex(shaded(paths, layout, body, mode)[0, 0, 0, 0])
 
 
 def test_half_plane_at_grazing_costs_six_db() -> None:
@@ -77,10 +84,10 @@ def test_elements_see_the_shadow_from_where_they_are() -> None:
     vertices, faces = screen(-1.7, 0.02)
     body = (vertices * [1.0, 0.005, 1.0], faces)
     paths, layout = line_of_sight(tx, rx, offsets)
-    together = transmission(paths, layout, [body], FREQ_HZ, "kirchhoff")[0, 0, :, 0]
+    together = shaded(paths, layout, body)[0, 0, :, 0]
     for offset, value in zip(offsets, together, strict=True):
         alone, place = line_of_sight(tx, rx + offset, np.zeros((1, 3)))
-        exact = transmission(alone, place, [body], FREQ_HZ, "kirchhoff")[0, 0, 0, 0]
+        exact = shaded(alone, place, body)[0, 0, 0, 0]
         assert abs(value - exact) < 0.02
 
 
@@ -95,13 +102,10 @@ def test_reflected_path_is_shaded_on_its_unfolded_line() -> None:
     middle = [np.stack([np.full(4, D_1), wide[:, 0], wide[:, 1]], axis=1)]
     middle.append(np.stack([3.0 + wide[:, 0], np.full(4, 6.0 - D_1 - 3.0), wide[:, 1]], axis=1))
     faces = np.array([[0, 1, 2], [0, 2, 3]])
-    first, second = (
-        transmission(paths, layout, [(body, faces)], FREQ_HZ, "kirchhoff")[0, 0, 0, 0]
-        for body in middle
-    )
+    first, second = (shaded(paths, layout, (body, faces))[0, 0, 0, 0] for body in middle)
     straight_paths, straight_layout = line_of_sight(tx, np.array([6.0, 0.0, 0.0]), np.zeros((1, 3)))
     straight = [
-        transmission(straight_paths, straight_layout, [(body, faces)], FREQ_HZ, "kirchhoff")
+        shaded(straight_paths, straight_layout, (body, faces))
         for body in (middle[0], middle[0] + [6.0 - D_1 - 3.0 + 3.0 - D_1, 0.0, 0.0])
     ]
     assert first == pytest.approx(straight[0][0, 0, 0, 0], abs=1e-6)

@@ -31,7 +31,7 @@ def bounced(tracer, points) -> np.ndarray:
     """Channel of the points by way of walls."""
     from dataset_factory.trace.held import Trace
 
-    trace = Trace(np.zeros(0), None, points, None, tracer._bounces.paths(points))
+    trace = Trace(np.zeros(0), None, [], points, None, tracer._bounces.paths(points))
     return tracer._bounced(points, trace)
 
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from rfgs_core.study.cases import CONDITIONS
 from rfgs_core.study.summary import Row
@@ -35,13 +35,18 @@ from the rival to `oracle_init`, the same fit started on the true surface. Eleme
 unseen array columns of csi − csi_static. Missed: marks that were set before and are not reached."""
 
 
-def study_table(rows: Sequence[Row]) -> str:
-    """All rows, then what the columns and conditions mean."""
+def study_table(rows: Sequence[Row], failed: Mapping[str, str] | None = None) -> str:
+    """All rows, then what the columns and conditions mean, and why cases by name have failed."""
     lines = [f"| {' | '.join(_HEAD)} |", "|" + "---|" * len(_HEAD)]
     lines += [f"| {' | '.join(_cells(row))} |" for row in rows]
     shown = dict.fromkeys(row.condition for row in rows)
     conditions = [f"- {name}: {CONDITIONS[name].label}" for name in shown]
-    return "\n".join([*lines, "", _NOTES, "", *conditions, ""])
+    lines += ["", _NOTES, "", *conditions, ""]
+    if failed:
+        lines += ["Failed, and in no row:", ""]
+        lines += [f"- {name}: {why}" for name, why in failed.items()]
+        lines.append("")
+    return "\n".join(lines)
 
 
 def _cells(row: Row) -> list[str]:

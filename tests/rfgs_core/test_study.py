@@ -9,7 +9,9 @@ from typing import Any
 import pytest
 
 from rfgs_core.cli.calls import call
+from rfgs_core.cli.study import StudyArgs, run
 from rfgs_core.errors import RfgsError
+from rfgs_core.files import write_json
 from rfgs_core.study import CONDITIONS, RADIOS, SCENES, Case, cases, study_table, summarise
 
 
@@ -101,6 +103,22 @@ def test_the_table_names_what_is_missed() -> None:
     assert line.endswith("| cut, template f10, linear, gaussian process |")
     assert "0.600 (clean)" in line and "an inverse crime" in text
     assert line.count("|") == text.splitlines()[0].count("|")
+
+
+def test_a_case_that_fails_is_named_and_the_others_go_on(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One dataset is damaged; another case was finished before."""
+    damaged, finished = (Case("two_crossing", "clean", radio, 0) for radio in ("wifi", "mmwave"))
+    write_json(tmp_path / damaged.dataset / "dataset.json", {})
+    write_json(tmp_path / finished.run / "metrics.json", metrics(0.8))
+    assert run(StudyArgs(tmp_path, ("two_crossing",), ("clean",), ("wifi", "mmwave"), 1)) == 1
+    text = (tmp_path / "study.md").read_text()
+    assert text in capsys.readouterr().out
+    assert "| two_crossing | mmwave | clean | 1 | 0.600 | 0.800 |" in text
+    assert "| wifi |" not in text
+    assert f"\n- {damaged.run.name}: `python -m rfgs_core.cli train" in text
+    assert "failed (exit code 2)" in text
 
 
 def test_a_failed_command_is_named() -> None:

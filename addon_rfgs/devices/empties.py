@@ -121,10 +121,14 @@ def duplicate(scene: bpy.types.Scene, item: bpy.types.Object) -> bpy.types.Objec
     """A copy of a device in the same place and in the same collections.
 
     Of a device whose collections are all linked from another file the copy joins the scene's own.
+
+    Raises:
+        AddonError: The scene's own is of another file too; nothing has changed then.
     """
     homes = [row for row in item.users_collection if row.library is None]
+    homes = homes or [own_collection(scene, COLLECTION)]
     twin = item.copy()
-    for collection in homes or [own_collection(scene, COLLECTION)]:
+    for collection in homes:
         collection.objects.link(twin)
     return twin
 

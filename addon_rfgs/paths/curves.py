@@ -22,6 +22,7 @@ COLLECTION = "RF-GS Paths"
 MATERIAL = "RF-GS path"
 #: Custom property: whose paths an object shows.
 LINK = "rfgs_link"
+_STATIC = ", static"
 #: Levels of power that are told apart by colour.
 _LEVELS = 12
 
@@ -119,7 +120,7 @@ def show_paths(
             item = _curve_object(part, _levels(part, top, choice), materials, choice)
             # Corners are metres; the object's scale carries them into the scene's units.
             item.scale = (1 / unit_scale(scene),) * 3
-            item[LINK] = f"{choice.radio}: {ends}" + ("" if frame is not None else ", static")
+            item[LINK] = f"{choice.radio}: {ends}" + ("" if frame is not None else _STATIC)
             item["power_db"] = [float(value) for value in part.power_db]
             item["delay_s"] = [float(value) for value in part.delay_s]
             item["interactions"] = json.dumps([part.interactions(i) for i in range(len(part))])
@@ -153,7 +154,7 @@ def clear_paths() -> tuple[int, int]:
         How many objects there were, and of how many links.
     """
     items = [item for row in collections_of(COLLECTION) for item in row.objects if LINK in item]
-    links = {item[LINK] for item in items}
+    links = {item[LINK].removesuffix(_STATIC) for item in items}
     _remove(items)
     drop_empty(COLLECTION)
     for material in [row for row in bpy.data.materials if row.name.startswith(MATERIAL + " ")]:

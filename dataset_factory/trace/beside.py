@@ -14,19 +14,22 @@ import numpy as np
 
 from dataset_factory.trace.scene import visible
 
-#: Places on a body, any of which may be in sight.
+#: Places on a body, at most, any of which may be in sight.
 PLACES = 24
 #: Points on a segment keep this distance from its ends, which lie on walls [m].
 _MARGIN_M = 0.01
 
 
-def beside(mi_scene: Any, corners: np.ndarray, vertices: np.ndarray) -> np.ndarray:
+def beside(
+    mi_scene: Any, corners: np.ndarray, vertices: np.ndarray, faces: np.ndarray
+) -> np.ndarray:
     """Whether any of a body is in sight from where segments of paths pass it.
 
     Args:
         mi_scene: Mitsuba scene of everything that hides, without the body.
         corners: Corners of paths [m], shape (path, corner, 3).
         vertices: Vertices of the body [m], shape (V, 3).
+        faces: Its triangles, shape (T, 3).
 
     Returns:
         One value per segment, bool, shape (path, corner - 1).
@@ -38,6 +41,7 @@ def beside(mi_scene: Any, corners: np.ndarray, vertices: np.ndarray) -> np.ndarr
     share = ((vertices.mean(axis=0) - start) * way).sum(axis=2) / length**2
     share = np.clip(share, _MARGIN_M / length, 1 - _MARGIN_M / length)
     foot = (start + share[..., None] * way).reshape(-1, 3)
-    places = vertices[:: max(1, len(vertices) // PLACES)]
+    # Not vertices: those of a simple mesh are its corners, which may stick in floor and ceiling.
+    places = vertices[faces[:: -(-len(faces) // PLACES)]].mean(axis=1)
     seen = visible(mi_scene, np.repeat(foot, len(places), axis=0), np.tile(places, (len(foot), 1)))
     return seen.reshape(*share.shape, len(places)).any(axis=2)

@@ -88,7 +88,7 @@ class Bodies:
         """
         posed = self.people.posed(vertices)
         return [
-            Outline(posed[kept], faces, beside(scene.mi_scene, corners, posed[kept]))
+            Outline(posed[kept], faces, beside(scene.mi_scene, corners, posed[kept], faces))
             for kept, faces in self._outlines
         ]
 

@@ -63,24 +63,24 @@ def tell_apart(
     if near is None:
         for body in range(1, count):
             echoes = _echoes(observations, maps, found[:body], config, seed)
-            _move(found, body, found[:body], _sought(observations, echoes.sum(axis=0)))
+            _move(found, body, _sought(observations, echoes.sum(axis=0)))
     for _ in range(ROUNDS):
         for body in range(count):
             echoes = _echoes(observations, maps, found, config, seed)
             others = echoes.sum(axis=0) - echoes[body]
             where = None if near is None else near[[body]]
             place = _sought(observations, others, where, reach_m[body])
-            _move(found, body, np.delete(found, body, axis=0), place)
+            _move(found, body, place)
     return found
 
 
 def _move(
     found: Float64[np.ndarray, "body 2"],
     body: int,
-    others: Float64[np.ndarray, "other 2"],
     place: Float64[np.ndarray, "1 2"],
 ) -> None:
     """Puts a body where it was sought, unless another one stands there."""
+    others = np.delete(found, body, axis=0)
     if np.linalg.norm(others - place, axis=1).min() >= SEPARATION_M:
         found[body] = place[0]
 

@@ -69,7 +69,7 @@ def calibrate(
     straight = CrossSpectra.of(observations, observations.static, direct_channel(observations))
     capture = _likeliest(config, straight, pooled=True)
     for _ in range(TURNS):
-        change = _fitted_change(capture.undone(aligned), config, seed)
+        change = fitted_change(capture.undone(aligned), config, seed)
         scattered = CrossSpectra.of(observations, aligned.delta, change)
         capture = _likeliest(config, straight, scattered, pooled=True)
     return Calibration(capture, drift)
@@ -80,7 +80,7 @@ def _likeliest(config: TrainConfig, *models: CrossSpectra, pooled: bool = False)
     return estimate_offsets(*models, phase=phase, timing=timing, pooled=pooled)
 
 
-def _fitted_change(
+def fitted_change(
     observations: Observations, config: TrainConfig, seed: int
 ) -> Complex64[np.ndarray, "tx rx subcarrier"]:
     """What Gaussians fitted to the observations predict at the visible entries."""

@@ -161,6 +161,12 @@ def steel_sheet() -> Mesh:
     return sheet((-1.5, 0, 0.2), (3, 0, 0), (0, 0, 2.4))
 
 
+@pytest.fixture(scope="session")
+def make_sheet() -> Callable[..., Mesh]:
+    """Makes parallelograms from a corner and two sides."""
+    return sheet
+
+
 @pytest.fixture
 def three_sheets() -> list[Mesh]:
     """Three sheets of the room."""

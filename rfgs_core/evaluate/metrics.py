@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -160,7 +161,9 @@ def _evaluate_frame(
     score, predicted = scene.score(frame), scene.run.predict(frame)
     evidence = scene.evidence(frame, score)
     # Without phases there is no channel to compare with, and nothing is left to add.
-    whole = with_residual(predicted, evidence) if scene.observe == "complex" else predicted
+    whole = predicted
+    if scene.observe == "complex":
+        whole = with_residual(predicted, evidence, partial(scene.run.refitted, frame))
     # A static set brings the method's own empty room.
     best, alone = (None, None) if room is None else (room.best, room.whole)
     _add(scene, table, METHOD, frame, ControlResult(score, whole, best), reference, csi)

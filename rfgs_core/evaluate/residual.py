@@ -1,34 +1,136 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Adds to a prediction what it leaves of the visible channel, kriged to hidden entries.
+"""The method's prediction of hidden entries: Gaussians, what they leave, and how far to trust both.
 
-The Gaussians are the mean of a Gaussian process whose covariance is that of the control
-`gaussian_process` (regression kriging): physics says what is far from all that was measured, and
-neighbouring antennas and tones say what physics has missed. Device pairs without a visible link
-keep the prediction.
+Gaussians say what is far from all that was measured; neighbouring antennas and tones say what
+physics has missed (regression kriging), with the covariance of the control `spectrum`. Which of
+the two to believe differs between radios and device pairs: three answers are mixed, the
+Gaussians', the Gaussians' with their residual carried on, and the channel carried on as it is.
+Weights come from visible entries that were left out of all three beforehand (stacking, Wolpert,
+Neural Networks 5(2), 1992), one set per device pair and kind of entry, none below zero, one at
+most in sum: what nobody can tell is predicted as nothing. Device pairs without a visible link keep
+the prediction.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
-from jaxtyping import Complex
+from jaxtyping import Bool, Complex, Complex64, Float64
+from scipy.optimize import nnls
 
-from rfgs_core.evaluate.controls.gaussian_process import krige
 from rfgs_core.evaluate.controls.interpolation import fill
+from rfgs_core.evaluate.controls.spectrum import spectral
 from rfgs_core.evaluate.evidence import Evidence
+from rfgs_core.radio import Layout
 
-#: Row of the prediction without its residual.
+#: Row of the prediction of the Gaussians by themselves.
 GAUSSIANS_ALONE = "gaussians_alone"
+#: Weights where nothing can be left out: Gaussians with their residual.
+_UNTRIED = np.array([0.0, 1.0, 0.0])
+#: How strictly weights keep to a sum of one.
+_STRICT = 1e4
+
+#: What the method predicts once it has seen these links and tones only.
+Refit = Callable[
+    [Bool[np.ndarray, "tx rx"], Bool[np.ndarray, "subcarrier"]],
+    Complex[np.ndarray, "tx rx subcarrier"],
+]
 
 
 def with_residual(
+    predicted: Complex[np.ndarray, "tx rx subcarrier"], evidence: Evidence, refit: Refit
+) -> Complex64[np.ndarray, "tx rx subcarrier"]:
+    """The prediction of csi − csi_static, completed by what is visible.
+
+    Args:
+        predicted: What the Gaussians say.
+        evidence: What may be looked at.
+        refit: The Gaussians' answer from less evidence.
+    """
+    fewer = _fewer(evidence)
+    tried = _answers(refit(fewer.link_visible, fewer.tone_visible), fewer)
+    answers = _answers(predicted, evidence)
+    links = evidence.link_visible & ~fewer.link_visible
+    tones = evidence.tone_visible & ~fewer.tone_visible
+    out = np.array(predicted, dtype=np.complex64)
+    for pair in _pairs(evidence.layout):
+        seen = pair & evidence.link_visible
+        if not seen.any():
+            continue
+        columns = (pair & links)[..., None] & fewer.tone_visible
+        gaps = (pair & fewer.link_visible)[..., None] & tones
+        for where, left_out in ((seen, gaps), (pair & ~seen, columns)):
+            weights = _weights(tried[:, left_out], evidence.delta[left_out])
+            out[where] = np.einsum("a,a...->...", weights, answers[:, where])
+    visible = np.isfinite(evidence.delta)
+    out[visible] = evidence.delta[visible]
+    out[~evidence.layout.measured] = 0.0
+    return out
+
+
+def _fewer(evidence: Evidence) -> Evidence:
+    """The evidence with as much left out as is held out: last columns, and tones amid others."""
+    column = evidence.layout.rx_column
+    seen = np.unique(column[evidence.link_visible.any(axis=0)])
+    hidden = len(np.unique(column)) - len(seen)
+    links = evidence.link_visible.copy()
+    if hidden < len(seen):
+        links[:, np.isin(column, seen[len(seen) - hidden :])] = False
+    tones = evidence.tone_visible.copy()
+    first, last = _longest_run(tones)
+    count = min(int((~tones).sum()), (last - first) // 2)
+    middle = (first + last - count) // 2
+    tones[middle : middle + count] = False
+    kept = links[..., None] & tones
+    unknown = np.complex64(complex(np.nan, np.nan))
+    return replace(
+        evidence,
+        delta=np.where(kept, evidence.delta, unknown).astype(np.complex64),
+        link_visible=links,
+        tone_visible=tones,
+    )
+
+
+def _longest_run(tones: Bool[np.ndarray, "subcarrier"]) -> tuple[int, int]:
+    """First and last + 1 of the most visible tones in a row."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], tones.astype(int), [0]])))
+    runs = edges.reshape(-1, 2)
+    longest = runs[int(np.argmax(runs[:, 1] - runs[:, 0]))]
+    return int(longest[0]), int(longest[1])
+
+
+def _answers(
     predicted: Complex[np.ndarray, "tx rx subcarrier"], evidence: Evidence
-) -> Complex[np.ndarray, "tx rx subcarrier"]:
-    """The prediction of csi − csi_static with its kriged residual."""
+) -> Complex64[np.ndarray, "answer tx rx subcarrier"]:
+    """Gaussians, Gaussians with their residual, and the channel without Gaussians."""
     left = evidence.delta - np.where(np.isnan(evidence.delta), 0.0, predicted)
-    residual = fill(left.astype(np.complex64), evidence, krige)
-    layout = evidence.layout
-    for a, b in layout.device_pairs:
-        block = np.ix_(layout.tx_device == a, layout.rx_device == b)
-        if not evidence.link_visible[block].any():
-            residual[block] = 0.0
-    return (predicted + residual).astype(np.complex64)
+    carried = fill(left.astype(np.complex64), evidence, spectral)
+    plain = fill(evidence.delta, evidence, spectral)
+    return np.stack([predicted, predicted + carried, plain]).astype(np.complex64)
+
+
+def _pairs(layout: Layout) -> list[Bool[np.ndarray, "tx rx"]]:
+    """Measured links of each ordered pair of devices."""
+    devices = layout.tx_device[:, None], layout.rx_device
+    return [(devices[0] == a) & (devices[1] == b) & layout.measured for a, b in layout.device_pairs]
+
+
+def _weights(
+    tried: Complex64[np.ndarray, "answer n"], true: Complex64[np.ndarray, "n"]
+) -> Float64[np.ndarray, "answer"]:
+    """Least squares with weights of at least zero and at most one in sum."""
+    known = np.isfinite(true)
+    scale = float(np.linalg.norm(true[known]))
+    if scale == 0.0:
+        return _UNTRIED
+    columns, target = tried[:, known].T / scale, true[known] / scale
+    columns = np.concatenate([columns.real, columns.imag]).astype(np.float64)
+    target = np.concatenate([target.real, target.imag]).astype(np.float64)
+    weights = nnls(columns, target)[0]
+    if weights.sum() > 1.0:
+        # Without the limit the sum is larger, so with it the sum is one.
+        ones = np.full((1, columns.shape[1]), _STRICT)
+        weights = nnls(np.vstack([columns, ones]), np.append(target, _STRICT))[0]
+    return weights

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-from jaxtyping import Complex, Float, Float32, Float64
+from jaxtyping import Bool, Complex, Float, Float32, Float64
 
 from rfgs_core.dataset.observed import Observed, observed_csi
 from rfgs_core.dataset.sequence import Sequence
@@ -71,6 +71,15 @@ class EvaluatedRun(Protocol):
 
     def predict(self, frame: int) -> Complex[np.ndarray, "tx rx subcarrier"]:
         """Csi − csi_static on every measured link, held-out ones included."""
+        ...
+
+    def refitted(
+        self,
+        frame: int,
+        links: Bool[np.ndarray, "tx rx"],
+        tones: Bool[np.ndarray, "subcarrier"],
+    ) -> Complex[np.ndarray, "tx rx subcarrier"]:
+        """The same, had training seen these links and tones only."""
         ...
 
 

@@ -116,7 +116,7 @@ def _rf(metrics: dict[str, Any], key: str) -> str:
         return f"{WON}{numbers}, the best control."
     below = [name for name, value in known.items() if value >= own]
     smooth = ""
-    if best in ("gaussian_process", "linear"):
+    if best in ("spectrum", "gaussian_process", "linear"):
         smooth = (
             " Clean channels are smooth along arrays and tones, which suits interpolation; it "
             "says nothing about where the person is."

@@ -4,14 +4,14 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
 import torch
-from jaxtyping import Complex64
+from jaxtyping import Bool, Complex64, Float64
 
 from rfgs_core.arrays import Shape, load_arrays
 from rfgs_core.dataset import Sequence, open_dataset
@@ -22,9 +22,12 @@ from rfgs_core.gaussians import FEATURE_DIM, Gaussians
 from rfgs_core.gaussians.ply import read_ply
 from rfgs_core.run.calibration import read_calibration
 from rfgs_core.run.static import static_gaussians
+from rfgs_core.threads import one_torch_thread
 from rfgs_core.train.channel import Channel
+from rfgs_core.train.config import TrainConfig
 from rfgs_core.train.head import HEAD_SHAPES, RadioHead
 from rfgs_core.train.observations import Observations, Reported, observe
+from rfgs_core.train.reflectivity import fitted_reflectivities
 from rfgs_core.train.unseen_pairs import levelled
 
 #: Schema of `config.json`.
@@ -142,18 +145,55 @@ class Run:
         Device pairs that training did not see get the mean power of reflected powers without
         phases. Of a calibrated run: as devices with the offsets of the empty room's capture see it.
         """
-        observations = self.observations(frame)
+        return self._answer(frame, self.observations(frame), self.moving(frame))
+
+    def refitted(
+        self,
+        frame: int,
+        links: Bool[np.ndarray, "tx rx"],
+        tones: Bool[np.ndarray, "subcarrier"],
+    ) -> Complex64[np.ndarray, "tx rx subcarrier"]:
+        """What `predict` says once reflectivities are solved from some of the visible entries.
+
+        What the run was fitted to says nothing about how well it predicts; entries that are left
+        out here do. Gaussians stay where they are. Radios without phases have no such answer.
+
+        Args:
+            frame: Which frame.
+            links: Links to keep.
+            tones: Tones to keep.
+        """
+        observations = self.observations(frame).only(links, tones)
+        gaussians, head = self.moving(frame), self.head
+        power = torch.from_numpy(self._power(frame).astype(np.float32))
+        with one_torch_thread():
+            gamma = fitted_reflectivities(
+                *(observations, head, gaussians, power),
+                self.config.get("unexplained", TrainConfig.unexplained),
+                self.config.get("solver_steps", TrainConfig.solver_steps),
+            )
+        assert gamma is not None
+        features = head.with_gamma(gaussians.features, gamma)
+        return self._answer(frame, observations, replace(gaussians, features=features))
+
+    def _power(self, frame: int) -> Float64[np.ndarray, "M"]:
+        """Reflected power of each moving Gaussian [m²]."""
+        return 10 ** (self.attributes(frame)["rf_power_db"].astype(np.float64) / 10)
+
+    def _answer(
+        self, frame: int, observations: Observations, gaussians: Gaussians
+    ) -> Complex64[np.ndarray, "tx rx subcarrier"]:
+        """What Gaussians do to every measured link."""
         everything = np.ones(len(observations.freq_hz), dtype=bool)
         channel = Channel.of(observations, observations.layout.measured, everything)
-        head, gaussians = self.head, self.moving(frame)
+        head = self.head
         with torch.no_grad():
             change = channel.change(head, gaussians).numpy()
         csi = np.zeros_like(observations.delta)
         csi[channel.tx, channel.rx] = change
-        power = 10 ** (self.attributes(frame)["rf_power_db"].astype(np.float64) / 10)
         csi = levelled(
             *(csi, observations.links, observations.layout, observations.centre_hz),
-            *(head, gaussians, power),
+            *(head, gaussians, self._power(frame)),
         )
         if self.calibrated:
             offsets = read_calibration(self.path, frame).capture

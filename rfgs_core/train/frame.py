@@ -15,15 +15,13 @@ from rfgs_core.errors import RfgsError
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.seeds import sub_seed
 from rfgs_core.train.apart import tell_apart
-from rfgs_core.train.channel import Channel
-from rfgs_core.train.comparison import comparison_of
 from rfgs_core.train.config import TrainConfig
 from rfgs_core.train.density.motion import kept, novelty, paces_m_s, wanted_counts
-from rfgs_core.train.first_powers import fit_power, new_head, noise_per_link
+from rfgs_core.train.first_powers import fit_power, new_head
 from rfgs_core.train.head import RadioHead
 from rfgs_core.train.localise import PairMaps, locate_bodies, pair_maps
 from rfgs_core.train.observations import Observations
-from rfgs_core.train.reflectivity import posterior_mean
+from rfgs_core.train.reflectivity import fitted_reflectivities
 from rfgs_core.train.sampling import encode
 from rfgs_core.train.start import (
     StartDensity,
@@ -198,19 +196,12 @@ def solve_reflectivity(
     Powers per delay know nothing of phases: there each Gaussian gets the root of its reflected
     power and a phase drawn for it, the model that the power fit assumes.
     """
-    comparison = comparison_of(observations)
-    channel = Channel.of(observations, observations.links, observations.tones)
-    with torch.no_grad():
-        shadow = comparison.linear(channel.shadowed(state.head, state.gaussians))
-    if shadow is None:
+    gamma = fitted_reflectivities(
+        *(observations, state.head, state.gaussians, state.power),
+        *(config.unexplained, config.solver_steps),
+    )
+    if gamma is None:
         gamma = _drawn_phases(state, config.seed)
-    else:
-        measured = comparison.measured()
-        noise = noise_per_link(observations, measured, config.unexplained)
-        gamma = posterior_mean(
-            *(channel, state.head, state.gaussians, measured - shadow, noise, state.power),
-            *(config.solver_steps, comparison),
-        )
     features = state.head.with_gamma(state.gaussians.features, gamma)
     return replace(state, gaussians=replace(state.gaussians, features=features))
 

@@ -93,6 +93,16 @@ class Observations:
         delta[tx[:, None], rx[:, None], np.flatnonzero(self.tones)] = entries
         return self.with_delta(delta)
 
+    def only(
+        self, links: Bool[np.ndarray, "tx rx"], tones: Bool[np.ndarray, "subcarrier"]
+    ) -> Observations:
+        """The same observations of fewer links and tones, as if the others were held out too."""
+        links, tones = self.links & links, self.tones & tones
+        seen = links[..., None] & tones
+        fewer = self.with_delta(np.where(seen, self.delta, 0))
+        static = np.where(seen, self.static, 0).astype(np.complex64)
+        return replace(fewer, static=static, links=links, tones=tones)
+
 
 def _visible(
     split: dict[str, Any], elements: Layout, num_subcarriers: int

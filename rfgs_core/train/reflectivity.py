@@ -17,8 +17,43 @@ from torch import Tensor
 
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.train.channel import Channel
-from rfgs_core.train.comparison import Comparison
+from rfgs_core.train.comparison import Comparison, comparison_of
+from rfgs_core.train.first_powers import noise_per_link
 from rfgs_core.train.head import RadioHead
+from rfgs_core.train.observations import Observations
+
+
+def fitted_reflectivities(
+    observations: Observations,
+    head: RadioHead,
+    gaussians: Gaussians,
+    power: Float[Tensor, "M"],
+    unexplained: float,
+    iterations: int,
+) -> Complex[Tensor, "M"] | None:
+    """Posterior-mean reflectivities [m] that explain a frame beside the Gaussians' shadow.
+
+    Args:
+        observations: The frame.
+        head: Decodes ρ and opacities.
+        gaussians: Fixed Gaussians.
+        power: Prior variance of each reflectivity [m²].
+        unexplained: Share of each device pair's power that is left as noise.
+        iterations: Conjugate-gradient steps.
+
+    Returns:
+        One per Gaussian; None where the radio reports powers per delay, which have no phases.
+    """
+    comparison = comparison_of(observations)
+    channel = Channel.of(observations, observations.links, observations.tones)
+    with torch.no_grad():
+        shadow = comparison.linear(channel.shadowed(head, gaussians))
+    if shadow is None:
+        return None
+    measured = comparison.measured()
+    noise = noise_per_link(observations, measured, unexplained)
+    target = measured - shadow
+    return posterior_mean(channel, head, gaussians, target, noise, power, iterations, comparison)
 
 
 def posterior_mean(

@@ -11,6 +11,7 @@ from rfgs_core.evaluate.controls import (
     matched_filter,
     nearest_element,
     omp,
+    spectrum,
     template,
     zero,
 )
@@ -22,6 +23,7 @@ CONTROLS: dict[str, Control] = {
     "nearest_element": nearest_element.control,
     "linear": linear.control,
     "gaussian_process": gaussian_process.control,
+    "spectrum": spectrum.control,
     "empty_room": empty_room.control,
     "matched_filter": matched_filter.control,
     "matched_filter_all_sum": matched_filter.all_sum,

@@ -21,8 +21,8 @@ from rfgs_core.evaluate.evidence import ControlResult, Evidence
 
 #: Correlation lengths tried, in steps of the coordinate.
 LENGTHS = (0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 40.0)
-#: Noise powers tried, relative to the signal.
-NOISES = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
+#: Noise powers tried, relative to the signal; what is nearly all noise is predicted as nothing.
+NOISES = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0)
 #: Correlation length of levels between device pairs, as a share of their mean distance.
 LEVEL_LENGTH = 1.0
 LEVEL_NOISE = 0.1

@@ -7,7 +7,7 @@ from rfgs_core.evaluate.evidence import Control, ControlResult, Evidence
 from rfgs_core.train.config import Observe
 
 #: Controls that say nothing but a channel, which takes the channel's phases to interpolate.
-_CHANNEL_ONLY = ("nearest_element", "linear", "gaussian_process")
+_CHANNEL_ONLY = ("nearest_element", "linear", "gaussian_process", "spectrum")
 #: Controls that add up waves; a hologram of powers per tone still has some, delays have none.
 _COHERENT = ("clean", "omp")
 #: Predict that nothing changed or arrives, whatever is reported.

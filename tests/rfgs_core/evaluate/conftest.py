@@ -62,6 +62,9 @@ class SurfaceRun:
     def predict(self, frame: int) -> np.ndarray:
         return 0.9 * (self.sequence.csi("wifi", frame) - self.sequence.csi_static("wifi"))
 
+    def refitted(self, frame: int, links: np.ndarray, tones: np.ndarray) -> np.ndarray:
+        return self.predict(frame)
+
 
 @pytest.fixture
 def surface_run(tiny_dataset: Path, tmp_path: Path) -> SurfaceRun:

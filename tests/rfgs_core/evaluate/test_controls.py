@@ -12,6 +12,7 @@ from rfgs_core.evaluate.controls.clean import separated_peaks
 from rfgs_core.evaluate.controls.gaussian_process import krige
 from rfgs_core.evaluate.controls.linear import linear
 from rfgs_core.evaluate.controls.nearest_element import nearest
+from rfgs_core.evaluate.controls.spectrum import _like, _likeliest, spectral
 from rfgs_core.evaluate.evidence import Evidence
 from rfgs_core.evaluate.geometry import best_voxels
 from rfgs_core.evaluate.rf import frame_rf, rf_values
@@ -111,7 +112,7 @@ def test_empty_room_predicts_hidden_static_entries(scatterers) -> None:
 
 def test_interpolators_keep_visible_entries_and_unmeasured_links(scatterers) -> None:
     made = scatterers(ONE, own_device_links="excluded")
-    for name in ("nearest_element", "linear", "gaussian_process"):
+    for name in ("nearest_element", "linear", "gaussian_process", "spectrum"):
         delta = CONTROLS[name](made.evidence).delta
         visible = made.held_out.visible
         np.testing.assert_array_equal(delta[visible], made.evidence.delta[visible])
@@ -140,6 +141,49 @@ def test_kriging_bridges_a_gap_of_tones() -> None:
     seen = (x[:, 0] < 16) | (x[:, 0] >= 20)
     filled = krige(values[seen], x[seen], x[~seen])
     assert np.abs(filled - values[~seen]).max() < 0.05
+
+
+def test_a_spectrum_carries_on_waves_that_kriging_confuses() -> None:
+    """Two echoes far apart in direction or delay: one phase slope fits neither of them."""
+    x = np.arange(64.0)[:, None]
+    rng = np.random.default_rng(0)
+    # Samples of one spectrum, as links of a device pair are: the same waves, other amplitudes.
+    amplitude = rng.standard_normal((2, 12)) + 1j * rng.standard_normal((2, 12))
+    values = np.exp(1j * x * np.array([0.4, -1.3])) @ amplitude
+    seen = (x[:, 0] < 40) | (x[:, 0] >= 48)
+    error = {
+        f.__name__: np.linalg.norm(f(values[seen], x[seen], x[~seen]) - values[~seen])
+        / np.linalg.norm(values[~seen])
+        for f in (krige, spectral)
+    }
+    assert error["spectral"] < 0.01 < 0.5 < error["krige"]
+
+
+def test_noise_is_predicted_as_nothing() -> None:
+    """Hidden values of white noise: whatever is said about them only adds to the error."""
+    x = np.arange(48.0)[:, None]
+    rng = np.random.default_rng(1)
+    values = rng.standard_normal((48, 200)) + 1j * rng.standard_normal((48, 200))
+    seen = (x[:, 0] < 30) | (x[:, 0] >= 36)
+    for carry_on in (krige, spectral):
+        said = carry_on(values[seen], x[seen], x[~seen])
+        assert np.mean(np.abs(said) ** 2) < 0.1 * np.mean(np.abs(values) ** 2), carry_on.__name__
+
+
+def test_a_spectrum_has_the_power_of_wave_and_noise() -> None:
+    """The power of a single wave, and that of the noise around it."""
+    x = np.arange(16)
+    rng = np.random.default_rng(2)
+    noise = 0.1 * (rng.standard_normal((16, 400)) + 1j * rng.standard_normal((16, 400)))
+    wave = np.exp(2j * np.pi * 0.25 * x)[:, None] * np.exp(2j * np.pi * rng.random(400))
+    values = _like((wave + noise).astype(np.complex128))
+    power, level = _likeliest(values, x, 64)
+    assert int(np.argmax(power)) == 16
+    wide = np.zeros(64, dtype=bool)
+    wide[12:21] = True
+    assert power[wide].sum() == pytest.approx(1.0, rel=0.05)
+    # An even spectrum is noise too, so only their sum is known.
+    assert power[~wide].sum() + level == pytest.approx(0.02, rel=0.3)
 
 
 def test_lines_extend_beyond_the_last_value_and_nearest_does_not() -> None:

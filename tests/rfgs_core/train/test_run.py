@@ -74,6 +74,29 @@ def test_training_explains_what_it_saw_and_some_of_what_it_did_not(
     assert error[~visible].sum() < power[~visible].sum()
 
 
+def test_a_refit_knows_no_more_than_what_is_left(
+    trained_run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Other values at left-out entries change nothing; at the others they do."""
+    seen = trained_run.observations(1)
+    links, tones = seen.links.copy(), seen.tones.copy()
+    links[:, np.flatnonzero(links.any(axis=0))[::2]] = False
+    tones[: len(tones) // 4] = False
+    first = trained_run.refitted(1, links, tones)
+    assert np.isfinite(first).all()
+    kept = links[..., None] & tones
+    assert np.vdot(first[kept], seen.delta[kept]).real > 0
+
+    def reports(delta: np.ndarray, static: np.ndarray) -> np.ndarray:
+        other = replace(seen.with_delta(delta), static=static.astype(np.complex64))
+        monkeypatch.setattr(Run, "observations", lambda run, frame: other)
+        return trained_run.refitted(1, links, tones)
+
+    elsewhere = np.where(kept, 1.0, -3.0)
+    np.testing.assert_array_equal(reports(seen.delta * elsewhere, seen.static * elsewhere), first)
+    assert not np.allclose(reports(-seen.delta, seen.static), first, rtol=0.1)
+
+
 def test_prediction_is_zero_on_links_that_the_radio_lacks(trained_run: Run, own_run: Path) -> None:
     files = SequenceFiles(own_run.parent / "dataset" / "tiny")
     store = files.csi("wifi")

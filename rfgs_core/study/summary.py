@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from rfgs_core.evaluate.residual import GAUSSIANS_ALONE
 from rfgs_core.study.cases import Case
 
 #: Controls whose best F10 the method's is held against.
@@ -23,6 +24,8 @@ TEMPLATE_MARKS = {"wifi": ("f10",), "mmwave": ("f05", "f10"), "uwb": ("f05", "f1
 TRACKED_MARK = 0.95
 #: Decibels above linear interpolation that held-out elements are to reach.
 ELEMENT_MARK_DB = 6.0
+#: Controls that only interpolate the channel.
+INTERPOLATORS = ("linear", "gaussian_process", "spectrum")
 
 _OWN = ("f05", "f10", "centroid_m", "tracked")
 
@@ -42,6 +45,10 @@ class Row:
     """Largest less smallest F10 over the seeds."""
     best_rival: str
     """Which of `RIVALS` has the best F10."""
+    best_gain: str
+    """Which control has the least error of an unseen device pair's level; empty for none."""
+    best_profile: str
+    """Which control has the best delay profiles of unseen links; empty for none."""
     marks: dict[str, bool | None]
     """Whether each mark is reached; None where it cannot be told."""
 
@@ -78,13 +85,32 @@ def _row(scene: str, condition: str, radio: str, rows: list[Mapping[str, Any]]) 
     values["cut"] = _share(values["f10"], values["rival_f10"], 1.0)
     values["gap"] = _share(values["f10"], values["rival_f10"], values["oracle_f10"])
     values["element_snr_db"] = _mean(row["rf"].get("element_snr_db") for row in rows)
-    for name in ("linear", "gaussian_process"):
+    for name in INTERPOLATORS:
         values[f"{name}_snr_db"] = _control(rows, name, "rf", "element_snr_db")
+    best_gain = _best_channel(rows, values, "device_gain_mae_db", min)
+    best_profile = _best_channel(rows, values, "delay_profile_corr", max)
     f10 = [row["geometry"]["f10"] for row in rows if row["geometry"].get("f10") is not None]
     spread = max(f10) - min(f10) if f10 else 0.0
     return Row(
-        *(scene, condition, radio, len(rows), values, spread, best_rival, _marks(radio, values))
+        *(scene, condition, radio, len(rows), values, spread),
+        *(best_rival, best_gain, best_profile, _marks(radio, values)),
     )
+
+
+def _best_channel(
+    rows: list[Mapping[str, Any]],
+    values: dict[str, float | None],
+    key: str,
+    best: Callable[..., str],
+) -> str:
+    """Puts a metric of unseen links and its best control's into `values`; names that control."""
+    values[key] = _mean(row["rf"].get(key) for row in rows)
+    names = [name for name in rows[0]["controls"] if name not in (GAUSSIANS_ALONE, "oracle_init")]
+    found = {name: _control(rows, name, "rf", key) for name in names}
+    known = {name: value for name, value in found.items() if value is not None}
+    name = best(known, key=lambda name: known[name], default="")
+    values[f"control_{key}"] = known.get(name)
+    return name
 
 
 def _share(own: float | None, rival: float | None, ceiling: float | None) -> float | None:
@@ -106,12 +132,17 @@ def _marks(radio: str, values: Mapping[str, float | None]) -> dict[str, bool | N
         return above(name, None if other is None else other + lead)
 
     shares = [share for share in (values["cut"], values["gap"]) if share is not None]
-    centroid_m = values["centroid_m"]
     return {
         "cut": max(shares) >= CUT_MARK[radio] if shares else None,
         **{f"template_{key}": better(key, f"template_{key}", 0.0) for key in TEMPLATE_MARKS[radio]},
-        "centroid": None if centroid_m is None else centroid_m < CENTROID_MARK_M[radio],
+        "centroid": _less(values["centroid_m"], CENTROID_MARK_M[radio]),
         "tracked": above("tracked", TRACKED_MARK),
         "linear": better("element_snr_db", "linear_snr_db", ELEMENT_MARK_DB),
         "gaussian_process": better("element_snr_db", "gaussian_process_snr_db", 0.0),
+        "pair_gain": _less(values["device_gain_mae_db"], values["control_device_gain_mae_db"]),
+        "profiles": better("delay_profile_corr", "control_delay_profile_corr", 0.0),
     }
+
+
+def _less(value: float | None, mark: float | None) -> bool | None:
+    return None if value is None or mark is None else value < mark

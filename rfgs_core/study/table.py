@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from rfgs_core.study.cases import CONDITIONS
-from rfgs_core.study.summary import Row
+from rfgs_core.study.summary import INTERPOLATORS, Row
 
 _HEAD = (
     "scene",
@@ -24,7 +24,9 @@ _HEAD = (
     "centroid [m]",
     "tracked",
     "elements [dB]",
-    "linear/GP [dB]",
+    "linear/GP/spectrum [dB]",
+    "pair level [dB]",
+    "profiles",
     "missed",
 )
 
@@ -32,7 +34,9 @@ _NOTES = """\
 F5, F10: F-score at 5 and 10 cm, mean over frames and seeds. Best rival: the best of matched filter,
 CLEAN and OMP. Error cut: share of the rival's 1 − F10 that is removed; gap closed: share of the way
 from the rival to `oracle_init`, the same fit started on the true surface. Elements: complex SNR on
-unseen array columns of csi − csi_static. Missed: marks that were set before and are not reached."""
+unseen array columns of csi − csi_static, beside three ways to interpolate. Pair level: error of an
+unseen device pair's mean power; profiles: correlation of the delay profiles of unseen links; both
+beside the best control. Missed: marks that were set before and are not reached."""
 
 
 def study_table(rows: Sequence[Row], failed: Mapping[str, str] | None = None) -> str:
@@ -60,9 +64,17 @@ def _cells(row: Row) -> list[str]:
         f"{number(v['template_f05'])} / {number(v['template_f10'])}",
         *(number(v["oracle_f10"]), number(v["centroid_m"]), number(v["tracked"])),
         number(v["element_snr_db"], ".1f"),
-        f"{number(v['linear_snr_db'], '.1f')} / {number(v['gaussian_process_snr_db'], '.1f')}",
+        " / ".join(number(v[f"{name}_snr_db"], ".1f") for name in INTERPOLATORS),
+        _beside(v, "device_gain_mae_db", row.best_gain, ".1f"),
+        _beside(v, "delay_profile_corr", row.best_profile, ".2f"),
         ", ".join(missed) or "none",
     ]
+
+
+def _beside(values: Mapping[str, float | None], key: str, control: str, form: str) -> str:
+    """The method's value, and the best control's in brackets."""
+    own = number(values[key], form)
+    return f"{own} ({number(values[f'control_{key}'], form)} {control})" if control else own
 
 
 def number(value: float | None, form: str = ".3f") -> str:

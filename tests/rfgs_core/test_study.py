@@ -18,13 +18,13 @@ from rfgs_core.study import CONDITIONS, RADIOS, SCENES, Case, cases, study_table
 def metrics(f10: float, **changes: float) -> dict[str, Any]:
     """Metrics of a case: matched filter at 0.5, CLEAN at 0.6, template at 0.7, ceiling at 0.9."""
     geometry = {"f05": 0.6, "f10": f10, "centroid_m": 0.08, "tracked": 1.0}
-    rf = {"element_snr_db": 9.0}
+    rf = {"element_snr_db": 9.0, "device_gain_mae_db": 3.0, "delay_profile_corr": 0.7}
     for name, value in changes.items():
         (rf if name in rf else geometry)[name] = value
 
-    def control(f10: float | None, snr_db: float | None = None) -> dict[str, Any]:
+    def control(f10: float | None, snr_db: float | None = None, **rf: float) -> dict[str, Any]:
         own = {"f05": 0.5, "f10": f10} if f10 is not None else {"f05": None, "f10": None}
-        return {"geometry": own, "rf": {"element_snr_db": snr_db}}
+        return {"geometry": own, "rf": {"element_snr_db": snr_db, **rf}}
 
     controls = {
         "matched_filter": control(0.5),
@@ -32,8 +32,11 @@ def metrics(f10: float, **changes: float) -> dict[str, Any]:
         "omp": control(None),
         "template": control(0.7),
         "oracle_init": control(0.9),
-        "linear": control(None, 2.0),
-        "gaussian_process": control(None, 9.5),
+        "linear": control(None, 2.0, device_gain_mae_db=5.0, delay_profile_corr=0.6),
+        "gaussian_process": control(None, 9.5, device_gain_mae_db=4.0, delay_profile_corr=0.8),
+        "spectrum": control(None, 9.7),
+        # Neither the method's own parts nor its ceiling are rivals.
+        "gaussians_alone": control(None, 1.0, device_gain_mae_db=0.5, delay_profile_corr=0.9),
     }
     return {"geometry": geometry, "rf": rf, "controls": controls}
 
@@ -81,7 +84,10 @@ def test_marks_follow_from_means_over_seeds() -> None:
         "tracked": True,
         "linear": True,
         "gaussian_process": False,
+        "pair_gain": True,
+        "profiles": False,
     }
+    assert (row.best_gain, row.best_profile) == ("gaussian_process", "gaussian_process")
 
 
 def test_marks_differ_by_radio_and_a_lower_ceiling_counts() -> None:
@@ -100,7 +106,8 @@ def test_the_table_names_what_is_missed() -> None:
     case = Case("living_room_walk", "clean", "wifi", 0)
     text = study_table(summarise([(case, metrics(0.61, element_snr_db=3.0))]))
     (line,) = [line for line in text.splitlines() if line.startswith("| living_room_walk")]
-    assert line.endswith("| cut, template f10, linear, gaussian process |")
+    assert line.endswith("| cut, template f10, linear, gaussian process, profiles |")
+    assert "| 3.0 | 2.0 / 9.5 / 9.7 | 3.0 (4.0 gaussian_process) | 0.70 (0.80" in line
     assert "0.600 (clean)" in line and "an inverse crime" in text
     assert line.count("|") == text.splitlines()[0].count("|")
 

@@ -19,6 +19,7 @@ from rfgs_core.dataset.sequence import Sequence
 from rfgs_core.evaluate.controls.gaussian_process import krige, krige_level
 from rfgs_core.evaluate.controls.interpolation import fill
 from rfgs_core.evaluate.controls.linear import inverse_distance, linear
+from rfgs_core.evaluate.controls.spectrum import spectral
 from rfgs_core.evaluate.evidence import Evidence
 from rfgs_core.evaluate.geometry import reference_points
 from rfgs_core.evaluate.rf import RF_KEYS, frame_rf, pool_rf, snr_db
@@ -70,7 +71,7 @@ class Backgrounds:
 
     @cached_property
     def best(self) -> Channel:
-        """Direct paths, the set, and what they leave of the visible background, kriged."""
+        """Direct paths, the set, and what they leave of the visible background, carried on."""
         return _with_residual(self.whole, self.evidence)
 
 
@@ -78,10 +79,11 @@ def background_metrics(scene: Scene, own: Backgrounds) -> dict[str, Any]:
     """`rows`, the metrics by method, and `surface_m`, distances of the set to true surfaces."""
     evidence = own.evidence
     answers = {
-        "static_set, residual kriged": own.best,
+        "static_set, with residual": own.best,
         "static_set": own.whole,
-        "direct paths, residual kriged": _with_residual(own.straight, evidence),
+        "direct paths, with residual": _with_residual(own.straight, evidence),
         "direct paths": own.straight,
+        "spectrum": fill(evidence.static, evidence, spectral, krige_level),
         "gaussian_process": fill(evidence.static, evidence, krige, krige_level),
         "linear": fill(evidence.static, evidence, linear, inverse_distance),
         "zero": np.zeros_like(own.whole),
@@ -94,9 +96,9 @@ def background_metrics(scene: Scene, own: Backgrounds) -> dict[str, Any]:
 
 
 def _with_residual(predicted: Channel, evidence: Evidence) -> Channel:
-    """The prediction with what it leaves of the visible background, kriged."""
+    """The prediction with what it leaves of the visible background, carried on by its spectrum."""
     left = evidence.static - np.where(np.isnan(evidence.static), 0.0, predicted)
-    return predicted + fill(left.astype(np.complex64), evidence, krige)
+    return predicted + fill(left.astype(np.complex64), evidence, spectral)
 
 
 def _metrics(scene: Scene, predicted: Channel) -> dict[str, float | None]:

@@ -206,7 +206,7 @@ def test_the_empty_room_is_told_better_than_by_direct_paths(own_run: Run) -> Non
     for name in ("visible_snr_db", "element_snr_db", "subcarrier_snr_db"):
         assert rows["static_set"][name] > rows["direct paths"][name] + 1, name
     # Both know what was visible exactly.
-    assert rows["static_set, residual kriged"]["visible_snr_db"] > 60
+    assert rows["static_set, with residual"]["visible_snr_db"] > 60
     assert set(metrics["surface_m"]) == {"power_median", "median", "chance_median"}
 
 

@@ -17,7 +17,7 @@ from scipy.spatial import KDTree
 
 from rfgs_core.dataset.sequence import Sequence
 from rfgs_core.evaluate.controls.gaussian_process import krige, krige_level
-from rfgs_core.evaluate.controls.interpolation import fill
+from rfgs_core.evaluate.controls.interpolation import carry_on, fill
 from rfgs_core.evaluate.controls.linear import inverse_distance, linear
 from rfgs_core.evaluate.controls.spectrum import spectral
 from rfgs_core.evaluate.evidence import Evidence
@@ -98,7 +98,7 @@ def background_metrics(scene: Scene, own: Backgrounds) -> dict[str, Any]:
 def _with_residual(predicted: Channel, evidence: Evidence) -> Channel:
     """The prediction with what it leaves of the visible background, carried on by its spectrum."""
     left = evidence.static - np.where(np.isnan(evidence.static), 0.0, predicted)
-    return predicted + fill(left.astype(np.complex64), evidence, spectral)
+    return predicted + carry_on(left, evidence, spectral)
 
 
 def _metrics(scene: Scene, predicted: Channel) -> dict[str, float | None]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -19,12 +20,13 @@ from rfgs_core.evaluate.image import IMAGE_KEYS
 from rfgs_core.evaluate.oracle import oracle_scores
 from rfgs_core.evaluate.pictures import Values, has_pictures, mean_of, picture_metrics
 from rfgs_core.evaluate.provenance import conditions, hardware, limits, now, versions
-from rfgs_core.evaluate.residual import GAUSSIANS_ALONE, with_residual
+from rfgs_core.evaluate.residual import GAUSSIANS_ALONE, Answer, with_residual
 from rfgs_core.evaluate.rf import RF_KEYS, frame_rf, pool_rf, rf_values
 from rfgs_core.evaluate.scene import EvaluatedRun, Scene
 from rfgs_core.evaluate.verdicts import verdicts
 from rfgs_core.files import write_json
 from rfgs_core.render.view import pictures_of
+from rfgs_core.train.observations import Kept
 
 SCHEMA = "rfgs-metrics/1"
 #: Name of the evaluated method among the controls while they are computed alike.
@@ -163,7 +165,8 @@ def _evaluate_frame(
     # Without phases there is no channel to compare with, and nothing is left to add.
     whole = predicted
     if scene.observe == "complex":
-        whole = with_residual(predicted, evidence, partial(scene.run.refitted, frame))
+        seen = replace(evidence, delta=scene.run.visible_change(frame))
+        whole = with_residual(predicted, seen, partial(_from_less, scene.run, frame))
     # A static set brings the method's own empty room.
     best, alone = (None, None) if room is None else (room.best, room.whole)
     _add(scene, table, METHOD, frame, ControlResult(score, whole, best), reference, csi)
@@ -176,6 +179,11 @@ def _evaluate_frame(
         result = phase_free.answer(name, control, evidence, scene.observe)
         _add(scene, table, name, frame, result, reference, csi)
         on_step()
+
+
+def _from_less(run: EvaluatedRun, frame: int, kept: Kept) -> Answer:
+    """What is visible of some entries, and what the method says from them."""
+    return Answer(run.visible_change(frame, kept), run.refitted(frame, kept))
 
 
 def _add(

@@ -5,25 +5,27 @@ Gaussians say what is far from all that was measured; neighbouring antennas and 
 physics has missed (regression kriging), with the covariance of the control `spectrum`. Which of
 the two to believe differs between radios and device pairs: three answers are mixed, the
 Gaussians', the Gaussians' with their residual carried on, and the channel carried on as it is.
-Weights come from visible entries that were left out of all three beforehand (stacking, Wolpert,
-Neural Networks 5(2), 1992), one set per device pair and kind of entry, none below zero, one at
-most in sum: what nobody can tell is predicted as nothing. Device pairs without a visible link keep
-the prediction.
+Weights come from visible entries that are left out beforehand (stacking, Wolpert, Neural Networks
+5(2), 1992), one set per device pair and kind of entry, none below zero, one at most in sum: what
+none of the three can tell is predicted as nothing. Reflectivities are solved without what is left
+out; places and shapes of Gaussians had seen it. Where nothing can be left out, the second answer
+stands; device pairs without a visible link keep the prediction.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Complex, Complex64, Float64
 from scipy.optimize import nnls
 
-from rfgs_core.evaluate.controls.interpolation import fill
+from rfgs_core.evaluate.controls.interpolation import carry_on, fill
 from rfgs_core.evaluate.controls.spectrum import spectral
 from rfgs_core.evaluate.evidence import Evidence
 from rfgs_core.radio import Layout
+from rfgs_core.train.observations import Kept
 
 #: Row of the prediction of the Gaussians by themselves.
 GAUSSIANS_ALONE = "gaussians_alone"
@@ -32,35 +34,40 @@ _UNTRIED = np.array([0.0, 1.0, 0.0])
 #: How strictly weights keep to a sum of one.
 _STRICT = 1e4
 
-#: What the method predicts once it has seen these links and tones only.
-Refit = Callable[
-    [Bool[np.ndarray, "tx rx"], Bool[np.ndarray, "subcarrier"]],
-    Complex[np.ndarray, "tx rx subcarrier"],
-]
+
+@dataclass(frozen=True)
+class Answer:
+    """What is visible and what the Gaussians say from it."""
+
+    change: Complex[np.ndarray, "tx rx subcarrier"]
+    """Csi − csi_static, NaN where hidden."""
+    predicted: Complex[np.ndarray, "tx rx subcarrier"]
+    """The Gaussians' own csi − csi_static."""
 
 
 def with_residual(
-    predicted: Complex[np.ndarray, "tx rx subcarrier"], evidence: Evidence, refit: Refit
+    predicted: Complex[np.ndarray, "tx rx subcarrier"],
+    evidence: Evidence,
+    from_less: Callable[[Kept], Answer],
 ) -> Complex64[np.ndarray, "tx rx subcarrier"]:
     """The prediction of csi − csi_static, completed by what is visible.
 
     Args:
         predicted: What the Gaussians say.
         evidence: What may be looked at.
-        refit: The Gaussians' answer from less evidence.
+        from_less: What there would be of some links and tones only.
     """
-    fewer = _fewer(evidence)
-    tried = _answers(refit(fewer.link_visible, fewer.tone_visible), fewer)
-    answers = _answers(predicted, evidence)
-    links = evidence.link_visible & ~fewer.link_visible
-    tones = evidence.tone_visible & ~fewer.tone_visible
+    links, tones = kept = _left(evidence)
+    less = from_less(kept)
+    fewer = replace(evidence, delta=less.change, link_visible=links, tone_visible=tones)
+    tried, answers = _answers(less.predicted, fewer), _answers(predicted, evidence)
     out = np.array(predicted, dtype=np.complex64)
     for pair in _pairs(evidence.layout):
         seen = pair & evidence.link_visible
         if not seen.any():
             continue
-        columns = (pair & links)[..., None] & fewer.tone_visible
-        gaps = (pair & fewer.link_visible)[..., None] & tones
+        columns = (seen & ~links)[..., None] & tones
+        gaps = (seen & links)[..., None] & evidence.tone_visible & ~tones
         for where, left_out in ((seen, gaps), (pair & ~seen, columns)):
             weights = _weights(tried[:, left_out], evidence.delta[left_out])
             out[where] = np.einsum("a,a...->...", weights, answers[:, where])
@@ -70,8 +77,8 @@ def with_residual(
     return out
 
 
-def _fewer(evidence: Evidence) -> Evidence:
-    """The evidence with as much left out as is held out: last columns, and tones amid others."""
+def _left(evidence: Evidence) -> Kept:
+    """Links and tones without as many as are held out: the last columns, and tones amid others."""
     column = evidence.layout.rx_column
     seen = np.unique(column[evidence.link_visible.any(axis=0)])
     hidden = len(np.unique(column)) - len(seen)
@@ -83,14 +90,7 @@ def _fewer(evidence: Evidence) -> Evidence:
     count = min(int((~tones).sum()), (last - first) // 2)
     middle = (first + last - count) // 2
     tones[middle : middle + count] = False
-    kept = links[..., None] & tones
-    unknown = np.complex64(complex(np.nan, np.nan))
-    return replace(
-        evidence,
-        delta=np.where(kept, evidence.delta, unknown).astype(np.complex64),
-        link_visible=links,
-        tone_visible=tones,
-    )
+    return links, tones
 
 
 def _longest_run(tones: Bool[np.ndarray, "subcarrier"]) -> tuple[int, int]:
@@ -106,7 +106,7 @@ def _answers(
 ) -> Complex64[np.ndarray, "answer tx rx subcarrier"]:
     """Gaussians, Gaussians with their residual, and the channel without Gaussians."""
     left = evidence.delta - np.where(np.isnan(evidence.delta), 0.0, predicted)
-    carried = fill(left.astype(np.complex64), evidence, spectral)
+    carried = carry_on(left, evidence, spectral)
     plain = fill(evidence.delta, evidence, spectral)
     return np.stack([predicted, predicted + carried, plain]).astype(np.complex64)
 
@@ -122,9 +122,11 @@ def _weights(
 ) -> Float64[np.ndarray, "answer"]:
     """Least squares with weights of at least zero and at most one in sum."""
     known = np.isfinite(true)
+    if not known.any():
+        return _UNTRIED
     scale = float(np.linalg.norm(true[known]))
     if scale == 0.0:
-        return _UNTRIED
+        return np.zeros(len(tried))
     columns, target = tried[:, known].T / scale, true[known] / scale
     columns = np.concatenate([columns.real, columns.imag]).astype(np.float64)
     target = np.concatenate([target.real, target.imag]).astype(np.float64)

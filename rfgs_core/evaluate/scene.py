@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-from jaxtyping import Bool, Complex, Float, Float32, Float64
+from jaxtyping import Complex, Float, Float32, Float64
 
 from rfgs_core.dataset.observed import Observed, observed_csi
 from rfgs_core.dataset.sequence import Sequence
@@ -26,7 +26,7 @@ from rfgs_core.render.view import moving_gaussians
 from rfgs_core.seeds import sub_seed
 from rfgs_core.train.config import Background, Observe, Packets
 from rfgs_core.train.delay_maps import delay_power_map
-from rfgs_core.train.observations import Observations
+from rfgs_core.train.observations import Kept, Observations
 
 
 class EvaluatedRun(Protocol):
@@ -73,13 +73,14 @@ class EvaluatedRun(Protocol):
         """Csi − csi_static on every measured link, held-out ones included."""
         ...
 
-    def refitted(
-        self,
-        frame: int,
-        links: Bool[np.ndarray, "tx rx"],
-        tones: Bool[np.ndarray, "subcarrier"],
+    def refitted(self, frame: int, kept: Kept) -> Complex[np.ndarray, "tx rx subcarrier"]:
+        """The same with reflectivities solved from some of the visible entries."""
+        ...
+
+    def visible_change(
+        self, frame: int, kept: Kept | None = None
     ) -> Complex[np.ndarray, "tx rx subcarrier"]:
-        """The same, had training seen these links and tones only."""
+        """Csi − csi_static as training sees it, of all or some entries; NaN where hidden."""
         ...
 
 

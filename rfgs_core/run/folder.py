@@ -11,7 +11,7 @@ from typing import Any, get_args
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Complex64, Float64
+from jaxtyping import Complex64, Float64
 
 from rfgs_core.arrays import Shape, load_arrays
 from rfgs_core.dataset import Sequence, open_dataset
@@ -26,7 +26,7 @@ from rfgs_core.threads import one_torch_thread
 from rfgs_core.train.channel import Channel
 from rfgs_core.train.config import TrainConfig
 from rfgs_core.train.head import HEAD_SHAPES, RadioHead
-from rfgs_core.train.observations import Observations, Reported, observe
+from rfgs_core.train.observations import Kept, Observations, Reported, observe
 from rfgs_core.train.reflectivity import fitted_reflectivities
 from rfgs_core.train.unseen_pairs import levelled
 
@@ -75,19 +75,20 @@ class Run:
         """Whether offsets of devices are taken out before the fit."""
         return self.config.get("calibrate", "none") != "none"
 
-    def observations(self, frame: int) -> Observations:
+    def observations(self, frame: int, kept: Kept | None = None) -> Observations:
         """What the fit sees of a frame: as reported, without the offsets of a calibrated run."""
-        reported = self.as_reported(frame)
+        reported = self.as_reported(frame, kept)
         if not self.calibrated:
             return reported
         return read_calibration(self.path, frame).undone(reported)
 
-    def as_reported(self, frame: int) -> Observations:
+    def as_reported(self, frame: int, kept: Kept | None = None) -> Observations:
         """The channel of a frame as the run's radios report it."""
         return observe(
             *(self.sequence, self.config["radio"], frame, self.channel),
             *(self.config.get("observe", "complex"), self._background()),
             packets=self.config.get("packets", "first"),
+            kept=kept,
         )
 
     def _background(self) -> Reported | None:
@@ -147,12 +148,7 @@ class Run:
         """
         return self._answer(frame, self.observations(frame), self.moving(frame))
 
-    def refitted(
-        self,
-        frame: int,
-        links: Bool[np.ndarray, "tx rx"],
-        tones: Bool[np.ndarray, "subcarrier"],
-    ) -> Complex64[np.ndarray, "tx rx subcarrier"]:
+    def refitted(self, frame: int, kept: Kept) -> Complex64[np.ndarray, "tx rx subcarrier"]:
         """What `predict` says once reflectivities are solved from some of the visible entries.
 
         What the run was fitted to says nothing about how well it predicts; entries that are left
@@ -160,10 +156,9 @@ class Run:
 
         Args:
             frame: Which frame.
-            links: Links to keep.
-            tones: Tones to keep.
+            kept: Links and tones to solve from.
         """
-        observations = self.observations(frame).only(links, tones)
+        observations = self.observations(frame, kept)
         gaussians, head = self.moving(frame), self.head
         power = torch.from_numpy(self._power(frame).astype(np.float32))
         with one_torch_thread():
@@ -175,6 +170,18 @@ class Run:
         assert gamma is not None
         features = head.with_gamma(gaussians.features, gamma)
         return self._answer(frame, observations, replace(gaussians, features=features))
+
+    def visible_change(
+        self, frame: int, kept: Kept | None = None
+    ) -> Complex64[np.ndarray, "tx rx subcarrier"]:
+        """Csi − csi_static as the fit sees it, NaN where hidden; what `predict` is held against.
+
+        Of a calibrated run with the offsets of the empty room's capture, as `predict` says it.
+        """
+        seen = self.observations(frame, kept)
+        unknown = np.complex64(complex(np.nan, np.nan))
+        visible = np.where(seen.links[..., None] & seen.tones, seen.delta, unknown)
+        return self._as_captured(frame, seen, visible)
 
     def _power(self, frame: int) -> Float64[np.ndarray, "M"]:
         """Reflected power of each moving Gaussian [m²]."""
@@ -195,11 +202,20 @@ class Run:
             *(csi, observations.links, observations.layout, observations.centre_hz),
             *(head, gaussians, self._power(frame)),
         )
-        if self.calibrated:
-            offsets = read_calibration(self.path, frame).capture
-            turn = offsets.turn(observations.layout, observations.freq_hz)
-            csi = (csi * turn).astype(np.complex64)
-        return csi
+        return self._as_captured(frame, observations, csi)
+
+    def _as_captured(
+        self,
+        frame: int,
+        observations: Observations,
+        csi: Complex64[np.ndarray, "tx rx subcarrier"],
+    ) -> Complex64[np.ndarray, "tx rx subcarrier"]:
+        """With the offsets that devices had when the empty room was captured."""
+        if not self.calibrated:
+            return csi
+        offsets = read_calibration(self.path, frame).capture
+        turn = offsets.turn(observations.layout, observations.freq_hz)
+        return (csi * turn).astype(np.complex64)
 
 
 @lru_cache(maxsize=8)

@@ -87,30 +87,27 @@ def _row(scene: str, condition: str, radio: str, rows: list[Mapping[str, Any]]) 
     values["element_snr_db"] = _mean(row["rf"].get("element_snr_db") for row in rows)
     for name in INTERPOLATORS:
         values[f"{name}_snr_db"] = _control(rows, name, "rf", "element_snr_db")
-    best_gain = _best_channel(rows, values, "device_gain_mae_db", min)
-    best_profile = _best_channel(rows, values, "delay_profile_corr", max)
+    for key in ("device_gain_mae_db", "delay_profile_corr"):
+        values[key] = _mean(row["rf"].get(key) for row in rows)
+    best_gain, values["control_device_gain_mae_db"] = _best_channel(rows, "device_gain_mae_db", min)
+    best_corr, values["control_delay_profile_corr"] = _best_channel(rows, "delay_profile_corr", max)
     f10 = [row["geometry"]["f10"] for row in rows if row["geometry"].get("f10") is not None]
     spread = max(f10) - min(f10) if f10 else 0.0
     return Row(
         *(scene, condition, radio, len(rows), values, spread),
-        *(best_rival, best_gain, best_profile, _marks(radio, values)),
+        *(best_rival, best_gain, best_corr, _marks(radio, values)),
     )
 
 
 def _best_channel(
-    rows: list[Mapping[str, Any]],
-    values: dict[str, float | None],
-    key: str,
-    best: Callable[..., str],
-) -> str:
-    """Puts a metric of unseen links and its best control's into `values`; names that control."""
-    values[key] = _mean(row["rf"].get(key) for row in rows)
+    rows: list[Mapping[str, Any]], key: str, best: Callable[..., str]
+) -> tuple[str, float | None]:
+    """Which control is best in a metric of unseen links, and its mean."""
     names = [name for name in rows[0]["controls"] if name not in (GAUSSIANS_ALONE, "oracle_init")]
     found = {name: _control(rows, name, "rf", key) for name in names}
     known = {name: value for name, value in found.items() if value is not None}
     name = best(known, key=lambda name: known[name], default="")
-    values[f"control_{key}"] = known.get(name)
-    return name
+    return name, known.get(name)
 
 
 def _share(own: float | None, rival: float | None, ceiling: float | None) -> float | None:

@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 #: What a radio reports of a channel; the last axis is subcarrier or delay.
 Reported = Complex64[np.ndarray, "tx rx entry"] | Float32[np.ndarray, "tx rx entry"]
 
+#: Links and tones that are left when more is hidden than what is held out.
+Kept = tuple[Bool[np.ndarray, "tx rx"], Bool[np.ndarray, "subcarrier"]]
+
 
 @dataclass(frozen=True)
 class Observations:
@@ -92,16 +95,6 @@ class Observations:
         tx, rx = np.nonzero(self.links)
         delta[tx[:, None], rx[:, None], np.flatnonzero(self.tones)] = entries
         return self.with_delta(delta)
-
-    def only(
-        self, links: Bool[np.ndarray, "tx rx"], tones: Bool[np.ndarray, "subcarrier"]
-    ) -> Observations:
-        """The same observations of fewer links and tones, as if the others were held out too."""
-        links, tones = self.links & links, self.tones & tones
-        seen = links[..., None] & tones
-        fewer = self.with_delta(np.where(seen, self.delta, 0))
-        static = np.where(seen, self.static, 0).astype(np.complex64)
-        return replace(fewer, static=static, links=links, tones=tones)
 
 
 def _visible(
@@ -210,6 +203,7 @@ def observe(
     kind: Observe = "complex",
     empty: Reported | None = None,
     packets: Packets = "first",
+    kept: Kept | None = None,
 ) -> Observations:
     """Reads one frame at its own time and hides what is held out, and links that heard nothing.
 
@@ -223,12 +217,15 @@ def observe(
             empty-room capture.
         packets: Whether the frame's other packets help to tell the change from noise; only of
             the channel itself.
+        kept: Hides all other links and tones as well, before anything is made of the channel.
 
     Raises:
         RfgsError: The channel holds values that are not finite, or its antennas move within a
             frame.
     """
     elements, links, tones, csi = visible_channel(sequence, radio, frame, channel, packets)
+    if kept is not None:
+        links, tones = links & kept[0], tones & kept[1]
     if empty is None:
         static = sequence.csi_static(radio)
         _need_finite(

@@ -63,6 +63,18 @@ def fill(
     return out
 
 
+def carry_on(
+    left: Complex[np.ndarray, "tx rx subcarrier"], evidence: Evidence, along: Interpolator
+) -> Complex[np.ndarray, "tx rx subcarrier"]:
+    """What a prediction leaves of visible entries, at all; zero where devices heard nothing."""
+    out = fill(left.astype(np.complex64), evidence, along)
+    for tx, rx in _device_blocks(evidence.layout).values():
+        block = np.ix_(tx, rx)
+        if not evidence.link_visible[block].any():
+            out[block] = 0.0
+    return out
+
+
 def _device_blocks(layout: Layout) -> dict[tuple[int, int], tuple[np.ndarray, np.ndarray]]:
     """Elements of each ordered pair of devices that has a measured link."""
     blocks = {}

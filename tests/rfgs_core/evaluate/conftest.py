@@ -23,7 +23,7 @@ from rfgs_core.evaluate.rf import HeldOut
 from rfgs_core.gaussians.model import FEATURE_DIM, Gaussians
 from rfgs_core.radio import Radio, layout, place_devices
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
-from rfgs_core.train.observations import Observations, observe
+from rfgs_core.train.observations import Kept, Observations, observe
 
 BOUNDS_M = np.array([[0.0, 0.0, 0.0], [4.0, 3.5, 2.5]])
 
@@ -56,14 +56,19 @@ class SurfaceRun:
         count = len(self.gaussians(frame))
         return {"features": np.ones((count, FEATURE_DIM)), "rf_power_db": np.zeros(count)}
 
-    def observations(self, frame: int) -> Observations:
-        return observe(self.sequence, "wifi", frame, kind=self.config.get("observe", "complex"))
+    def observations(self, frame: int, kept: Kept | None = None) -> Observations:
+        kind = self.config.get("observe", "complex")
+        return observe(self.sequence, "wifi", frame, kind=kind, kept=kept)
 
     def predict(self, frame: int) -> np.ndarray:
         return 0.9 * (self.sequence.csi("wifi", frame) - self.sequence.csi_static("wifi"))
 
-    def refitted(self, frame: int, links: np.ndarray, tones: np.ndarray) -> np.ndarray:
+    def refitted(self, frame: int, kept: Kept) -> np.ndarray:
         return self.predict(frame)
+
+    def visible_change(self, frame: int, kept: Kept | None = None) -> np.ndarray:
+        seen = self.observations(frame, kept)
+        return np.where(seen.links[..., None] & seen.tones, seen.delta, np.nan)
 
 
 @pytest.fixture

@@ -6,6 +6,7 @@ from __future__ import annotations
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,8 +20,9 @@ from rfgs_core.files import read_json, write_json
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.gaussians.ply import cloud_of, write_ply
 from rfgs_core.run import Run, open_run
+from rfgs_core.train import observations
 from rfgs_core.train.channel import Channel
-from rfgs_core.train.observations import observe
+from rfgs_core.train.observations import observe, visible_channel
 
 
 @pytest.fixture
@@ -82,19 +84,32 @@ def test_a_refit_knows_no_more_than_what_is_left(
     links, tones = seen.links.copy(), seen.tones.copy()
     links[:, np.flatnonzero(links.any(axis=0))[::2]] = False
     tones[: len(tones) // 4] = False
-    first = trained_run.refitted(1, links, tones)
-    assert np.isfinite(first).all()
     kept = links[..., None] & tones
+    first = trained_run.refitted(1, (links, tones))
     assert np.vdot(first[kept], seen.delta[kept]).real > 0
+    change = trained_run.visible_change(1, (links, tones))
+    np.testing.assert_array_equal(np.isfinite(change), kept)
+    np.testing.assert_array_equal(change[kept], seen.delta[kept])
 
-    def reports(delta: np.ndarray, static: np.ndarray) -> np.ndarray:
-        other = replace(seen.with_delta(delta), static=static.astype(np.complex64))
-        monkeypatch.setattr(Run, "observations", lambda run, frame: other)
-        return trained_run.refitted(1, links, tones)
+    def after(factor: np.ndarray) -> np.ndarray:
+        def altered(*args: Any) -> Any:
+            elements, links, tones, csi = visible_channel(*args)
+            return elements, links, tones, (csi * factor).astype(np.complex64)
 
-    elsewhere = np.where(kept, 1.0, -3.0)
-    np.testing.assert_array_equal(reports(seen.delta * elsewhere, seen.static * elsewhere), first)
-    assert not np.allclose(reports(-seen.delta, seen.static), first, rtol=0.1)
+        monkeypatch.setattr(observations, "visible_channel", altered)
+        return trained_run.refitted(1, (links, tones))
+
+    np.testing.assert_array_equal(after(np.where(kept, 1.0, -3.0)), first)
+    assert not np.allclose(after(np.where(kept, -1.0, 1.0)), first, rtol=0.1)
+
+
+def test_a_refit_from_everything_is_the_fit_before_it_is_refined(
+    tiny_dataset: Path, train, quick_config, tmp_path: Path
+) -> None:
+    run = train(tiny_dataset, tmp_path / "run", replace(quick_config, iterations=0), [1])
+    seen = run.observations(1)
+    again = run.refitted(1, (seen.links, seen.tones))
+    np.testing.assert_allclose(again, run.predict(1), rtol=1e-2, atol=1e-3 * np.abs(again).max())
 
 
 def test_prediction_is_zero_on_links_that_the_radio_lacks(trained_run: Run, own_run: Path) -> None:

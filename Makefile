@@ -7,6 +7,9 @@ READY := .venv/.ready
 # A machine with only `python3` is fine as long as that is Python 3.11.
 PYTHON_FOUND := $(shell command -v $(PYTHON) || command -v python3)
 
+# As `rfgs_core` sets it for programs; pytest's plugins load numpy before that.
+export OPENBLAS_NUM_THREADS ?= 1
+
 .PHONY: demo test test-slow test-blender test-bpy lint format sync system clean
 
 demo: $(READY) system

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Threads of compiled kernels sleep between their calls."""
+"""Threads of compiled kernels sleep between their calls, and small matrices have one."""
 
 from __future__ import annotations
 
@@ -44,3 +44,22 @@ def test_threads_sleep_between_kernels_unless_told_otherwise() -> None:
     assert _processor_s() < 0.2
     if THREADS > 1:
         assert _processor_s(OMP_WAIT_POLICY="ACTIVE") > 0.2
+
+
+def test_matrices_of_numpy_are_solved_on_one_thread_unless_told_otherwise() -> None:
+    code = """
+import os
+import rfgs_core
+import numpy as np
+
+np.linalg.inv(np.random.default_rng(0).random((400, 400)))
+print(len(os.listdir("/proc/self/task")))
+"""
+    kept = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
+    count = []
+    for env in (kept, {**kept, "OPENBLAS_NUM_THREADS": str(THREADS)}):
+        done = subprocess.run(
+            [sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True
+        )
+        count.append(int(done.stdout))
+    assert count == [1, THREADS]

@@ -111,6 +111,21 @@ def test_predictions_are_those_of_devices_with_the_captures_offsets(calibrated: 
     assert not np.allclose(between, plain.predict(1)[~own], rtol=0.1)
 
 
+def test_a_calibrated_run_is_tried_on_what_its_own_fit_sees(calibrated: Run) -> None:
+    """The drift of a frame is no change, and both sides have the offsets of the capture."""
+    seen = calibrated.observations(1)
+    visible = seen.links[..., None] & seen.tones
+    change = calibrated.visible_change(1)
+    np.testing.assert_array_equal(np.isfinite(change), visible)
+    turn = read_calibration(calibrated.path, 1).capture.turn(seen.layout, seen.freq_hz)
+    np.testing.assert_allclose(change[visible], (seen.delta * turn)[visible], rtol=1e-4)
+    drifting = calibrated.as_reported(1).delta
+    assert np.linalg.norm((drifting - change)[visible]) > np.linalg.norm(change[visible])
+    said = calibrated.refitted(1, (seen.links, seen.tones))[visible]
+    alike = np.vdot(said, change[visible]).real
+    assert alike > 0.5 * np.linalg.norm(said) * np.linalg.norm(change[visible])
+
+
 def test_echoes_alone_tell_offsets_too(calibrated: Run, quick_config: TrainConfig) -> None:
     """Fitted to a channel without offsets, Gaussians find none; heard from one side, they stand
     for a ball heard through, and that error of the model is 5 % of 1/B = 6.25 ns."""

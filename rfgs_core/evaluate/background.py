@@ -17,7 +17,7 @@ from scipy.spatial import KDTree
 
 from rfgs_core.dataset.sequence import Sequence
 from rfgs_core.evaluate.controls.gaussian_process import krige, krige_level
-from rfgs_core.evaluate.controls.interpolation import carry_on, fill
+from rfgs_core.evaluate.controls.interpolation import completed, fill
 from rfgs_core.evaluate.controls.linear import inverse_distance, linear
 from rfgs_core.evaluate.controls.spectrum import spectral
 from rfgs_core.evaluate.evidence import Evidence
@@ -72,7 +72,7 @@ class Backgrounds:
     @cached_property
     def best(self) -> Channel:
         """Direct paths, the set, and what they leave of the visible background, carried on."""
-        return _with_residual(self.whole, self.evidence)
+        return completed(self.whole, self.evidence.static, self.evidence, spectral)
 
 
 def background_metrics(scene: Scene, own: Backgrounds) -> dict[str, Any]:
@@ -81,7 +81,7 @@ def background_metrics(scene: Scene, own: Backgrounds) -> dict[str, Any]:
     answers = {
         "static_set, with residual": own.best,
         "static_set": own.whole,
-        "direct paths, with residual": _with_residual(own.straight, evidence),
+        "direct paths, with residual": completed(own.straight, evidence.static, evidence, spectral),
         "direct paths": own.straight,
         "spectrum": fill(evidence.static, evidence, spectral, krige_level),
         "gaussian_process": fill(evidence.static, evidence, krige, krige_level),
@@ -93,12 +93,6 @@ def background_metrics(scene: Scene, own: Backgrounds) -> dict[str, Any]:
         "n_gaussians": len(own.static.gaussians),
         "surface_m": surface_distances(own.static, scene.run.sequence),
     }
-
-
-def _with_residual(predicted: Channel, evidence: Evidence) -> Channel:
-    """The prediction with what it leaves of the visible background, carried on by its spectrum."""
-    left = evidence.static - np.where(np.isnan(evidence.static), 0.0, predicted)
-    return predicted + carry_on(left, evidence, spectral)
 
 
 def _metrics(scene: Scene, predicted: Channel) -> dict[str, float | None]:

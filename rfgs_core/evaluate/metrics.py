@@ -165,7 +165,8 @@ def _evaluate_frame(
     # Without phases there is no channel to compare with, and nothing is left to add.
     whole = predicted
     if scene.observe == "complex":
-        seen = replace(evidence, delta=scene.run.visible_change(frame))
+        change = scene.run.visible_change(frame, scene.run.observations(frame))
+        seen = replace(evidence, delta=change)
         whole = with_residual(predicted, seen, partial(_from_less, scene.run, frame))
     # A static set brings the method's own empty room.
     best, alone = (None, None) if room is None else (room.best, room.whole)
@@ -183,7 +184,8 @@ def _evaluate_frame(
 
 def _from_less(run: EvaluatedRun, frame: int, kept: Kept) -> Answer:
     """What is visible of some entries, and what the method says from them."""
-    return Answer(run.visible_change(frame, kept), run.refitted(frame, kept))
+    less = run.observations(frame, kept)
+    return Answer(run.visible_change(frame, less), run.refitted(frame, less))
 
 
 def _add(

@@ -21,10 +21,10 @@ import numpy as np
 from jaxtyping import Bool, Complex, Complex64, Float64
 from scipy.optimize import nnls
 
-from rfgs_core.evaluate.controls.interpolation import carry_on, fill
+from rfgs_core.encode.matched_filter import device_pairs
+from rfgs_core.evaluate.controls.interpolation import completed, fill
 from rfgs_core.evaluate.controls.spectrum import spectral
 from rfgs_core.evaluate.evidence import Evidence
-from rfgs_core.radio import Layout
 from rfgs_core.train.observations import Kept
 
 #: Row of the prediction of the Gaussians by themselves.
@@ -62,7 +62,10 @@ def with_residual(
     fewer = replace(evidence, delta=less.change, link_visible=links, tone_visible=tones)
     tried, answers = _answers(less.predicted, fewer), _answers(predicted, evidence)
     out = np.array(predicted, dtype=np.complex64)
-    for pair in _pairs(evidence.layout):
+    layout = evidence.layout
+    index, names = device_pairs(layout.tx_device, layout.rx_device, layout.measured)
+    for number in range(len(names)):
+        pair = index == number
         seen = pair & evidence.link_visible
         if not seen.any():
             continue
@@ -73,7 +76,7 @@ def with_residual(
             out[where] = np.einsum("a,a...->...", weights, answers[:, where])
     visible = np.isfinite(evidence.delta)
     out[visible] = evidence.delta[visible]
-    out[~evidence.layout.measured] = 0.0
+    out[~layout.measured] = 0.0
     return out
 
 
@@ -105,16 +108,9 @@ def _answers(
     predicted: Complex[np.ndarray, "tx rx subcarrier"], evidence: Evidence
 ) -> Complex64[np.ndarray, "answer tx rx subcarrier"]:
     """Gaussians, Gaussians with their residual, and the channel without Gaussians."""
-    left = evidence.delta - np.where(np.isnan(evidence.delta), 0.0, predicted)
-    carried = carry_on(left, evidence, spectral)
+    carried = completed(predicted, evidence.delta, evidence, spectral)
     plain = fill(evidence.delta, evidence, spectral)
-    return np.stack([predicted, predicted + carried, plain]).astype(np.complex64)
-
-
-def _pairs(layout: Layout) -> list[Bool[np.ndarray, "tx rx"]]:
-    """Measured links of each ordered pair of devices."""
-    devices = layout.tx_device[:, None], layout.rx_device
-    return [(devices[0] == a) & (devices[1] == b) & layout.measured for a, b in layout.device_pairs]
+    return np.stack([predicted, carried, plain]).astype(np.complex64)
 
 
 def _weights(

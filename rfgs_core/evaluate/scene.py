@@ -65,22 +65,24 @@ class EvaluatedRun(Protocol):
         """Per-Gaussian arrays of the moving ones."""
         ...
 
-    def observations(self, frame: int) -> Observations:
-        """What training sees of a frame."""
+    def observations(self, frame: int, kept: Kept | None = None) -> Observations:
+        """What training sees of a frame, or would see of some links and tones."""
         ...
 
     def predict(self, frame: int) -> Complex[np.ndarray, "tx rx subcarrier"]:
         """Csi − csi_static on every measured link, held-out ones included."""
         ...
 
-    def refitted(self, frame: int, kept: Kept) -> Complex[np.ndarray, "tx rx subcarrier"]:
-        """The same with reflectivities solved from some of the visible entries."""
+    def refitted(
+        self, frame: int, observations: Observations
+    ) -> Complex[np.ndarray, "tx rx subcarrier"]:
+        """The same with reflectivities solved from other observations of the frame."""
         ...
 
     def visible_change(
-        self, frame: int, kept: Kept | None = None
+        self, frame: int, observations: Observations
     ) -> Complex[np.ndarray, "tx rx subcarrier"]:
-        """Csi − csi_static as training sees it, of all or some entries; NaN where hidden."""
+        """Csi − csi_static as training sees it, NaN where hidden."""
         ...
 
 

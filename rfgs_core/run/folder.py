@@ -148,7 +148,9 @@ class Run:
         """
         return self._answer(frame, self.observations(frame), self.moving(frame))
 
-    def refitted(self, frame: int, kept: Kept) -> Complex64[np.ndarray, "tx rx subcarrier"]:
+    def refitted(
+        self, frame: int, observations: Observations
+    ) -> Complex64[np.ndarray, "tx rx subcarrier"]:
         """What `predict` says once reflectivities are solved from some of the visible entries.
 
         What the run was fitted to says nothing about how well it predicts; entries that are left
@@ -156,9 +158,8 @@ class Run:
 
         Args:
             frame: Which frame.
-            kept: Links and tones to solve from.
+            observations: What to solve from, of the run's own `observations`.
         """
-        observations = self.observations(frame, kept)
         gaussians, head = self.moving(frame), self.head
         power = torch.from_numpy(self._power(frame).astype(np.float32))
         with one_torch_thread():
@@ -172,16 +173,17 @@ class Run:
         return self._answer(frame, observations, replace(gaussians, features=features))
 
     def visible_change(
-        self, frame: int, kept: Kept | None = None
+        self, frame: int, observations: Observations
     ) -> Complex64[np.ndarray, "tx rx subcarrier"]:
-        """Csi − csi_static as the fit sees it, NaN where hidden; what `predict` is held against.
+        """Csi − csi_static of the run's observations, NaN where hidden, to hold `predict` against.
 
         Of a calibrated run with the offsets of the empty room's capture, as `predict` says it.
         """
-        seen = self.observations(frame, kept)
+        visible = observations.links[..., None] & observations.tones
         unknown = np.complex64(complex(np.nan, np.nan))
-        visible = np.where(seen.links[..., None] & seen.tones, seen.delta, unknown)
-        return self._as_captured(frame, seen, visible)
+        return self._as_captured(
+            frame, observations, np.where(visible, observations.delta, unknown)
+        )
 
     def _power(self, frame: int) -> Float64[np.ndarray, "M"]:
         """Reflected power of each moving Gaussian [m²]."""

@@ -63,16 +63,23 @@ def fill(
     return out
 
 
-def carry_on(
-    left: Complex[np.ndarray, "tx rx subcarrier"], evidence: Evidence, along: Interpolator
+def completed(
+    predicted: Complex[np.ndarray, "tx rx subcarrier"],
+    field: Complex[np.ndarray, "tx rx subcarrier"],
+    evidence: Evidence,
+    along: Interpolator,
 ) -> Complex[np.ndarray, "tx rx subcarrier"]:
-    """What a prediction leaves of visible entries, at all; zero where devices heard nothing."""
-    out = fill(left.astype(np.complex64), evidence, along)
+    """A prediction and what it leaves of a field's visible entries, interpolated.
+
+    Between devices that heard nothing of each other the prediction stays as it is.
+    """
+    left = field - np.where(np.isnan(field), 0.0, predicted)
+    residual = fill(left.astype(np.complex64), evidence, along)
     for tx, rx in _device_blocks(evidence.layout).values():
         block = np.ix_(tx, rx)
         if not evidence.link_visible[block].any():
-            out[block] = 0.0
-    return out
+            residual[block] = 0.0
+    return predicted + residual
 
 
 def _device_blocks(layout: Layout) -> dict[tuple[int, int], tuple[np.ndarray, np.ndarray]]:

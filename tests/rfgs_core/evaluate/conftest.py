@@ -63,12 +63,12 @@ class SurfaceRun:
     def predict(self, frame: int) -> np.ndarray:
         return 0.9 * (self.sequence.csi("wifi", frame) - self.sequence.csi_static("wifi"))
 
-    def refitted(self, frame: int, kept: Kept) -> np.ndarray:
+    def refitted(self, frame: int, observations: Observations) -> np.ndarray:
         return self.predict(frame)
 
-    def visible_change(self, frame: int, kept: Kept | None = None) -> np.ndarray:
-        seen = self.observations(frame, kept)
-        return np.where(seen.links[..., None] & seen.tones, seen.delta, np.nan)
+    def visible_change(self, frame: int, observations: Observations) -> np.ndarray:
+        visible = observations.links[..., None] & observations.tones
+        return np.where(visible, observations.delta, np.nan)
 
 
 @pytest.fixture

@@ -115,13 +115,13 @@ def test_a_calibrated_run_is_tried_on_what_its_own_fit_sees(calibrated: Run) -> 
     """The drift of a frame is no change, and both sides have the offsets of the capture."""
     seen = calibrated.observations(1)
     visible = seen.links[..., None] & seen.tones
-    change = calibrated.visible_change(1)
+    change = calibrated.visible_change(1, seen)
     np.testing.assert_array_equal(np.isfinite(change), visible)
     turn = read_calibration(calibrated.path, 1).capture.turn(seen.layout, seen.freq_hz)
     np.testing.assert_allclose(change[visible], (seen.delta * turn)[visible], rtol=1e-4)
     drifting = calibrated.as_reported(1).delta
     assert np.linalg.norm((drifting - change)[visible]) > np.linalg.norm(change[visible])
-    said = calibrated.refitted(1, (seen.links, seen.tones))[visible]
+    said = calibrated.refitted(1, seen)[visible]
     alike = np.vdot(said, change[visible]).real
     assert alike > 0.5 * np.linalg.norm(said) * np.linalg.norm(change[visible])
 

@@ -75,7 +75,7 @@ def load_arrays(
 
 def _without_unknown(values: np.ndarray) -> np.ndarray:
     """Values with zeros in the rows that are all NaN."""
-    if values.dtype.kind != "f" or values.ndim < 2:
+    if values.dtype.kind != "f" or values.ndim < 1:
         return values
     unknown = np.isnan(values).all(axis=tuple(range(1, values.ndim)))
     return np.where(unknown.reshape(-1, *[1] * (values.ndim - 1)), values.dtype.type(0), values)

@@ -19,6 +19,7 @@ from rfgs_core.train.config import (
     Observe,
     Packets,
     Part,
+    Posture,
     Recipe,
     TrainConfig,
 )
@@ -87,6 +88,9 @@ class TrainArgs:
     """Weight with which Gaussians are held to their place on the body from frame to frame."""
     settle: float = 0.0
     """Share of the steps at the end, 0 to 1, in which the rates fall to nothing."""
+    posture: Posture = "told"
+    """told: the radio decides in every frame who stands and who sits, and where the knees point;
+    standing: everybody stands, as is assumed without phases anyway."""
     power_trust: float = 0.0
     """Exponent, 0 to 1, of reflected powers fitted to delay–angle power without phases; 0 starts
     from equal powers, which has served better."""
@@ -123,6 +127,7 @@ def run(args: TrainArgs) -> int:
         density=args.density,
         coarse_share=args.coarse,
         settle_share=args.settle,
+        posture=args.posture,
         power_trust=args.power_trust,
         temporal=args.temporal,
         without=args.without,

@@ -59,10 +59,14 @@ _CHECKPOINT: dict[str, Shape] = {
     "axes_xy": ("body", 2),
     "velocity_xy": ("body", 2),
     "time_s": (),
+    "knees_rad": ("body",),
     "track_id": ("M",),
     "next_track": (),
     **{f"head.{name}": shape for name, shape in HEAD_SHAPES.items()},
 }
+
+#: Velocities are not known in a first frame, and who stands has no knees that point anywhere.
+_MAY_BE_NAN = ("velocity_xy", "knees_rad")
 
 
 def train_sequence(
@@ -237,7 +241,7 @@ def _store(run: Run, frame: int, state: FrameState) -> None:
             "gamma": gamma[:, None],
             "rf_power_db": power_db,
             "track_id": state.track_id,
-            "body": state.body,
+            "body": state.moving.body,
         },
     )
     if not static_ply(run.path).exists():
@@ -257,13 +261,16 @@ def _finished(run: Run, frame: int) -> FrameState | None:
     path = _state_path(run, frame)
     if not path.exists():
         return None
-    arrays = load_arrays(path, "delete it to fit this frame again", _CHECKPOINT, ("velocity_xy",))
+    arrays = load_arrays(path, "delete it to fit this frame again", _CHECKPOINT, _MAY_BE_NAN)
     fields = {name: torch.from_numpy(arrays[name]) for name in GAUSSIAN_SHAPES}
     return FrameState(
         gaussians=Gaussians(**fields),
         power=torch.from_numpy(arrays["power"]),
         head=RadioHead.of_arrays(arrays, "head."),
-        tracks=Tracks(arrays["axes_xy"], arrays["velocity_xy"], float(arrays["time_s"])),
+        tracks=Tracks(
+            *(arrays["axes_xy"], arrays["velocity_xy"], float(arrays["time_s"])),
+            arrays["knees_rad"],
+        ),
         track_id=arrays["track_id"],
         next_track=int(arrays["next_track"]),
     )

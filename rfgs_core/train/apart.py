@@ -15,6 +15,7 @@ import torch
 from jaxtyping import Complex64, Float64
 
 from rfgs_core.seeds import sub_seed
+from rfgs_core.train.body_prior import Bodies, nearest_axis, outward_normals
 from rfgs_core.train.channel import Channel
 from rfgs_core.train.comparison import comparison_of
 from rfgs_core.train.config import TrainConfig
@@ -22,7 +23,7 @@ from rfgs_core.train.first_powers import fit_power, new_head, noise_per_link
 from rfgs_core.train.localise import NEAR_M, SEPARATION_M, PairMaps, locate_bodies, pair_maps
 from rfgs_core.train.observations import Observations
 from rfgs_core.train.reflectivity import posterior_mean
-from rfgs_core.train.start import StartDensity, gaussians_at, nearest_axis, outward_normals
+from rfgs_core.train.start import StartDensity, gaussians_at
 
 #: Gaussians that stand for each body.
 GAUSSIANS_PER_BODY = 1500
@@ -74,6 +75,21 @@ def tell_apart(
     return found
 
 
+def each_alone(
+    observations: Observations,
+    maps: PairMaps,
+    axes_xy: Float64[np.ndarray, "body 2"],
+    config: TrainConfig,
+    seed: int,
+) -> list[Observations]:
+    """The frame once for each body, without the echoes of all others."""
+    if len(axes_xy) == 1:
+        return [observations]
+    echoes = _echoes(observations, maps, axes_xy, config, seed)
+    others = echoes.sum(axis=0) - echoes
+    return [_without(observations, part) for part in others]
+
+
 def _move(
     found: Float64[np.ndarray, "body 2"],
     body: int,
@@ -92,8 +108,15 @@ def _sought(
     reach_m: float = NEAR_M,
 ) -> Float64[np.ndarray, "1 2"]:
     """The loudest body of what remains without some echoes."""
-    rest = observations.with_delta((observations.delta - echoes).astype(np.complex64))
-    return locate_bodies(pair_maps(rest), observations.bounds_m, 1, near, reach_m)
+    maps = pair_maps(_without(observations, echoes))
+    return locate_bodies(maps, observations.bounds_m, 1, near, reach_m)
+
+
+def _without(
+    observations: Observations, echoes: Complex64[np.ndarray, "tx rx subcarrier"]
+) -> Observations:
+    """The frame less some echoes."""
+    return observations.with_delta(observations.delta - echoes)
 
 
 def _echoes(
@@ -105,9 +128,10 @@ def _echoes(
 ) -> Complex64[np.ndarray, "body tx rx subcarrier"]:
     """What each body reflects at the visible entries, all fitted together, shadows left aside."""
     rng = np.random.default_rng(sub_seed(seed, "apart"))
-    density = StartDensity.of(maps, axes_xy, observations.bounds_m)
+    bodies = Bodies.standing(axes_xy)
+    density = StartDensity.of(maps, bodies, observations.bounds_m)
     points = density.draw(GAUSSIANS_PER_BODY * len(axes_xy), rng)
-    gaussians = gaussians_at(points, outward_normals(points, axes_xy))
+    gaussians = gaussians_at(points, outward_normals(points, bodies))
     power = fit_power(observations, gaussians, replace(config, power_trust=0.0))
     head = new_head(observations, config, power)
     channel = Channel.of(observations, observations.links, observations.tones)

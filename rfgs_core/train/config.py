@@ -16,6 +16,8 @@ EncoderKind = Literal["matched_filter", "cnn", "paths"]
 Observe = Literal["complex", "power", "delay_power"]
 #: all: every packet of a frame helps to tell its change from noise; first: the one at its own time.
 Packets = Literal["all", "first"]
+#: told: the likelier of standing and sitting, per frame; standing: everybody stands.
+Posture = Literal["told", "standing"]
 #: empty_room: the capture without anything that moves; learned: the median over the frames.
 Background = Literal["empty_room", "learned"]
 #: Offsets of devices that are estimated: none, of oscillators, of clocks, or of both.
@@ -50,6 +52,8 @@ class TrainConfig:
     """Moving Gaussians at the start of the first frame."""
     bodies: int = 1
     """Moving bodies in the scene; taken from the dataset's instances."""
+    posture: Posture = "told"
+    """How bodies are taken to hold themselves; without phases they stand."""
     power_trust: float = 0.0
     """Exponent of the phase-free fit of reflected powers against equal powers; 0: no such fit."""
     solver_steps: int = 8

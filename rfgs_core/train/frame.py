@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The fit of one frame, in named stages: locate, draw, power, reflectivity, refine."""
+"""The fit of one frame, in named stages: locate, posture, draw, power, reflectivity, refine."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Complex, Float, Float64, Int64
+from jaxtyping import Bool, Complex, Float, Int64
 from torch import Tensor
 
 from rfgs_core.encode import MATCHED_FILTER, Encoder
@@ -15,21 +15,19 @@ from rfgs_core.errors import RfgsError
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.seeds import sub_seed
 from rfgs_core.train.apart import tell_apart
+from rfgs_core.train.body_prior import outward_normals
 from rfgs_core.train.config import TrainConfig
-from rfgs_core.train.density.motion import kept, novelty, paces_m_s, wanted_counts
+from rfgs_core.train.density.motion import novelty, paces_m_s, wanted_counts
 from rfgs_core.train.first_powers import fit_power, new_head
 from rfgs_core.train.head import RadioHead
 from rfgs_core.train.localise import PairMaps, locate_bodies, pair_maps
 from rfgs_core.train.observations import Observations
+from rfgs_core.train.posture import tell_postures
 from rfgs_core.train.reflectivity import fitted_reflectivities
 from rfgs_core.train.sampling import encode
-from rfgs_core.train.start import (
-    StartDensity,
-    gaussians_at,
-    nearest_axis,
-    outward_normals,
-)
+from rfgs_core.train.start import StartDensity, gaussians_at
 from rfgs_core.train.tracks import Tracks
+from rfgs_core.train.warm_start import Moving, at_pace, carry_over
 
 
 @dataclass(frozen=True)
@@ -59,10 +57,11 @@ class FrameState:
         return max(self.next_track, int(self.track_id.max(initial=-1)) + 1)
 
     @property
-    def body(self) -> Int64[np.ndarray, "M"]:
-        """Body that each Gaussian belongs to: the one whose axis is nearest."""
+    def moving(self) -> Moving:
+        """What the next frame starts from."""
         means = self.gaussians.means.numpy().astype(np.float64)
-        return nearest_axis(means, self.tracks.axes_xy)
+        power = self.power.numpy().astype(np.float64)
+        return Moving(means, self.tracks.bodies, power, self.track_id, self.unused_track)
 
     @property
     def gamma(self) -> Complex[Tensor, "M"]:
@@ -78,11 +77,11 @@ def start_frame(
     encoder: Encoder = MATCHED_FILTER,
     earlier: Observations | None = None,
 ) -> FrameState:
-    """Locates the bodies and draws Gaussians; a later frame keeps the earlier one's.
+    """Locates the bodies, tells how they hold themselves and draws Gaussians.
 
     From frame to frame all Gaussians move along with their body; the third that the new
-    channel supports least is drawn anew and gets new track numbers. With `--density motion` their
-    number then follows the bodies' pace.
+    channel supports least is drawn anew and gets new track numbers, and so is whoever has sat
+    down or stood up. With `--density motion` their number then follows the bodies' pace.
 
     Args:
         observations: The frame.
@@ -104,21 +103,20 @@ def start_frame(
     rng = np.random.default_rng(seed)
     maps = pair_maps(observations)
     tracks = _followed(before, maps, observations, config, seed)
-    axes_xy = tracks.axes_xy
-    density = StartDensity.of(maps, axes_xy, observations.bounds_m)
+    bodies = tell_postures(observations, maps, tracks.axes_xy, config, seed)
+    tracks = replace(tracks, knees_rad=bodies.knees_rad)
+    density = StartDensity.of(maps, bodies, observations.bounds_m)
     points = density.draw(config.num_gaussians, rng)
     track_id, goes_on, next_track = np.arange(len(points), dtype=np.int64), None, 0
     if before is not None:
-        points, track_id = _carry_over(before, density, axes_xy, points)
+        room = before.moving, bodies, maps, observations.bounds_m
+        points, track_id = carry_over(*room, points, rng)
         if config.density == "motion" and earlier is not None:
             pace_m_s = paces_m_s(tracks, novelty(observations, earlier))
             wanted = wanted_counts(config.num_gaussians, pace_m_s)
-            points, track_id = _at_pace(
-                *(before, maps, observations.bounds_m, axes_xy),
-                *(wanted, points, track_id, rng),
-            )
+            points, track_id = at_pace(*room, wanted, points, track_id, rng)
         goes_on, next_track = np.isin(track_id, before.track_id), before.unused_track
-    gaussians = gaussians_at(points, outward_normals(points, axes_xy))
+    gaussians = gaussians_at(points, outward_normals(points, bodies))
     power = fit_power(observations, gaussians, config)
     head = before.head if before is not None else new_head(observations, config, power)
     features = head.without_readings(encode(observations, points, encoder).features)
@@ -142,50 +140,6 @@ def _followed(
     axes_xy = locate_bodies(maps, bounds_m, config.bodies, near, reach_m)
     axes_xy = tell_apart(observations, maps, axes_xy, config, seed, near, reach_m)
     return before.tracks.moved(axes_xy, time_s)
-
-
-def _carry_over(
-    before: FrameState,
-    density: StartDensity,
-    axes_xy: Float64[np.ndarray, "body 2"],
-    fresh: Float64[np.ndarray, "M 3"],
-) -> tuple[Float64[np.ndarray, "M 3"], Int64[np.ndarray, "M"]]:
-    """Moves the earlier Gaussians with their bodies; the least supported third is fresh."""
-    points = before.gaussians.means.numpy().astype(np.float64)
-    points[:, :2] += (axes_xy - before.tracks.axes_xy)[before.body]
-    count = min(len(points) // 3, len(fresh))
-    weakest = np.argsort(density.at(points))[:count]
-    track_id = before.track_id.copy()
-    points[weakest] = fresh[:count]
-    track_id[weakest] = before.unused_track + np.arange(count)
-    return points, track_id
-
-
-def _at_pace(
-    before: FrameState,
-    maps: PairMaps,
-    bounds_m: Float64[np.ndarray, "2 3"],
-    axes_xy: Float64[np.ndarray, "body 2"],
-    wanted: Int64[np.ndarray, "body"],
-    points: Float64[np.ndarray, "M 3"],
-    track_id: Int64[np.ndarray, "M"],
-    rng: np.random.Generator,
-) -> tuple[Float64[np.ndarray, "N 3"], Int64[np.ndarray, "N"]]:
-    """Drops each body's weakest Gaussians, or draws some, until there are as many as wanted."""
-    # What came anew has not reflected anything yet.
-    power = np.where(np.isin(track_id, before.track_id), before.power.numpy(), 0.0)
-    keep = kept(nearest_axis(points, axes_xy), power, wanted)
-    points, track_id = points[keep], track_id[keep]
-    have = np.bincount(nearest_axis(points, axes_xy), minlength=len(wanted))
-    more = [
-        StartDensity.of(maps, axes_xy[body : body + 1], bounds_m).draw(int(count), rng)
-        for body, count in enumerate(wanted - have)
-        if count > 0
-    ]
-    points = np.concatenate([points, *more])
-    unused = max(track_id.max(initial=-1) + 1, before.unused_track)
-    fresh = unused + np.arange(len(points) - len(track_id))
-    return points, np.concatenate([track_id, fresh])
 
 
 def solve_reflectivity(

@@ -224,7 +224,7 @@ def density_control(
     if kind == "residual":
         return ResidualDensity(
             *(ResidualRule(), observations, task.channel, task.comparison, task.noise),
-            *(state.head, state.tracks.axes_xy, config.iterations),
+            *(state.head, state.tracks.bodies, config.iterations),
         )
     return NoDensity()
 

@@ -8,16 +8,15 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from jaxtyping import Float, Float64, Int64
+from jaxtyping import Float, Float64
 from torch import Tensor
 
 from rfgs_core.gaussians import FEATURE_DIM, Gaussians
+from rfgs_core.train.body_prior import Bodies, nearest_axis, surface_prior
 from rfgs_core.train.localise import PairMaps
 
-#: Standard deviation of the prior around a body's vertical axis [m].
-PRIOR_RADIUS_M = 0.20
-#: Height above which the prior falls off, and how fast [m].
-PRIOR_HEIGHT_M, PRIOR_HEIGHT_FALL_M = 1.6, 0.08
+#: Nothing is drawn further than this from all axes along x or y, or above this height [m].
+REACH_M, REACH_HEIGHT_M = 0.8, 2.1
 #: Exponent of the matched filter against the prior, chosen on a room that is not in the demo.
 EVIDENCE_EXPONENT = 0.25
 #: How much of that moves Gaussians from one height to another: what is below or above the
@@ -37,22 +36,6 @@ START_COVERAGE = 1.5
 SILHOUETTE_M2 = 0.75
 
 
-def nearest_axis(
-    points: Float[np.ndarray, "N 3"], axes_xy: Float[np.ndarray, "body 2"]
-) -> Int64[np.ndarray, "N"]:
-    """Which body axis is nearest to each point, seen from above."""
-    return np.linalg.norm(points[:, None, :2] - axes_xy[None], axis=2).argmin(axis=1)
-
-
-def outward_normals(
-    points: Float[np.ndarray, "N 3"], axes_xy: Float[np.ndarray, "body 2"]
-) -> Float64[np.ndarray, "N 3"]:
-    """Horizontal directions away from the nearest body axis."""
-    flat = points[:, :2] - axes_xy[nearest_axis(points, axes_xy)]
-    flat = flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-9)
-    return np.concatenate([flat, np.zeros((len(points), 1))], axis=1)
-
-
 @dataclass(frozen=True)
 class StartDensity:
     """Where new Gaussians are drawn: body-sized prior times matched filter, in cubic cells.
@@ -70,29 +53,9 @@ class StartDensity:
     """Upper corner that nothing is drawn beyond [m]."""
 
     @staticmethod
-    def of(
-        maps: PairMaps,
-        axes_xy: Float[np.ndarray, "body 2"],
-        bounds_m: Float64[np.ndarray, "2 3"],
-    ) -> StartDensity:
-        """The density around bodies at `axes_xy`."""
-        reach_m = 4 * PRIOR_RADIUS_M
-        low = np.maximum([*(axes_xy.min(axis=0) - reach_m), bounds_m[0, 2]], bounds_m[0])
-        high = np.minimum([*(axes_xy.max(axis=0) + reach_m), bounds_m[0, 2] + 2.1], bounds_m[1])
-        axes = [np.arange(low[k] + CELL_M / 2, high[k], CELL_M) for k in range(3)]
-        cells = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-        points = cells.reshape(-1, 3)
-        prior = np.exp(log_prior(points, axes_xy)).reshape(cells.shape[:3])
-        evidence = np.log(maps.at(points) + 1e-3).mean(axis=0).reshape(cells.shape[:3])
-        share = prior * np.exp(EVIDENCE_EXPONENT * (evidence - evidence.max()))
-        body = nearest_axis(points, axes_xy).reshape(cells.shape[:3])
-        for index in range(len(axes_xy)):
-            mine = body == index
-            own = np.where(mine, share, 0)
-            wanted = _densest(np.where(mine, prior, 0))
-            own *= (wanted / np.maximum(_densest(own), 1e-300)) ** (1 - HEIGHT_EVIDENCE)
-            share = np.where(mine, own * wanted.sum() / max(_densest(own).sum(), 1e-300), share)
-        return StartDensity(share / share.sum(), low, high)
+    def of(maps: PairMaps, bodies: Bodies, bounds_m: Float64[np.ndarray, "2 3"]) -> StartDensity:
+        """The density of some bodies."""
+        return StartCells.around(maps, bodies.axes_xy, bounds_m).density(bodies)
 
     def draw(self, count: int, rng: np.random.Generator) -> Float64[np.ndarray, "count 3"]:
         """Positions [m]: cells by chance, anywhere within them."""
@@ -110,20 +73,55 @@ class StartDensity:
         return np.where(inside, self.share[tuple(index.T)], 0.0)
 
 
+@dataclass(frozen=True)
+class StartCells:
+    """Cells around some axes and what the matched filter says there, however bodies hold there."""
+
+    points: Float64[np.ndarray, "x y z 3"]
+    """Centres of the cells [m]."""
+    evidence: Float64[np.ndarray, "x y z"]
+    """Mean log power over the pairs, at most zero."""
+    low_m: Float64[np.ndarray, "3"]
+    """Lower corner of the first cell [m]."""
+    high_m: Float64[np.ndarray, "3"]
+    """Upper corner that nothing is drawn beyond [m]."""
+
+    @staticmethod
+    def around(
+        maps: PairMaps,
+        axes_xy: Float[np.ndarray, "body 2"],
+        bounds_m: Float64[np.ndarray, "2 3"],
+    ) -> StartCells:
+        """The cells that bodies at `axes_xy` may fill."""
+        floor_m = bounds_m[0, 2]
+        low = np.maximum([*(axes_xy.min(axis=0) - REACH_M), floor_m], bounds_m[0])
+        high = np.minimum([*(axes_xy.max(axis=0) + REACH_M), floor_m + REACH_HEIGHT_M], bounds_m[1])
+        axes = [np.arange(low[k] + CELL_M / 2, high[k], CELL_M) for k in range(3)]
+        points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+        evidence = np.log(maps.at(points.reshape(-1, 3)) + 1e-3).mean(axis=0)
+        evidence = (evidence - evidence.max()).reshape(points.shape[:3])
+        return StartCells(points, evidence, low, high)
+
+    def density(self, bodies: Bodies) -> StartDensity:
+        """Where Gaussians of these bodies are drawn."""
+        points, shape = self.points.reshape(-1, 3), self.points.shape[:3]
+        prior = np.exp(surface_prior(points, bodies)[0]).reshape(shape)
+        share = prior * np.exp(EVIDENCE_EXPONENT * self.evidence)
+        whose = nearest_axis(points, bodies.axes_xy).reshape(shape)
+        for body in range(len(bodies)):
+            mine = whose == body
+            own = np.where(mine, share, 0)
+            wanted = _densest(np.where(mine, prior, 0))
+            own *= (wanted / np.maximum(_densest(own), 1e-300)) ** (1 - HEIGHT_EVIDENCE)
+            share = np.where(mine, own * wanted.sum() / max(_densest(own).sum(), 1e-300), share)
+        return StartDensity(share / share.sum(), self.low_m, self.high_m)
+
+
 def _densest(share: Float64[np.ndarray, "x y z"]) -> Float64[np.ndarray, "z"]:
     """Mean of the likeliest cells of each height, as many as a trunk's cross-section covers."""
     cells = share.reshape(-1, share.shape[2])
     count = min(round(CROSS_SECTION_M2 / CELL_M**2), len(cells))
     return np.partition(cells, len(cells) - count, axis=0)[len(cells) - count :].mean(axis=0)
-
-
-def log_prior(
-    points: Float[np.ndarray, "N 3"], axes_xy: Float[np.ndarray, "body 2"]
-) -> Float64[np.ndarray, "N"]:
-    """Unnormalised log density of the surface of upright bodies."""
-    radius = np.linalg.norm(points[:, None, :2] - axes_xy[None], axis=2).min(axis=1)
-    above = np.clip(points[:, 2] - PRIOR_HEIGHT_M, 0.0, None)
-    return -0.5 * (radius / PRIOR_RADIUS_M) ** 2 - 0.5 * (above / PRIOR_HEIGHT_FALL_M) ** 2
 
 
 def quats_from_normals(normals: Float[np.ndarray, "N 3"]) -> Float[Tensor, "N 4"]:

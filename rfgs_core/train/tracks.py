@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float64
+
+from rfgs_core.train.body_prior import Bodies
 
 #: A body is looked for at least this far around where it is expected [m].
 REACH_M = 0.5
@@ -26,11 +28,19 @@ class Tracks:
     """Velocities [m/s]; NaN before a second frame."""
     time_s: float
     """When [s]."""
+    knees_rad: Float64[np.ndarray, "body"]
+    """Where the knees of who sits point, see `Bodies`; NaN of who stands."""
 
     @staticmethod
     def begun(axes_xy: Float64[np.ndarray, "body 2"], time_s: float) -> Tracks:
-        """Tracks of one frame, velocities unknown."""
-        return Tracks(axes_xy, np.full_like(axes_xy, np.nan), time_s)
+        """Tracks of one frame, of bodies that stand, velocities unknown."""
+        unknown = np.full_like(axes_xy, np.nan)
+        return Tracks(axes_xy, unknown, time_s, np.full(len(axes_xy), np.nan))
+
+    @property
+    def bodies(self) -> Bodies:
+        """The bodies as they hold themselves."""
+        return Bodies(self.axes_xy, self.knees_rad)
 
     def expected(
         self, time_s: float
@@ -43,8 +53,9 @@ class Tracks:
         return self.axes_xy + elapsed_s * velocity, REACH_M + abs(elapsed_s) * doubt_m_s
 
     def moved(self, axes_xy: Float64[np.ndarray, "body 2"], time_s: float) -> Tracks:
-        """The same bodies at another time."""
+        """The same bodies at another time, held as before."""
         elapsed_s = time_s - self.time_s
         if elapsed_s == 0.0:
-            return Tracks(axes_xy, self.velocity_xy, time_s)
-        return Tracks(axes_xy, (axes_xy - self.axes_xy) / elapsed_s, time_s)
+            return replace(self, axes_xy=axes_xy)
+        velocity_xy = (axes_xy - self.axes_xy) / elapsed_s
+        return replace(self, axes_xy=axes_xy, velocity_xy=velocity_xy, time_s=time_s)

@@ -19,6 +19,7 @@ from scipy.spatial import KDTree
 from torch import Tensor
 
 from rfgs_core.gaussians import Gaussians
+from rfgs_core.train.body_prior import Bodies, outward_normals
 from rfgs_core.train.channel import Channel
 from rfgs_core.train.comparison import Comparison
 from rfgs_core.train.head import RadioHead
@@ -27,7 +28,7 @@ from rfgs_core.train.losses import SamplePoints
 from rfgs_core.train.observations import Observations
 from rfgs_core.train.parameters import TrainableGaussians
 from rfgs_core.train.reflectivity import posterior_mean
-from rfgs_core.train.start import gaussians_at, outward_normals
+from rfgs_core.train.start import gaussians_at
 
 
 @dataclass(frozen=True)
@@ -83,8 +84,8 @@ class ResidualDensity:
     """Variance per link that need not be explained."""
     head: RadioHead
     """Decodes reflectivities."""
-    axes_xy: Float64[np.ndarray, "body 2"]
-    """Ground positions of the bodies, which new Gaussians face away from [m]."""
+    bodies: Bodies
+    """The bodies, which new Gaussians face away from."""
     iterations: int
     """Steps of the whole descent."""
 
@@ -111,7 +112,7 @@ class ResidualDensity:
         if not left.changed or room <= 0:
             return Gaussians.none()
         points = residual_peaks(pair_maps(left), g.means.double().numpy(), self.rule)[:room]
-        new = gaussians_at(points, outward_normals(points, self.axes_xy))
+        new = gaussians_at(points, outward_normals(points, self.bodies))
         new = replace(new, logit_opacities=g.logit_opacities.median().expand(len(new)).clone())
         power = energy.median().expand(len(new))
         gamma = torch.polar(power.sqrt(), torch.zeros(len(new)))

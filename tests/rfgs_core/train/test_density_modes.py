@@ -181,7 +181,7 @@ def test_each_mode_changes_rows_and_resumes_exactly(
     tmp_path: Path, monkeypatch, missing_one, head, quick_config: TrainConfig, mode
 ) -> None:
     seen, cloud = missing_one
-    tracks = Tracks(np.array([[2.3, 2.2]]), np.zeros((1, 2)), 0.0)
+    tracks = Tracks(np.array([[2.3, 2.2]]), np.zeros((1, 2)), 0.0, np.array([np.nan]))
     state = FrameState(cloud, torch.full((6,), 1e-3), head, tracks, np.arange(6) + 10)
     # A checkpoint between two densifications: the accumulated gradients must be in it.
     monkeypatch.setattr(refine_module, "CHECKPOINT_EVERY", 17)
@@ -219,7 +219,7 @@ def _eager(real):
 
 def test_the_papers_rule_needs_its_points(missing_one, head, quick_config) -> None:
     seen, cloud = missing_one
-    tracks = Tracks(np.array([[2.3, 2.2]]), np.zeros((1, 2)), 0.0)
+    tracks = Tracks(np.array([[2.3, 2.2]]), np.zeros((1, 2)), 0.0, np.array([np.nan]))
     state = FrameState(cloud, torch.full((6,), 1e-3), head, tracks, np.arange(6))
     with pytest.raises(RfgsError, match="--density paper reads the sample points"):
         refine(seen, state, replace(quick_config, density="paper"), 0)

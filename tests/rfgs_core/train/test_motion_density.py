@@ -80,7 +80,9 @@ def test_the_change_of_a_still_body_is_not_new(make_observations) -> None:
 
 
 def test_a_trembling_track_of_a_still_change_has_no_pace() -> None:
-    tracks = Tracks(np.zeros((2, 2)), np.array([[0.3, 0.4], [np.nan, np.nan]]), 1.0)
+    tracks = Tracks(
+        *(np.zeros((2, 2)), np.array([[0.3, 0.4], [np.nan, np.nan]]), 1.0), np.full(2, np.nan)
+    )
     assert paces_m_s(tracks, 0.0).tolist() == [0.0, WALK_M_S]
     assert paces_m_s(tracks, 0.5).tolist() == [0.25, WALK_M_S]
 

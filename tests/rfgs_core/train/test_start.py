@@ -10,6 +10,7 @@ import pytest
 import torch
 
 from rfgs_core.gaussians.model import rotation_matrices
+from rfgs_core.train.body_prior import Bodies, nearest_axis, surface_prior
 from rfgs_core.train.localise import PairMaps
 from rfgs_core.train.start import (
     CELL_M,
@@ -17,9 +18,6 @@ from rfgs_core.train.start import (
     HEIGHT_EVIDENCE,
     StartDensity,
     gaussians_at,
-    log_prior,
-    nearest_axis,
-    outward_normals,
     quats_from_normals,
 )
 
@@ -47,28 +45,13 @@ def test_local_z_turns_into_the_normal() -> None:
     np.testing.assert_allclose(torch.linalg.det(matrices), np.ones(56), atol=1e-5)
 
 
-def test_normals_point_away_from_the_nearest_axis() -> None:
-    axes = np.array([[0.0, 0.0], [3.0, 0.0]])
-    points = np.array([[0.5, 0.0, 1.0], [2.0, 0.0, 1.0], [3.0, 2.0, 0.3], [0.0, 0.0, 1.0]])
-    normals = outward_normals(points, axes)
-    np.testing.assert_allclose(normals, [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, 0, 0]], atol=1e-12)
-
-
-def test_the_prior_is_a_body() -> None:
-    """Gaussian of 0.2 m around the axis; a half Gaussian of 0.08 m above 1.6 m."""
-    axes = np.array([[0.7, 0.7]])
-    places = np.array([[0.7, 0.7, 1.0], [0.9, 0.7, 1.0], [0.7, 0.3, 0.2], [0.7, 0.7, 1.76]])
-    got = log_prior(places, axes)
-    np.testing.assert_allclose(got - got[0], [0, -0.5, -2.0, -2.0], atol=1e-6)
-
-
 def test_without_evidence_the_density_is_the_prior() -> None:
-    axes = np.array([[0.7, 0.7]])
-    density = StartDensity.of(flat_maps(), axes, BOUNDS_M)
+    bodies = Bodies.standing(np.array([[0.7, 0.7]]))
+    density = StartDensity.of(flat_maps(), bodies, BOUNDS_M)
     covered_m = density.low_m + CELL_M * np.array(density.share.shape)
     places = np.random.default_rng(0).uniform(density.low_m, covered_m, (200, 3))
     cells = density.low_m + (np.floor((places - density.low_m) / CELL_M) + 0.5) * CELL_M
-    prior = np.exp(log_prior(cells, axes))
+    prior = np.exp(surface_prior(cells, bodies)[0])
     got = density.at(places)
     np.testing.assert_allclose(got / got.sum(), prior / prior.sum(), rtol=1e-6)
     assert density.share.sum() == pytest.approx(1.0)
@@ -78,9 +61,9 @@ def test_without_evidence_the_density_is_the_prior() -> None:
 def test_within_a_height_density_follows_the_maps_with_a_quarter_power() -> None:
     power = np.ones((2, 8, 8, 10), np.float32)
     power[0, 4:] = math.exp(8.0)
-    axes = np.array([[0.7, 0.7]])
-    loud = StartDensity.of(flat_maps(power), axes, BOUNDS_M).share
-    plain = StartDensity.of(flat_maps(), axes, BOUNDS_M).share
+    bodies = Bodies.standing(np.array([[0.7, 0.7]]))
+    loud = StartDensity.of(flat_maps(power), bodies, BOUNDS_M).share
+    plain = StartDensity.of(flat_maps(), bodies, BOUNDS_M).share
     lift = np.log(loud / plain)
     # Mean of the two maps' logarithms, 8 and 0, times a quarter.
     np.testing.assert_allclose(lift[-1] - lift[0], 1.0, atol=1e-3)
@@ -89,9 +72,9 @@ def test_within_a_height_density_follows_the_maps_with_a_quarter_power() -> None
 def test_between_heights_it_follows_them_far_less() -> None:
     power = np.full((2, 8, 8, 10), 1.0, np.float32)
     power[:, :, :, 5:] = math.exp(8.0)
-    axes = np.array([[0.7, 0.7]])
-    loud = StartDensity.of(flat_maps(power), axes, BOUNDS_M).share.sum(axis=(0, 1))
-    plain = StartDensity.of(flat_maps(), axes, BOUNDS_M).share.sum(axis=(0, 1))
+    bodies = Bodies.standing(np.array([[0.7, 0.7]]))
+    loud = StartDensity.of(flat_maps(power), bodies, BOUNDS_M).share.sum(axis=(0, 1))
+    plain = StartDensity.of(flat_maps(), bodies, BOUNDS_M).share.sum(axis=(0, 1))
     lift = np.log(loud / plain)
     assert lift[-1] - lift[0] == pytest.approx(0.25 * 8.0 * HEIGHT_EVIDENCE, abs=1e-3)
 
@@ -100,7 +83,9 @@ def test_heights_seen_sharply_do_not_outshine_blurred_ones() -> None:
     """Of the cells that a body fills, as many lie where the maps are flat as where they peak."""
     power = np.ones((2, 8, 8, 10), np.float32)
     power[:, 3:5, 3:5, 5:] = math.exp(8.0)
-    share = StartDensity.of(flat_maps(power), np.array([[0.7, 0.7]]), BOUNDS_M).share
+    share = StartDensity.of(
+        flat_maps(power), Bodies.standing(np.array([[0.7, 0.7]])), BOUNDS_M
+    ).share
     top = round(1.6 / CELL_M)
     body = np.sort(share[:, :, :top].ravel())[-round(CROSS_SECTION_M2 / CELL_M**2) * top :]
     filled = (share >= body[0])[:, :, :top].sum(axis=(0, 1))
@@ -113,7 +98,7 @@ def test_a_loud_body_gets_no_more_gaussians_than_a_quiet_one() -> None:
     power = np.ones((2, 20, 10, 10), np.float32)
     power[:, :10] = 100.0
     axes = np.array([[1.0, 1.0], [3.0, 1.0]])
-    points = StartDensity.of(flat_maps(power), axes, bounds_m).draw(
+    points = StartDensity.of(flat_maps(power), Bodies.standing(axes), bounds_m).draw(
         20_000, np.random.default_rng(3)
     )
     counts = np.bincount(nearest_axis(points, axes))
@@ -123,7 +108,9 @@ def test_a_loud_body_gets_no_more_gaussians_than_a_quiet_one() -> None:
 @pytest.mark.parametrize("axis", [(0.75, 0.7), (0.13, 0.13), (1.4, 1.34)])
 def test_drawn_points_stay_in_bounds(axis: tuple[float, float]) -> None:
     rng = np.random.default_rng(1)
-    points = StartDensity.of(flat_maps(), np.array([axis]), BOUNDS_M).draw(4000, rng)
+    points = StartDensity.of(flat_maps(), Bodies.standing(np.array([axis])), BOUNDS_M).draw(
+        4000, rng
+    )
     assert points.shape == (4000, 3)
     assert (points >= BOUNDS_M[0]).all()
     assert (points <= BOUNDS_M[1]).all()
@@ -134,7 +121,9 @@ def test_drawn_points_stay_in_bounds(axis: tuple[float, float]) -> None:
 def test_drawn_points_follow_the_density() -> None:
     bounds_m = np.array([[-2.0, -2.0, 0.0], [2.0, 2.0, 2.5]])
     rng = np.random.default_rng(2)
-    points = StartDensity.of(flat_maps(), np.array([[0.1, -0.2]]), bounds_m).draw(20_000, rng)
+    points = StartDensity.of(flat_maps(), Bodies.standing(np.array([[0.1, -0.2]])), bounds_m).draw(
+        20_000, rng
+    )
     radius = points[:, :2] - [0.1, -0.2]
     # 5 standard errors; cells of 4 cm widen a standard deviation of 0.2 m by 0.2 %.
     error = 5 * 0.2 / math.sqrt(2 * 20_000)
@@ -149,9 +138,9 @@ def test_drawn_points_follow_the_density() -> None:
 
 
 def test_the_draw_is_that_of_its_seed() -> None:
-    axes = np.array([[0.7, 0.7]])
+    bodies = Bodies.standing(np.array([[0.7, 0.7]]))
     draws = [
-        StartDensity.of(flat_maps(), axes, BOUNDS_M).draw(50, np.random.default_rng(seed))
+        StartDensity.of(flat_maps(), bodies, BOUNDS_M).draw(50, np.random.default_rng(seed))
         for seed in (0, 0, 1)
     ]
     np.testing.assert_array_equal(draws[0], draws[1])

@@ -15,6 +15,7 @@ from rfgs_core.evaluate.backprojection import PowerMap, ThinnedMaps, thinned_map
 from rfgs_core.evaluate.grid import Grid
 from rfgs_core.evaluate.rf import HeldOut
 from rfgs_core.radio import Layout
+from rfgs_core.train.body_prior import Bodies
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,8 @@ class Evidence:
     """Power maps where antennas are not coherent; None: the matched filter of `delta`."""
     method_centroid_m: Float[np.ndarray, "3"] | None = None
     """Centroid of the evaluated method's own prediction [m]; None if it predicts nothing."""
+    method_bodies: Bodies | None = None
+    """Where it has its bodies; None if it does not tell."""
 
     @staticmethod
     def hide(
@@ -68,9 +71,11 @@ class Evidence:
             power_map=power_map,
         )
 
-    def with_centroid(self, centroid_m: Float[np.ndarray, "3"] | None) -> Evidence:
-        """The same evidence with the evaluated method's own centroid [m]."""
-        return replace(self, method_centroid_m=centroid_m)
+    def with_method(
+        self, centroid_m: Float[np.ndarray, "3"] | None, bodies: Bodies | None = None
+    ) -> Evidence:
+        """The same evidence with the evaluated method's own centroid [m] and bodies."""
+        return replace(self, method_centroid_m=centroid_m, method_bodies=bodies)
 
     @cached_property
     def maps(self) -> ThinnedMaps:

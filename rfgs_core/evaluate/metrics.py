@@ -18,6 +18,7 @@ from rfgs_core.evaluate.controls import CONTROLS, ControlResult, phase_free
 from rfgs_core.evaluate.geometry import GEOMETRY_KEYS, geometry_metrics
 from rfgs_core.evaluate.image import IMAGE_KEYS
 from rfgs_core.evaluate.oracle import oracle_scores
+from rfgs_core.evaluate.people import FramePeople, people_metrics
 from rfgs_core.evaluate.pictures import Values, has_pictures, mean_of, picture_metrics
 from rfgs_core.evaluate.provenance import conditions, hardware, limits, now, versions
 from rfgs_core.evaluate.residual import GAUSSIANS_ALONE, Answer, with_residual
@@ -61,6 +62,7 @@ def evaluate_run(run: EvaluatedRun, *, oracle: bool = True) -> dict[str, Any]:
     metrics["controls"] = groups
     metrics["reasons"] = table.reasons(image, image_reasons, bool(pictures))
     metrics["frames"] = table.frames()
+    metrics["people"] = people_metrics(table.people) if table.people else None
     metrics["background"] = None if room is None else background_metrics(scene, room)
     metrics |= _circumstances(scene)
     metrics["verdicts"] = verdicts(metrics)
@@ -86,11 +88,12 @@ def _circumstances(scene: Scene) -> dict[str, Any]:
 
 
 class _Table:
-    """Per-frame rows of the method and of each control, and reasons for what is missing."""
+    """Per-frame rows of the method and of each control, its people, and why values are missing."""
 
     def __init__(self) -> None:
         self.rows: dict[str, dict[int, dict[str, Any]]] = {}
         self.why: dict[str, str] = {}
+        self.people: list[FramePeople] = []
 
     def add(self, name: str, frame: int, group: str, value: dict[str, Any]) -> None:
         """Stores one group of one frame."""
@@ -162,6 +165,9 @@ def _evaluate_frame(
     reference, csi = scene.reference(frame), scene.csi(frame)
     score, predicted = scene.score(frame), scene.run.predict(frame)
     evidence = scene.evidence(frame, score)
+    people = scene.people(frame, score)
+    if people is not None:
+        table.people.append(people)
     # Without phases there is no channel to compare with, and nothing is left to add.
     whole = predicted
     if scene.observe == "complex":

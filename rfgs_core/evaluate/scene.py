@@ -19,11 +19,13 @@ from rfgs_core.evaluate.controls.interpolation import fill
 from rfgs_core.evaluate.evidence import Evidence
 from rfgs_core.evaluate.geometry import best_voxels, reference_points, voxel_budget
 from rfgs_core.evaluate.grid import Grid, splat_gaussians
+from rfgs_core.evaluate.people import FramePeople, match_people, surface_centroids
 from rfgs_core.evaluate.rf import HeldOut
 from rfgs_core.gaussians.model import Gaussians
 from rfgs_core.radio import Layout, Radio
 from rfgs_core.render.view import moving_gaussians
 from rfgs_core.seeds import sub_seed
+from rfgs_core.train.body_prior import Bodies
 from rfgs_core.train.config import Background, Observe, Packets
 from rfgs_core.train.delay_maps import delay_power_map
 from rfgs_core.train.observations import Kept, Observations
@@ -59,6 +61,10 @@ class EvaluatedRun(Protocol):
 
     def gaussians(self, frame: int) -> Gaussians:
         """Static Gaussians, then the moving ones of a frame."""
+        ...
+
+    def bodies(self, frame: int) -> Bodies | None:
+        """Where the bodies of a frame are and how they hold themselves, if the run tells."""
         ...
 
     def attributes(self, frame: int) -> dict[str, np.ndarray]:
@@ -173,8 +179,21 @@ class Scene:
             self.voxels,
             power_map,
         )
-        best = best_voxels(score, self.voxels)
-        return evidence.with_centroid(self.grid.centres(best).mean(axis=0) if len(best) else None)
+        predicted = self.predicted(score)
+        centroid_m = predicted.mean(axis=0) if len(predicted) else None
+        return evidence.with_method(centroid_m, self.run.bodies(frame))
+
+    def predicted(self, score: Float[np.ndarray, "x y z"]) -> Float64[np.ndarray, "k 3"]:
+        """Centres of the voxels that a score predicts [m]."""
+        return self.grid.centres(best_voxels(score, self.voxels))
+
+    def people(self, frame: int, score: Float[np.ndarray, "x y z"]) -> FramePeople | None:
+        """Who the method's bodies are; None if it does not tell its bodies."""
+        bodies = self.run.bodies(frame)
+        if bodies is None:
+            return None
+        people = surface_centroids(*self.run.sequence.moving_mesh(frame))
+        return match_people(self.predicted(score), bodies.axes_xy, people)
 
     def reference(self, frame: int) -> Float64[np.ndarray, "n 3"]:
         """Points on the true moving surface [m]."""

@@ -10,6 +10,7 @@ from jaxtyping import Float64, Int64
 from scipy.optimize import linear_sum_assignment
 
 from rfgs_core.dataset import Sequence
+from rfgs_core.evaluate.people import identity_kept
 from rfgs_core.pose.estimate import PoseEstimate
 from rfgs_core.skeleton import JOINTS
 
@@ -38,7 +39,7 @@ def score_poses(estimate: PoseEstimate, sequence: Sequence) -> dict[str, Any]:
         for body, person in row
     ]
     result["tracked"] = float(np.sum(np.array(distance) < LOST_M) / people) if people else None
-    result["identity_kept"] = _identity_kept(matches)
+    result["identity_kept"] = identity_kept([[(int(b), int(p)) for b, p in row] for row in matches])
     return result
 
 
@@ -71,10 +72,3 @@ def _errors(
         "aligned_m": float(aligned.mean()),
         "joints_m": {name: float(each[:, j].mean()) for j, name in enumerate(JOINTS)},
     }
-
-
-def _identity_kept(matches: list[Int64[np.ndarray, "match 2"]]) -> float | None:
-    """Share of matches with the person that the body was matched to first."""
-    first: dict[int, int] = {}
-    kept = [first.setdefault(body, person) == person for row in matches for body, person in row]
-    return float(np.mean(kept)) if kept else None

@@ -23,6 +23,7 @@ from rfgs_core.gaussians.ply import read_ply
 from rfgs_core.run.calibration import read_calibration
 from rfgs_core.run.static import static_gaussians
 from rfgs_core.threads import one_torch_thread
+from rfgs_core.train.body_prior import Bodies
 from rfgs_core.train.channel import Channel
 from rfgs_core.train.config import TrainConfig
 from rfgs_core.train.head import HEAD_SHAPES, RadioHead
@@ -133,6 +134,19 @@ class Run:
                 f"{len(features)}; {_REMEDY}"
             )
         return cloud.to_gaussians(features)
+
+    def bodies(self, frame: int) -> Bodies | None:
+        """Where the bodies of a frame are and how they hold themselves; None without checkpoint.
+
+        Raises:
+            RfgsFormatError: The checkpoint is damaged, or of a version that told no postures.
+        """
+        path = self.path / "checkpoints" / f"{frame:06d}.npz"
+        if not path.exists():
+            return None
+        shapes = {"axes_xy": ("body", 2), "knees_rad": ("body",)}
+        stored = load_arrays(path, _REMEDY, shapes, ("knees_rad",), others=False)
+        return Bodies(stored["axes_xy"], stored["knees_rad"])
 
     @property
     def head(self) -> RadioHead:

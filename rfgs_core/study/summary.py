@@ -16,18 +16,19 @@ from rfgs_core.study.cases import Case
 RIVALS = ("matched_filter", "clean", "omp")
 #: Share of the best rival's error 1 − F10 that is to be cut, or of its gap to the ceiling closed.
 CUT_MARK = {"wifi": 0.5, "mmwave": 0.4, "uwb": 0.4}
-#: Largest distance between the true centroid and the predicted one [m].
+#: Largest distance between a person's true centroid and that of the body found [m].
 CENTROID_MARK_M = {"wifi": 0.25, "mmwave": 0.10, "uwb": 0.10}
 #: F-scores in which the template is to be beaten.
 TEMPLATE_MARKS = {"wifi": ("f10",), "mmwave": ("f05", "f10"), "uwb": ("f05", "f10")}
-#: Least share of frames with the centroid within half a metre.
-TRACKED_MARK = 0.95
+#: Least share of people whose body's centroid is within half a metre.
+FOUND_MARK = 0.95
 #: Decibels above linear interpolation that held-out elements are to reach.
 ELEMENT_MARK_DB = 6.0
 #: Controls that only interpolate the channel.
 INTERPOLATORS = ("linear", "gaussian_process", "spectrum")
 
-_OWN = ("f05", "f10", "centroid_m", "tracked")
+_OWN = ("f05", "f10")
+_PEOPLE = ("centroid_m", "found", "identity_kept")
 
 
 @dataclass(frozen=True)
@@ -76,12 +77,15 @@ def _control(rows: list[Mapping[str, Any]], name: str, group: str, key: str) -> 
 
 def _row(scene: str, condition: str, radio: str, rows: list[Mapping[str, Any]]) -> Row:
     values = {key: _mean(row["geometry"].get(key) for row in rows) for key in _OWN}
+    for key in _PEOPLE:
+        values[key] = _mean((row.get("people") or {}).get(key) for row in rows)
     rivals = {name: _control(rows, name, "geometry", "f10") for name in RIVALS}
     best_rival = max(RIVALS, key=lambda name: rivals[name] or 0.0)
     values["rival_f10"] = rivals[best_rival]
     values["oracle_f10"] = _control(rows, "oracle_init", "geometry", "f10")
     for key in ("f05", "f10"):
         values[f"template_{key}"] = _control(rows, "template", "geometry", key)
+    values["prior_f10"] = _control(rows, "body_prior", "geometry", "f10")
     values["cut"] = _share(values["f10"], values["rival_f10"], 1.0)
     values["gap"] = _share(values["f10"], values["rival_f10"], values["oracle_f10"])
     values["element_snr_db"] = _mean(row["rf"].get("element_snr_db") for row in rows)
@@ -133,12 +137,17 @@ def _marks(radio: str, values: Mapping[str, float | None]) -> dict[str, bool | N
         "cut": max(shares) >= CUT_MARK[radio] if shares else None,
         **{f"template_{key}": better(key, f"template_{key}", 0.0) for key in TEMPLATE_MARKS[radio]},
         "centroid": _less(values["centroid_m"], CENTROID_MARK_M[radio]),
-        "tracked": above("tracked", TRACKED_MARK),
+        "found": above("found", FOUND_MARK),
+        "identity": _none_or(values["identity_kept"], 1.0),
         "linear": better("element_snr_db", "linear_snr_db", ELEMENT_MARK_DB),
         "gaussian_process": better("element_snr_db", "gaussian_process_snr_db", 0.0),
         "pair_gain": _less(values["device_gain_mae_db"], values["control_device_gain_mae_db"]),
         "profiles": better("delay_profile_corr", "control_delay_profile_corr", 0.0),
     }
+
+
+def _none_or(value: float | None, wanted: float) -> bool | None:
+    return None if value is None else value == wanted
 
 
 def _less(value: float | None, mark: float | None) -> bool | None:

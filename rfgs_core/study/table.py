@@ -20,9 +20,11 @@ _HEAD = (
     "error cut",
     "gap closed",
     "template F5/F10",
+    "prior F10",
     "ceiling F10",
     "centroid [m]",
-    "tracked",
+    "found",
+    "identity",
     "elements [dB]",
     "linear/GP/spectrum [dB]",
     "pair level [dB]",
@@ -33,7 +35,10 @@ _HEAD = (
 _NOTES = """\
 F5, F10: F-score at 5 and 10 cm, mean over frames and seeds. Best rival: the best of matched filter,
 CLEAN and OMP. Error cut: share of the rival's 1 − F10 that is removed; gap closed: share of the way
-from the rival to `oracle_init`, the same fit started on the true surface. Elements: complex SNR on
+from the rival to `oracle_init`, the same fit started on the true surface. Prior: what the start of
+the fit assumes of bodies, at the places and in the postures found. Centroid: of each person against
+the body found; found: share of people with it within half a metre; identity: share of bodies that
+stay with the person they were with at first. Elements: complex SNR on
 unseen array columns of csi − csi_static, beside three ways to interpolate. Pair level: error of an
 unseen device pair's mean power; profiles: correlation of the delay profiles of unseen links; both
 beside the best control. Missed: marks that were set before and are not reached."""
@@ -62,7 +67,8 @@ def _cells(row: Row) -> list[str]:
         f"{number(v['rival_f10'])} ({row.best_rival})",
         *(_percent(v["cut"]), _percent(v["gap"])),
         f"{number(v['template_f05'])} / {number(v['template_f10'])}",
-        *(number(v["oracle_f10"]), number(v["centroid_m"]), number(v["tracked"])),
+        *(number(v["prior_f10"]), number(v["oracle_f10"]), number(v["centroid_m"])),
+        *(number(v["found"], ".2f"), number(v["identity_kept"], ".2f")),
         number(v["element_snr_db"], ".1f"),
         " / ".join(number(v[f"{name}_snr_db"], ".1f") for name in INTERPOLATORS),
         _beside(v, "device_gain_mae_db", row.best_gain, ".1f"),

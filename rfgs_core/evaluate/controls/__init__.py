@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from rfgs_core.evaluate.controls import (
+    body_prior,
     clean,
     empty_room,
     gaussian_process,
@@ -34,6 +35,7 @@ CONTROLS: dict[str, Control] = {
     "omp": omp.control,
     "template": template.control,
     "template_filled": template.filled,
+    "body_prior": body_prior.control,
 }
 
 __all__ = ["CONTROLS", "Control", "ControlResult", "Evidence"]

@@ -23,6 +23,7 @@ from rfgs_core.evaluate.rf import HeldOut
 from rfgs_core.gaussians.model import FEATURE_DIM, Gaussians
 from rfgs_core.radio import Radio, layout, place_devices
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.train.body_prior import Bodies
 from rfgs_core.train.observations import Kept, Observations, observe
 
 BOUNDS_M = np.array([[0.0, 0.0, 0.0], [4.0, 3.5, 2.5]])
@@ -55,6 +56,10 @@ class SurfaceRun:
     def attributes(self, frame: int) -> dict[str, np.ndarray]:
         count = len(self.gaussians(frame))
         return {"features": np.ones((count, FEATURE_DIM)), "rf_power_db": np.zeros(count)}
+
+    def bodies(self, frame: int) -> Bodies:
+        centre = self.sequence.moving_mesh(frame)[0].mean(axis=0) + self.shift_m
+        return Bodies.standing(centre[None, :2].astype(np.float64))
 
     def observations(self, frame: int, kept: Kept | None = None) -> Observations:
         kind = self.config.get("observe", "complex")

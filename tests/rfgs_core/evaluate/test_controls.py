@@ -16,6 +16,7 @@ from rfgs_core.evaluate.controls.spectrum import _like, _likeliest, spectral
 from rfgs_core.evaluate.evidence import Evidence
 from rfgs_core.evaluate.geometry import best_voxels
 from rfgs_core.evaluate.rf import frame_rf, rf_values
+from rfgs_core.train.body_prior import Bodies
 
 Make = Callable[..., object]
 ONE = np.array([[2.0, 1.7, 1.2]])
@@ -39,7 +40,7 @@ def test_held_out_entries_are_hidden(scatterers) -> None:
 @pytest.mark.parametrize("name", CONTROLS)
 def test_no_control_depends_on_held_out_entries(scatterers, name: str) -> None:
     made = scatterers(ONE)
-    evidence: Evidence = made.evidence.with_centroid(ONE[0])
+    evidence: Evidence = made.evidence.with_method(ONE[0])
     poison = np.where(made.held_out.visible, made.delta + made.static, np.nan)
     static = np.where(made.held_out.visible, made.static, np.nan)
     poisoned = Evidence.hide(
@@ -50,7 +51,7 @@ def test_no_control_depends_on_held_out_entries(scatterers, name: str) -> None:
         evidence.freq_hz,
         evidence.grid,
         evidence.voxels,
-    ).with_centroid(ONE[0])
+    ).with_method(ONE[0])
     plain, blind = CONTROLS[name](evidence), CONTROLS[name](poisoned)
     for key in ("score", "delta", "static"):
         first, second = getattr(plain, key), getattr(blind, key)
@@ -63,7 +64,7 @@ def test_no_control_depends_on_held_out_entries(scatterers, name: str) -> None:
 @pytest.mark.parametrize("name", CONTROLS)
 def test_every_control_says_why_it_leaves_something_out(scatterers, name: str) -> None:
     made = scatterers(ONE, own_device_links="only")
-    result = CONTROLS[name](made.evidence.with_centroid(ONE[0]))
+    result = CONTROLS[name](made.evidence.with_method(ONE[0]))
     if result.score is None or result.delta is None:
         assert result.reason
     if result.score is not None:
@@ -201,7 +202,7 @@ def test_hidden_device_pair_takes_the_level_of_its_neighbours(scatterers) -> Non
 
 def test_template_stands_on_the_floor_at_the_methods_centroid(scatterers) -> None:
     made = scatterers(ONE, voxels=1500)
-    score = CONTROLS["template"](made.evidence.with_centroid(np.array([2.0, 1.6, 0.4]))).score
+    score = CONTROLS["template"](made.evidence.with_method(np.array([2.0, 1.6, 0.4]))).score
     voxels = made.evidence.grid.centres(best_voxels(score, 1500))
     np.testing.assert_allclose(voxels.mean(axis=0), [2.0, 1.6, 0.85], atol=0.05)
     assert np.ptp(voxels[:, 2]) == pytest.approx(1.7, abs=0.1)
@@ -210,11 +211,27 @@ def test_template_stands_on_the_floor_at_the_methods_centroid(scatterers) -> Non
 
 def test_filled_template_stays_inside_the_ellipsoid(scatterers) -> None:
     made = scatterers(ONE, voxels=1500)
-    evidence = made.evidence.with_centroid(np.array([2.0, 1.6, 0.4]))
+    evidence = made.evidence.with_method(np.array([2.0, 1.6, 0.4]))
     score = CONTROLS["template_filled"](evidence).score
     voxels = made.evidence.grid.centres(best_voxels(score, 1500))
     radius = np.linalg.norm((voxels - [2.0, 1.6, 0.85]) / [0.25, 0.20, 0.85], axis=1)
     assert radius.max() < 0.85
+
+
+def test_the_prior_alone_is_that_of_the_methods_bodies(scatterers) -> None:
+    made = scatterers(ONE, voxels=1500)
+    sitting = Bodies(np.array([[2.0, 1.6]]), np.array([0.0]))
+    heights, widths = [], []
+    for bodies in (Bodies.standing(sitting.axes_xy), sitting):
+        evidence = made.evidence.with_method(None, bodies)
+        score = CONTROLS["body_prior"](evidence).score
+        voxels = made.evidence.grid.centres(best_voxels(score, 1500))
+        heights.append(np.ptp(voxels[:, 2]))
+        widths.append(voxels[:, 0].max() - 2.0)
+    assert heights == pytest.approx([1.65, 1.35], abs=0.1)
+    # Knees and the shins before them.
+    assert widths == pytest.approx([0.17, 0.5], abs=0.08)
+    assert "does not tell" in CONTROLS["body_prior"](made.evidence).reason
 
 
 def test_template_without_a_centroid_says_so(scatterers) -> None:

@@ -52,13 +52,20 @@ def estimate_poses(run: Run, on_step: Callable[[], Any] = lambda: None) -> PoseE
     centroid = np.array([[cloud.centre for cloud in row] for row in clouds])
     joints = np.zeros((*centroid.shape[:2], 17, 3))
     control = np.zeros_like(joints)
+    knees_rad = np.array([_knees(run, frame) for frame in run.frames])
     for body in range(centroid.shape[1]):
         headings = headings_of(time_s, centroid[:, body, :2])
         before = None
         for k, frame in enumerate(run.frames):
             cloud, seed = clouds[k][body], sub_seed(0, "pose", frame, body)
             elapsed_s = float(time_s[k] - time_s[k - 1]) if k else 0.0
-            found = fit_body(cloud, headings[k], before, elapsed_s, seed)
+            seated = bool(np.isfinite(knees_rad[k, body]))
+            if seated:
+                headings[k] = [float(knees_rad[k, body])]
+            if k and seated != np.isfinite(knees_rad[k - 1, body]):
+                # Limbs of another posture are no start for this one.
+                before = None
+            found = fit_body(cloud, headings[k], before, elapsed_s, seed, seated=seated)
             before = found.parameters
             joints[k, body] = joints_of(found.parameters, floor_m)
             # Of a body at rest the control is told the fit's own heading.
@@ -67,6 +74,12 @@ def estimate_poses(run: Run, on_step: Callable[[], Any] = lambda: None) -> PoseE
             control[k, body] = joints_of(standing(cloud, looks), floor_m)
             on_step()
     return PoseEstimate(list(run.frames), time_s, centroid, joints, control)
+
+
+def _knees(run: Run, frame: int) -> Float64[np.ndarray, "body"]:
+    """Where knees of who sits point [rad]; NaN of who stands, or where the run does not tell."""
+    bodies = run.bodies(frame)
+    return np.full(run.config["bodies"], np.nan) if bodies is None else bodies.knees_rad
 
 
 def headings_of(

@@ -24,6 +24,11 @@ _PRIOR: dict[str, tuple[float, float]] = {
     **dict.fromkeys(("left_shoulder", "right_shoulder"), (0.0, 0.4)),
     **dict.fromkeys(("left_elbow", "right_elbow"), (0.4, 0.4)),
 }
+#: What is otherwise of who sits on a chair, thighs level and shins upright.
+_SEATED: dict[str, tuple[float, float]] = {
+    "sink": (0.40, 0.10),
+    **dict.fromkeys(("left_hip", "right_hip", "left_knee", "right_knee"), (1.5, 0.3)),
+}
 _LIMITS: dict[str, tuple[float, float]] = {
     "height": (1.0, 2.2),
     "sink": (-0.1, 0.9),
@@ -90,6 +95,8 @@ def fit_body(
     before: Float64[np.ndarray, "15"] | None = None,
     elapsed_s: float = 0.0,
     seed: int = 0,
+    *,
+    seated: bool = False,
 ) -> FittedBody:
     """The body that lies closest to a cloud, by robust least squares from several headings.
 
@@ -99,12 +106,13 @@ def fit_body(
         before: Parameters in an earlier frame; its limbs pull the prior towards them.
         elapsed_s: Time since then [s].
         seed: Seed of the choice of points.
+        seated: Whether the body is known to sit.
     """
     chosen = np.random.default_rng(seed).permutation(len(cloud.points))[:MAX_POINTS]
     weight = cloud.power[chosen] ** 0.25
     points, weight = cloud.points[chosen], np.sqrt(EVIDENCE * weight / weight.sum())
     tree = KDTree(points)
-    mean, deviation = _prior(before, elapsed_s)
+    mean, deviation = _prior(before, elapsed_s, seated)
     closed = np.isfinite(deviation)
 
     def residuals(
@@ -120,10 +128,11 @@ def fit_body(
     best = FittedBody(standing(cloud, headings[0]), np.inf)
     low, high = _bounds()
     for heading in headings:
-        start = standing(cloud, heading)
+        start, limbs = standing(cloud, heading), index_of("sink")
         if before is not None:
-            limbs = index_of("sink")
             start[limbs:] = before[limbs:]
+        elif seated:
+            start[limbs:] = mean[limbs:]
         cost = np.inf
         for surface_m in SURFACE_M:
             start = np.clip(start, low + 1e-6, high - 1e-6)
@@ -144,10 +153,11 @@ def _along_bones(joints: Float64[np.ndarray, "17 3"]) -> Float64[np.ndarray, "sa
 
 
 def _prior(
-    before: Float64[np.ndarray, "15"] | None, elapsed_s: float
+    before: Float64[np.ndarray, "15"] | None, elapsed_s: float, seated: bool
 ) -> tuple[Float64[np.ndarray, "15"], Float64[np.ndarray, "15"]]:
     """Mean and standard deviation of every parameter, infinite where nothing is known."""
-    pairs = [_PRIOR.get(name, (0.0, np.inf)) for name in PARAMETERS]
+    known = _PRIOR | (_SEATED if seated else {})
+    pairs = [known.get(name, (0.0, np.inf)) for name in PARAMETERS]
     mean, deviation = (np.array(values) for values in zip(*pairs, strict=True))
     if before is not None:
         kept = np.exp(-elapsed_s / MEMORY_S) * np.isfinite(deviation)

@@ -103,6 +103,27 @@ def test_a_stride_is_found_in_its_own_cloud() -> None:
     assert abs(np.angle(np.exp(1j * turned))) < 0.25
 
 
+def test_who_is_known_to_sit_is_found_on_the_chair_from_a_blurred_cloud() -> None:
+    """Blur hides which way knees bend; the posture says it."""
+    joints = joints_of(
+        parameters(
+            **{"x": 1.0, "y": -0.5, "height": 1.75, "heading": 0.7, "sink": 0.42, "pitch": 0.1},
+            **dict.fromkeys(("left_hip", "right_hip", "left_knee", "right_knee"), 1.5),
+            **dict.fromkeys(("left_shoulder", "right_shoulder"), 0.6),
+        ),
+        0.0,
+    )
+    points = around(joints, 1500) + np.random.default_rng(1).normal(0, 0.08, (1500, 3))
+    cloud = Cloud(points, np.ones(1500), floor_m=0.0)
+    known, unknown = (fit_body(cloud, [0.7], seated=seated) for seated in (True, False))
+    errors = [
+        np.linalg.norm(joints_of(found.parameters, 0.0) - joints, axis=1).mean()
+        for found in (known, unknown)
+    ]
+    assert errors[0] < 0.07
+    assert errors[0] < 0.6 * errors[1]
+
+
 def test_limbs_that_are_not_seen_keep_the_earlier_pose_for_a_while() -> None:
     still = around(joints_of(parameters(height=1.78, x=1.0, y=-0.5, heading=0.7), 0.0), 3000)
     trunk = still[still[:, 2] > 1.0]

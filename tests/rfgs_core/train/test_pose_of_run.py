@@ -14,6 +14,7 @@ from rfgs_core.cli.pose import PoseArgs, run
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json, write_json
 from rfgs_core.run import Run
+from rfgs_core.skeleton import JOINTS
 
 
 @pytest.fixture
@@ -35,6 +36,25 @@ def test_poses_errors_and_picture_are_written(own_run: Path, capsys) -> None:
         assert 0.0 < scores[name]["aligned_m"] < 1.0
     assert "standing" in capsys.readouterr().out
     assert (own_run / "pose.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_the_posture_of_the_run_is_that_of_the_pose(own_run: Path) -> None:
+    run(PoseArgs(own_run))
+    knee, hip = JOINTS.index("left_knee"), JOINTS.index("left_hip")
+
+    def thighs() -> np.ndarray:
+        joints = load_arrays(own_run / "pose.npz", "try again")["joints"]
+        return joints[:, 0, knee] - joints[:, 0, hip]
+
+    hanging = thighs()
+    path = own_run / "checkpoints" / "000001.npz"
+    arrays = load_arrays(path, "try again", unknown=("velocity_xy", "knees_rad"))
+    save_arrays(path, {**arrays, "knees_rad": np.array([0.0])})
+    run(PoseArgs(own_run))
+    seated = thighs()
+    assert hanging[0, 2] < -0.3 and seated[0, 2] > -0.3 and seated[0, 0] > 0.2
+    # The frame in which the body stands again starts afresh.
+    np.testing.assert_allclose(seated[1, 2], hanging[1, 2], atol=0.15)
 
 
 def test_a_run_without_bodies_is_refused(own_run: Path) -> None:

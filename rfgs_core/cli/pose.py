@@ -54,7 +54,9 @@ def run(args: PoseArgs) -> int:
         )
     else:
         sys.stdout.write(
-            f"tracked {scores['tracked']:.2f}, identity kept {scores['identity_kept']:.2f}\n"
+            f"tracked {scores['tracked']:.2f}, identity kept {scores['identity_kept']:.2f}, "
+            f"posture right {scores['posture_right']:.2f} ({scores['seated']} of "
+            f"{scores['people']} sit)\n"
         )
     sys.stdout.write(f"{args.run / 'pose.png'} written\n")
     return 0

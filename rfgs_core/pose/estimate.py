@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Bool, Float64
 
 from rfgs_core.errors import RfgsError
 from rfgs_core.pose.body import index_of, joints_of
@@ -34,6 +34,8 @@ class PoseEstimate:
     """Centroid of each body's Gaussians [m]."""
     joints: Float64[np.ndarray, "frame body 17 3"]
     """Fitted joints [m]."""
+    seated: Bool[np.ndarray, "frame body"]
+    """Which bodies the run takes to sit."""
     standing: Float64[np.ndarray, "frame body 17 3"]
     """Joints of the control: a standing body of average height at the same centroid, which
     looks where the track leads [m]."""
@@ -53,18 +55,19 @@ def estimate_poses(run: Run, on_step: Callable[[], Any] = lambda: None) -> PoseE
     joints = np.zeros((*centroid.shape[:2], 17, 3))
     control = np.zeros_like(joints)
     knees_rad = np.array([_knees(run, frame) for frame in run.frames])
+    sits = np.isfinite(knees_rad)
     for body in range(centroid.shape[1]):
         headings = headings_of(time_s, centroid[:, body, :2])
         before = None
         for k, frame in enumerate(run.frames):
             cloud, seed = clouds[k][body], sub_seed(0, "pose", frame, body)
             elapsed_s = float(time_s[k] - time_s[k - 1]) if k else 0.0
-            seated = bool(np.isfinite(knees_rad[k, body]))
-            if seated:
+            if sits[k, body]:
                 headings[k] = [float(knees_rad[k, body])]
-            if k and seated != np.isfinite(knees_rad[k - 1, body]):
+            if k and sits[k, body] != sits[k - 1, body]:
                 # Limbs of another posture are no start for this one.
                 before = None
+            seated = bool(sits[k, body])
             found = fit_body(cloud, headings[k], before, elapsed_s, seed, seated=seated)
             before = found.parameters
             joints[k, body] = joints_of(found.parameters, floor_m)
@@ -73,7 +76,7 @@ def estimate_poses(run: Run, on_step: Callable[[], Any] = lambda: None) -> PoseE
             looks = headings[k][0] if len(headings[k]) == 1 else own
             control[k, body] = joints_of(standing(cloud, looks), floor_m)
             on_step()
-    return PoseEstimate(list(run.frames), time_s, centroid, joints, control)
+    return PoseEstimate(list(run.frames), time_s, centroid, joints, sits, control)
 
 
 def _knees(run: Run, frame: int) -> Float64[np.ndarray, "body"]:

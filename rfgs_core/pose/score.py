@@ -16,6 +16,8 @@ from rfgs_core.skeleton import JOINTS
 
 #: A body further than this from everybody has lost its person [m].
 LOST_M = 0.5
+#: Whose pelvis is lower above the floor sits [m]: halfway between a chair and standing.
+SITTING_PELVIS_M = 0.75
 
 
 def score_poses(estimate: PoseEstimate, sequence: Sequence) -> dict[str, Any]:
@@ -24,8 +26,9 @@ def score_poses(estimate: PoseEstimate, sequence: Sequence) -> dict[str, Any]:
     Bodies are matched to people frame by frame by the distance on the ground between pelvis and
     pelvis. `mpjpe_m` is the mean distance per joint, `aligned_m` the same with pelvis on pelvis;
     `identity_kept` is the share of matches with the person that a body had at first, and
-    `tracked` the share of people with their body within half a metre. Values are None where no
-    joint is known.
+    `tracked` the share of people with their body within half a metre. `posture_right` is the share
+    of matches of which the run says rightly whether they sit, `seated` the number who do. Values
+    are None where no joint is known.
     """
     truth = [sequence.joints(frame).astype(np.float64) for frame in estimate.frames]
     matches = [_matched(estimate.joints[k], true) for k, true in enumerate(truth)]
@@ -40,6 +43,14 @@ def score_poses(estimate: PoseEstimate, sequence: Sequence) -> dict[str, Any]:
     ]
     result["tracked"] = float(np.sum(np.array(distance) < LOST_M) / people) if people else None
     result["identity_kept"] = identity_kept([[(int(b), int(p)) for b, p in row] for row in matches])
+    floor_m = float(np.asarray(sequence.bounds_m)[0, 2])
+    sits = [
+        (estimate.seated[k, body], truth[k][person, 0, 2] - floor_m < SITTING_PELVIS_M)
+        for k, row in enumerate(matches)
+        for body, person in row
+    ]
+    result["posture_right"] = float(np.mean([a == b for a, b in sits])) if sits else None
+    result["seated"] = int(sum(true for _, true in sits))
     return result
 
 

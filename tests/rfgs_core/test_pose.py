@@ -145,12 +145,17 @@ def test_headings_follow_the_track_and_are_open_at_rest() -> None:
     assert headings_of(time_s[:1], walking[:1]) == [[0.0, np.pi / 2, np.pi, -np.pi / 2]]
 
 
-def scored(joints: np.ndarray, truth: np.ndarray) -> dict:
-    """Scores of estimated joints (frame, body, 17, 3) against true ones."""
+def scored(joints: np.ndarray, truth: np.ndarray, seated: np.ndarray | None = None) -> dict:
+    """Scores of estimated joints (frame, body, 17, 3) against true ones, on a floor at 0.2 m."""
+    sits = np.zeros(joints.shape[:2], bool) if seated is None else seated
     estimate = PoseEstimate(
-        list(range(len(joints))), np.arange(len(joints)), joints[:, :, 0], joints, joints + 0.3
+        *(list(range(len(joints))), np.arange(len(joints)), joints[:, :, 0], joints, sits),
+        joints + 0.3,
     )
-    sequence = SimpleNamespace(joints=lambda frame: truth[frame].astype(np.float32))
+    bounds_m = np.array([[0.0, 0.0, 0.2], [4.0, 4.0, 2.4]])
+    sequence = SimpleNamespace(
+        joints=lambda frame: truth[frame].astype(np.float32), bounds_m=bounds_m
+    )
     return score_poses(estimate, sequence)  # type: ignore[arg-type]
 
 
@@ -172,8 +177,17 @@ def test_scores_of_shifted_and_swapped_people() -> None:
     assert away["tracked"] == 0.0
 
 
+def test_postures_are_held_against_the_height_of_the_pelvis() -> None:
+    upright = joints_of(parameters(height=1.7), 0.2)
+    on_a_chair = joints_of(parameters(height=1.7, sink=0.4, x=2.0), 0.2)
+    truth = np.stack([np.stack([upright, on_a_chair])] * 2)
+    found = scored(truth, truth, np.array([[False, True], [True, False]]))
+    assert found["posture_right"] == pytest.approx(0.5) and found["seated"] == 2
+
+
 def test_unknown_joints_have_no_error() -> None:
     truth = np.full((2, 1, 17, 3), np.nan)
     found = scored(np.zeros((2, 1, 17, 3)), truth)
     assert found["fit"]["mpjpe_m"] is None
     assert found["tracked"] is None and found["identity_kept"] is None
+    assert found["posture_right"] is None

@@ -41,9 +41,9 @@ DIRECTIONS = 8
 #: Somebody who stands may be this far from the place that was found [m]: legs that point to where
 #: the body truly is would otherwise make up for the error.
 SHIFTS_M = (0.1, 0.2)
-#: What one device pair may say for or against a posture [nat]: bounces, and furniture that hides
-#: legs or trunk, mislead some of them without end.
-MOST_PER_PAIR = 10.0
+#: What one device pair may say for or against a posture [nat], where there are so many pairs that
+#: others can outvote it: furniture that hides legs or trunk, and noise, mislead some without end.
+MOST_PER_PAIR, FEWEST_PAIRS = 10.0, 8
 #: Evidence that it takes to call somebody seated [nat].
 TO_SIT = 15.0
 
@@ -170,26 +170,31 @@ def _knees(
     def seated(knees_rad: float) -> Bodies:
         return Bodies(axis_xy, np.array([knees_rad]))
 
+    most = MOST_PER_PAIR if len(samples) >= FEWEST_PAIRS else np.inf
     step = 2 * np.pi / DIRECTIONS
     angles = step * np.arange(DIRECTIONS)
     upright, *sitting = _all(evidence, [Bodies.standing(axis_xy), *map(seated, angles)])
-    best = int(np.argmax([_lead(log, upright) for log in sitting]))
-    if _lead(sitting[best], upright) <= TO_SIT:
+    best = int(np.argmax([_lead(log, upright, most) for log in sitting]))
+    if _lead(sitting[best], upright, most) <= TO_SIT:
         return np.nan
     around = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     shifted = [Bodies.standing(axis_xy + far * away) for far in SHIFTS_M for away in around]
-    rival = max([upright, *_all(evidence, shifted)], key=lambda log: _lead(log, upright))
-    if _lead(sitting[best], rival) <= TO_SIT:
+    rivals = [upright, *_all(evidence, shifted)]
+    rival = max(rivals, key=lambda log: _lead(log, upright, most))
+    if _lead(sitting[best], rival, most) <= TO_SIT:
         return np.nan
     between = [step * (best - 0.5), step * (best + 0.5)]
     found = [(sitting[best], angles[best])]
     found += zip(_all(evidence, [*map(seated, between)]), between, strict=True)
-    return float(max(found, key=lambda row: _lead(row[0], upright))[1] % (2 * np.pi))
+    likeliest = max(found, key=lambda row: _lead(row[0], upright, most))
+    return float(likeliest[1] % (2 * np.pi))
 
 
-def _lead(log: Float64[np.ndarray, "pair"], other: Float64[np.ndarray, "pair"]) -> float:
-    """By how much one posture's evidence is above another's, no pair counting too much [nat]."""
-    return float(np.clip(log - other, -MOST_PER_PAIR, MOST_PER_PAIR).sum())
+def _lead(
+    log: Float64[np.ndarray, "pair"], other: Float64[np.ndarray, "pair"], most: float
+) -> float:
+    """By how much one posture's evidence is above another's, with at most `most` per pair [nat]."""
+    return float(np.clip(log - other, -most, most).sum())
 
 
 def _all(

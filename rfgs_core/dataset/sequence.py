@@ -35,6 +35,7 @@ class Sequence:
         self.name = name
         self.files = SequenceFiles(path)
         self.info = read_sequence_info(self.files.info)
+        self._coordinates: dict[str, xarray.Dataset] = {}
 
     @property
     def frames(self) -> list[int]:
@@ -109,6 +110,15 @@ class Sequence:
         Values read this way are not checked against their digests; `Sequence.csi` does that.
         """
         return open_csi(self.files.csi(self._radio(name)))
+
+    def coordinates(self, name: str) -> xarray.Dataset:
+        """Coordinates of a radio's channels alone; read once, as they are the same at all frames.
+
+        Opening a store takes longer than reading a frame of a small radio. Do not change them.
+        """
+        if name not in self._coordinates:
+            self._coordinates[name] = self.radio(name).coords.to_dataset()
+        return self._coordinates[name]
 
     def csi(
         self, name: str, frame: int, *, impaired: bool = False

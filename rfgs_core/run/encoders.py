@@ -56,7 +56,7 @@ def refuse_other_radios(file: Path, sequence: Sequence, radio: str, packets: Pac
         RfgsError: Tones, antennas or, if its network looks at them, packets differ.
     """
     encoder = load_encoder(file)
-    freq_hz = np.asarray(sequence.radio(radio)["freq_hz"].values, dtype=np.float64)
+    freq_hz = np.array(sequence.coordinates(radio)["freq_hz"].values, dtype=np.float64)
     times_s = sequence.sample_times_s(radio, sequence.frames[0])
     rhythm = 1, 0.0
     if encoder.kind == "doppler" and packets == "all" and len(times_s) > 1:

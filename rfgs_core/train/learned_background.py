@@ -75,7 +75,7 @@ def learned_background(
             f"{sequence.path}: holds {len(sequence.frames)} frames; expected at least "
             f"{LEAST_FRAMES} to learn the background from; use --background empty_room"
         )
-    measured = sequence.radio(radio)["measured"].values
+    measured = sequence.coordinates(radio)["measured"].values
     ever, rows, shape = np.zeros_like(measured), [], ()
     for frame in sequence.frames:
         _, links, tones, csi = visible_channel(sequence, radio, frame, channel, packets)

@@ -117,7 +117,7 @@ def need_still_antennas(sequence: Sequence, radio: str) -> None:
     Raises:
         RfgsError: The radio's antennas move within a frame.
     """
-    data = sequence.radio(radio)
+    data = sequence.coordinates(radio)
     if data["tx_xyz"].ndim != 2 or data["rx_xyz"].ndim != 2:
         raise RfgsError(
             f"{sequence.name}, {radio}: the antennas move within a frame, and training takes one "
@@ -177,9 +177,9 @@ def visible_channel(
         RfgsError: What is visible is not finite, or the antennas move within a frame.
     """
     need_still_antennas(sequence, radio)
-    data = sequence.radio(radio)
+    data = sequence.coordinates(radio)
     # The links that exist are those the channels were stored with.
-    elements = replace(sequence.layout(radio), measured=data["measured"].values)
+    elements = replace(sequence.layout(radio), measured=data["measured"].values.copy())
     links, tones = _visible(sequence.splits["rf"][radio], elements, data.sizes["subcarrier"])
     count = 1 if packets == "first" else None
     csi = observed_packets(sequence, radio, frame, channel, count)
@@ -233,7 +233,7 @@ def observe(
         )
         empty = reported(static, tones, kind)
     seen = links[:, :, None] & tones
-    freq_hz = np.asarray(sequence.radio(radio)["freq_hz"].values, dtype=np.float64)
+    freq_hz = np.array(sequence.coordinates(radio)["freq_hz"].values, dtype=np.float64)
     now, delay_change = reported(csi[0], tones, kind), None
     change, interval_s = None, 0.0
     if kind == "complex" and len(csi) > 1:

@@ -47,6 +47,18 @@ def test_xarray_and_checked_reader_agree_bit_for_bit(tiny_dataset: Path) -> None
     assert np.array_equal(data["measured"].values, layout.measured)
 
 
+def test_coordinates_alone_are_those_of_the_store_and_read_once(tiny_dataset: Path) -> None:
+    sequence = open_dataset(tiny_dataset).sequence()
+    alone, data = sequence.coordinates("wifi"), sequence.radio("wifi")
+    assert set(alone.variables) == set(data.coords) and not set(alone.data_vars)
+    for name, values in data.coords.items():
+        assert (alone[name].dims, alone[name].attrs) == (values.dims, values.attrs)
+        np.testing.assert_array_equal(alone[name].values, values.values)
+    assert sequence.coordinates("wifi") is alone
+    with pytest.raises(RfgsError, match="no radio"):
+        sequence.coordinates("lora")
+
+
 def test_direct_path_delay_matches_geometry(tiny_dataset: Path) -> None:
     sequence = open_dataset(tiny_dataset).sequence()
     layout, radio = sequence.layout("wifi"), sequence.radio_spec("wifi")

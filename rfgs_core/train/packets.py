@@ -23,7 +23,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool, Complex, Complex64, Float
 from scipy.ndimage import uniform_filter1d
-from scipy.stats import gamma
+from scipy.special import gammainccinv
 
 from rfgs_core.encode.matched_filter import device_pairs
 from rfgs_core.radio import Layout
@@ -81,7 +81,7 @@ def doppler_spectrum(
         power = uniform_filter1d(power, length, axis=axis, mode="wrap")
     # Of the Doppler grid only one in DOPPLER_GRID values is independent of the others.
     looks = np.prod(averaged) / DOPPLER_GRID
-    heard = power > noise * gamma.isf(FALSE_ALARMS, looks) / looks
+    heard = power > noise * gammainccinv(looks, FALSE_ALARMS) / looks
     return np.where(heard, power - noise, 0.0)
 
 

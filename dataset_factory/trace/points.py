@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
@@ -192,9 +193,9 @@ def _lloyd(
     # Every n-th sample along a space-filling curve is an even start.
     along = np.argsort(_morton(places), kind="stable")
     chosen = along[_SAMPLES_PER_POINT // 2 :: _SAMPLES_PER_POINT]
-    tree = KDTree(places)
+    tree, cells = KDTree(places), Cells(places, along)
     for _ in range(_LLOYD_STEPS):
-        _, cell = KDTree(places[chosen]).query(places)
+        cell = cells.around(places[chosen])
         size = np.bincount(cell, minlength=count)
         mean = np.stack([np.bincount(cell, places[:, i], count) for i in range(3)], axis=1)
         filled = size > 0
@@ -203,9 +204,36 @@ def _lloyd(
         chosen[filled] = nearest
         chosen = np.unique(chosen)
         count = len(chosen)
-    _, cell = KDTree(places[chosen]).query(places)
+    cell = cells.around(places[chosen])
     cell_area = np.bincount(cell, minlength=count) * (area.sum() / samples)
     return index[chosen], barycentric[chosen], cell_area
+
+
+class Cells:
+    """Which centre is the nearest to each of many places, asked again and again.
+
+    Neighbours are asked one after the other, which finds the tree in the cache, and no further
+    than the farthest of the last time, which cuts the search short. The answers are the same.
+    """
+
+    def __init__(self, places: np.ndarray, along: np.ndarray) -> None:
+        """Args are the places, shape (N, 3), and their order along a space-filling curve."""
+        self._ordered, self._along = places[along], along
+        self._reach_m = np.inf
+
+    def around(self, centres: np.ndarray) -> np.ndarray:
+        """Index of the nearest centre of each place, shape (N,)."""
+        # As many threads as the kernels have: one in a tracing process.
+        tree, threads = KDTree(centres), numba.get_num_threads()
+        found = tree.query(self._ordered, distance_upper_bound=self._reach_m, workers=threads)
+        distance_m, nearest = (np.asarray(values) for values in found)
+        (beyond,) = np.nonzero(nearest == tree.n)
+        if len(beyond):
+            distance_m[beyond], nearest[beyond] = tree.query(self._ordered[beyond])
+        self._reach_m = distance_m.max()
+        cell = np.zeros_like(nearest)
+        cell[self._along] = nearest
+        return cell
 
 
 def _morton(places: np.ndarray) -> np.ndarray:

@@ -4,9 +4,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial import KDTree
 
 from dataset_factory.trace.facets import facet_sum
-from dataset_factory.trace.points import surface_points
+from dataset_factory.trace.points import Cells, surface_points
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
 FREQ_HZ = np.array([5.8e9])
@@ -113,6 +114,17 @@ def test_points_cover_the_surface_evenly() -> None:
     moved, normals = points.at(np.asarray(ball.vertices) + away)
     outward = (moved - away) / 0.25
     assert np.sum(normals * outward, axis=1).min() > 0.99
+
+
+def test_nearest_centres_are_those_of_a_plain_search() -> None:
+    """Also where centres have moved away, beyond the reach of the last time."""
+    rng = np.random.default_rng(4)
+    places = rng.normal(size=(3000, 3))
+    cells = Cells(places, rng.permutation(3000))
+    for count in (200, 300, 20, 1, 400):
+        centres = rng.normal(size=(count, 3)) + 0.1 * count
+        _, nearest = KDTree(centres).query(places)
+        np.testing.assert_array_equal(cells.around(centres), nearest)
 
 
 def test_small_inner_parts_are_left_out() -> None:

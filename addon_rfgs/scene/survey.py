@@ -249,7 +249,13 @@ def _follow(surface: Surface, local: np.ndarray, matrix: np.ndarray, unit: float
 
 def _local(mesh: bpy.types.Mesh) -> np.ndarray:
     flat = np.zeros(3 * len(mesh.vertices), dtype=np.float32)
-    mesh.vertices.foreach_get("co", flat)
+    # Attributes are copied whole, where `vertices` and `loops` hand out number by number; but in
+    # edit mode these are absent.
+    stored = mesh.attributes.get("position")
+    if stored is not None:
+        stored.data.foreach_get("vector", flat)
+    else:
+        mesh.vertices.foreach_get("co", flat)
     return flat.reshape(-1, 3)
 
 
@@ -270,7 +276,11 @@ def _corners(mesh: bpy.types.Mesh) -> bytes:
     """Vertex count, corners and face starts: equal bytes mean equal topology."""
     corners = np.zeros(len(mesh.loops), np.int32)
     starts = np.zeros(len(mesh.polygons), np.int32)
-    mesh.loops.foreach_get("vertex_index", corners)
+    stored = mesh.attributes.get(".corner_vert")
+    if stored is not None:
+        stored.data.foreach_get("value", corners)
+    else:
+        mesh.loops.foreach_get("vertex_index", corners)
     mesh.polygons.foreach_get("loop_start", starts)
     return len(mesh.vertices).to_bytes(8, "little") + corners.tobytes() + starts.tobytes()
 

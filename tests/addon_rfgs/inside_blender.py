@@ -16,7 +16,7 @@ import addon_rfgs
 from addon_rfgs import naming, tables
 from addon_rfgs.errors import AddonError
 from addon_rfgs.export import exr, mesh_ply
-from addon_rfgs.scene import rig
+from addon_rfgs.scene import rig, survey
 from addon_rfgs.scene.frames import chosen_frames
 from addon_rfgs.scene.override_file import read_overrides
 from addon_rfgs.scene.overrides import RadioMaterial, first_match
@@ -45,6 +45,16 @@ def test_exr_agrees_with_openexr(tmp_path: Path) -> None:
         library.File(header, dict(planes)).write(str(tmp_path / "theirs.exr"))
         for name, plane in exr.read_exr(tmp_path / "theirs.exr").items():
             np.testing.assert_array_equal(plane, planes[name])
+
+
+def test_topologies_differ_by_their_corners_alone() -> None:
+    told = []
+    for faces in ([(0, 1, 2), (0, 2, 3)], [(0, 1, 3), (1, 2, 3)], [(0, 1, 2), (0, 2, 3)]):
+        mesh = bpy.data.meshes.new("square")
+        mesh.from_pydata([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [], faces)
+        told.append(survey._corners(mesh))
+        assert np.array(faces, np.int32).tobytes() in told[-1]
+    assert told[0] == told[2] != told[1]
 
 
 def test_names_are_safe_and_unique() -> None:

@@ -82,9 +82,9 @@ def surface_run(tiny_dataset: Path, tmp_path: Path) -> SurfaceRun:
     return SurfaceRun(tmp_path, open_dataset(tiny_dataset).sequence())
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def evaluated_run(tiny_dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> SurfaceRun:
-    """The same run, evaluated once per module; nothing in its folder is changed."""
+    """The same run, evaluated once; nothing in its folder is changed, a report is added."""
     run = SurfaceRun(tmp_path_factory.mktemp("run"), open_dataset(tiny_dataset).sequence())
     run.path.joinpath("config.json").write_text("{}")
     evaluate_run(run, oracle=False)

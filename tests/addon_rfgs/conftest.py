@@ -38,9 +38,12 @@ def addon(python: Run) -> Run:
     return lambda blend, *arguments: python("-m", "addon_rfgs", "--blend", blend, *arguments)
 
 
-@pytest.fixture(scope="session")
-def pass_inside(python: Run) -> Callable[[str], None]:
+@pytest.fixture
+def pass_inside(python: Run, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
     """Runs the tests of `inside_NAME.py`, all of which must pass, in a Python of their own."""
+
+    # Plugins that other packages bring along take half a second to load, and none is used.
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
 
     def run(name: str) -> None:
         inner = Path(__file__).with_name(f"inside_{name}.py")

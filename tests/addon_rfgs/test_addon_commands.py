@@ -173,28 +173,12 @@ def test_import_saves_a_file_that_shows_each_frame_without_the_add_on(
     assert np.abs(halves[:, :64] - halves[:, 64:]).max() > 30
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("export",), "--out"),
-        (("frobnicate",), "invalid choice"),
-        (("export", "--out", "{tmp}/b", "--frames", "3:99"), "frames"),
-        (("export", "--out", "{tmp}/b", "--cameras", "9"), "cameras"),
-        (("import", "{tmp}/nothing", "--out", "{tmp}/x.blend"), "no such run"),
-        (("import", "{tmp}", "--picture", "{tmp}/x.png", "--camera", "nope"), "no camera 'nope'"),
-        (("import", "{tmp}", "--out", "{tmp}/x.blend", "--crop-box", "crate"), "an Empty"),
-        (("import", "{tmp}", "--out", "{tmp}/x.blend", "--opacity-threshold", "2"), "opacity"),
-        (("export-gaussians", "{tmp}/x.ply"), "no imported Gaussians"),
-    ],
-)
-def test_mistakes_get_one_line_and_exit_code_2(
-    scenes: Path, addon, tmp_path: Path, arguments: tuple[str, ...], words: str
-) -> None:
-    filled = [argument.format(tmp=tmp_path) for argument in arguments]
-    done = addon(scenes / "room.blend", *filled)
+def test_mistakes_get_one_line_and_exit_code_2(scenes: Path, addon) -> None:
+    """One of them; the others are made in `inside_mistakes.py`, without a process for each."""
+    done = addon(scenes / "room.blend", "frobnicate")
     assert done.returncode == 2
     lines = done.stderr.strip().splitlines()
-    assert len(lines) == 1 and lines[0].startswith("error: ") and words in lines[0], done.stderr
+    assert len(lines) == 1 and lines[0].startswith("error: ") and "invalid choice" in lines[0]
 
 
 @pytest.mark.parametrize("content", [None, b"", b"not a blend file at all", b"BLENDER-v405garbage"])

@@ -9,12 +9,15 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from dataset_factory import cli
 from dataset_factory.blender import Blender
+from dataset_factory.disk import Space, space
 from dataset_factory.generate import generate
 from dataset_factory.job import Job
 from dataset_factory.plan import make_plan
@@ -44,8 +47,9 @@ def build(out: Path, moving: str, wall: str, scale: str) -> Path:
 
 @pytest.fixture(scope="session")
 def build_scene(tmp_path_factory: pytest.TempPathFactory) -> BuildScene:
-    """Builds a scene: `build_scene(moving=True, wall="concrete", scale=1.0)`."""
+    """Builds a scene: `build_scene(moving=True, wall="concrete", scale=1.0)`, each kind once."""
 
+    @cache
     def make(moving: bool = True, wall: str = "concrete", scale: float = 1.0) -> Path:
         out = tmp_path_factory.mktemp("scene") / "box_room.blend"
         return build(out, "moving" if moving else "still", wall, str(scale))
@@ -91,11 +95,26 @@ def make_job(box_room: Path) -> MakeJob:
 
 
 @pytest.fixture(scope="session")
-def box_dataset(make_job: MakeJob, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def watched_box(
+    make_job: MakeJob, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Path, list[Space]]:
+    """A finished dataset, and each estimate of its disk from before it was there."""
+    out, estimates = tmp_path_factory.mktemp("factory") / "dataset", []
+
+    def kept(*arguments: Any) -> Space:
+        estimates.append(space(*arguments))
+        return estimates[-1]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("dataset_factory.generate.space", kept)
+        assert generate(make_job(out))
+    return out, estimates
+
+
+@pytest.fixture(scope="session")
+def box_dataset(watched_box: tuple[Path, list[Space]]) -> Path:
     """A finished dataset; copy it before changing anything."""
-    out = tmp_path_factory.mktemp("factory") / "dataset"
-    assert generate(make_job(out))
-    return out
+    return watched_box[0]
 
 
 @pytest.fixture
@@ -163,5 +182,20 @@ def factory() -> Factory:
             cwd=ROOT,
             env={**os.environ, **environment},
         )
+
+    return run
+
+
+@pytest.fixture
+def factory_here(capsys: pytest.CaptureFixture[str]) -> Factory:
+    """Runs `rfgs-factory` in this process, which spares a start where the command is what counts.
+
+    Of processes, their codes and streams tell the tests that take `factory`.
+    """
+
+    def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+        capsys.readouterr()
+        code = cli.main(arguments)
+        return subprocess.CompletedProcess(arguments, code, *capsys.readouterr())
 
     return run

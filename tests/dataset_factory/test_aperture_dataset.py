@@ -179,9 +179,11 @@ def test_imperfect_radios_stand_beside_the_clean_one(ring: Path, tmp_path: Path)
     assert data["csi_impaired"].shape == data["csi"].shape
 
 
-def test_paths_between_antennas_that_move_are_refused(box_room: Path, factory: Factory) -> None:
+def test_paths_between_antennas_that_move_are_refused(
+    box_room: Path, factory_here: Factory
+) -> None:
     command = ("plan", str(box_room), "--radio", "sar", "--frames", "1:2", "--paths", "--out", "x")
-    done = factory(*command)
+    done = factory_here(*command)
     assert done.returncode == 2 and done.stderr.count("\n") == 1
     assert "--paths: radio 'sar' has antennas that move" in done.stderr
 

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from dataset_factory.disk import space
+from dataset_factory.disk import Space
 from dataset_factory.estimate import estimate
 from dataset_factory.generate import generate
 from dataset_factory.job import Job
@@ -46,25 +46,15 @@ def test_too_few_frames_tell_nothing() -> None:
     assert paced([5.0, 5.0, 8.0], 2) is None
 
 
-def test_disk_is_estimated_from_above_and_closely(
-    make_job: MakeJob, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    found = []
-
-    def kept(job: Job, *rest: object) -> object:
-        found.append(space(job, *rest))  # type: ignore[arg-type]
-        return found[-1]
-
-    monkeypatch.setattr("dataset_factory.generate.space", kept)
-    job = make_job(tmp_path / "out")
-    assert generate(job)
-    channels = [file for file in job.out.rglob("*") if file.is_file() and "/c/" in str(file)]
-    pictures = [file for file in job.out.rglob("*") if file.suffix in (".png", ".exr")]
+def test_disk_is_estimated_from_above_and_closely(watched_box: tuple[Path, list[Space]]) -> None:
+    out, estimates = watched_box
+    channels = [file for file in out.rglob("*") if file.is_file() and "/c/" in str(file)]
+    pictures = [file for file in out.rglob("*") if file.suffix in (".png", ".exr")]
     size = sum(file.stat().st_size for file in [*channels, *pictures])
-    assert size < found[0].bytes(2)
+    assert size < estimates[0].bytes(2)
     # Links are all measured, so channels hardly compress; pictures of 32 px are small.
     raw = 3 * 4 * 256 * 64 * 8
-    assert raw < found[0].bytes(2) < 1.2 * raw
+    assert raw < estimates[0].bytes(2) < 1.2 * raw
 
 
 def test_a_disk_that_is_too_small_is_refused_before_tracing(

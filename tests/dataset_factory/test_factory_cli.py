@@ -63,7 +63,7 @@ WIDE = ["--bounds", "-8", "-8", "0", "10", "10", "3"]
     ],
 )
 def test_wrong_requests(
-    factory: Factory,
+    factory_here: Factory,
     box_room: Path,
     tmp_path: Path,
     scene: str,
@@ -75,7 +75,7 @@ def test_wrong_requests(
     target = str(tmp_path / scene) if scene.endswith(".blend") else scene
     target = str(box_room) if scene == "room" else target
     out = str(tmp_path / "out")
-    line = one_line(factory("generate", target, "--radio", radio, "--out", out, *more))
+    line = one_line(factory_here("generate", target, "--radio", radio, "--out", out, *more))
     assert all(word in line for word in words), line
 
 
@@ -88,11 +88,11 @@ def test_wrong_requests(
     ],
 )
 def test_unsuitable_scenes(
-    factory: Factory, build_scene: BuildScene, tmp_path: Path, scene: dict, words: list[str]
+    factory_here: Factory, build_scene: BuildScene, tmp_path: Path, scene: dict, words: list[str]
 ) -> None:
     out = tmp_path / "out"
     blend = str(build_scene(**scene))
-    line = one_line(factory("generate", blend, "--radio", "wifi", "--out", str(out)))
+    line = one_line(factory_here("generate", blend, "--radio", "wifi", "--out", str(out)))
     assert all(word in line for word in words), line
     assert not (out / "dataset.json").exists()
 
@@ -112,7 +112,7 @@ def test_truncated_chunk_is_named(factory: Factory, box_copy: Path) -> None:
     assert str(file) in one_line(factory("preview", str(box_copy)))
 
 
-def test_ambiguous_sequence(factory: Factory, box_copy: Path) -> None:
+def test_ambiguous_sequence(factory_here: Factory, box_copy: Path) -> None:
     from dataclasses import replace
 
     from rfgs_core.dataset import open_dataset
@@ -120,7 +120,9 @@ def test_ambiguous_sequence(factory: Factory, box_copy: Path) -> None:
 
     (box_copy / "box_room").rename(box_copy / "one")
     finish_dataset(box_copy, replace(open_dataset(box_copy).info, sequences=["one", "two"]))
-    assert "ambiguous sequence: it holds one, two" in one_line(factory("preview", str(box_copy)))
+    assert "ambiguous sequence: it holds one, two" in one_line(
+        factory_here("preview", str(box_copy))
+    )
 
 
 def test_full_disk(

@@ -32,23 +32,23 @@ def test_table_and_json_say_the_same(factory: Factory, box_room: Path, tmp_path:
 
 
 def test_faults_of_the_scene_and_of_the_radio_end_with_1(
-    factory: Factory, build_scene: BuildScene, tmp_path: Path
+    factory_here: Factory, build_scene: BuildScene, tmp_path: Path
 ) -> None:
-    answer = factory("check", str(build_scene(wall="floorboard")), "--radio", "wifi")
+    answer = factory_here("check", str(build_scene(wall="floorboard")), "--radio", "wifi")
     assert answer.returncode == 1
     assert any(
         line.startswith("error") and "50 to 100 GHz" in line for line in answer.stdout.splitlines()
     ), answer.stdout
     still = str(build_scene(moving=False))
-    answer = factory("check", still, "--radio", "wifi", "--json", "-")
+    answer = factory_here("check", still, "--radio", "wifi", "--json", "-")
     assert answer.returncode == 1
     (error,) = [row for row in json.loads(answer.stdout)["findings"] if row["severity"] == "error"]
     assert "no moving mesh" in error["message"] and error["remedy"]
 
 
-def test_packets_that_do_not_fit_a_frame_are_found(factory: Factory, box_room: Path) -> None:
+def test_packets_that_do_not_fit_a_frame_are_found(factory_here: Factory, box_room: Path) -> None:
     """401 chirps of 0.25 ms are longer than a tenth of a second."""
-    answer = factory("check", str(box_room), "--radio", "mmwave", "--packets-per-frame", "401")
+    answer = factory_here("check", str(box_room), "--radio", "mmwave", "--packets-per-frame", "401")
     assert answer.returncode == 1
     assert "401 samples per frame, 0.25 ms apart, do not fit a frame of 100 ms" in answer.stdout
 
@@ -80,7 +80,7 @@ def test_senseless_overrides_get_one_line(
 
 @pytest.mark.parametrize("damage", ["half", "head", "renamed"])
 def test_damaged_files_are_named(
-    factory: Factory, box_room: Path, tmp_path: Path, damage: str
+    factory_here: Factory, box_room: Path, tmp_path: Path, damage: str
 ) -> None:
     content = box_room.read_bytes()
     file = tmp_path / ("scene.obj" if damage == "renamed" else "scene.blend")
@@ -91,7 +91,7 @@ def test_damaged_files_are_named(
             "renamed": b"# OBJ\nv 0 0 0\n",
         }[damage]
     )
-    answer = factory("check", str(file))
+    answer = factory_here("check", str(file))
     assert answer.returncode == 2 and not answer.stdout
     errors = [line for line in answer.stderr.splitlines() if line.startswith("error:")]
     assert len(errors) == 1 and str(file) in errors[0], answer.stderr

@@ -30,8 +30,10 @@ from rfgs_core.train.start import StartCells
 
 #: Gaussians that stand for a body.
 GAUSSIANS = 1500
-#: Entries (links times tones) that are read of all device pairs together, and at most of one.
-ENTRIES, MOST_ENTRIES = 4096, 384
+#: Entries (links times tones) that are read of all device pairs together, and at most of one at a
+#: time. Of few pairs others are read, with other Gaussians, in several rounds: what one round says
+#: of a single pair may be 100 nat off.
+ENTRIES, MOST_ENTRIES, MOST_ROUNDS = 4096, 256, 4
 #: Links that are read of a pair; the other entries are tones.
 LINKS = 32
 #: Shares of noise that are tried, against the mean power of the echoes.
@@ -158,19 +160,24 @@ def _knees(
     observations: Observations, maps: PairMaps, axis_xy: Float[np.ndarray, "1 2"], seed: int
 ) -> float:
     """Where the knees of one body point [rad]; NaN if it stands."""
-    samples = pair_samples(observations, seed)
+    pairs = max(len(observations.pairs[1]), 1)
+    rounds = int(np.clip(ENTRIES // (pairs * MOST_ENTRIES), 1, MOST_ROUNDS))
+    samples = [pair_samples(observations, sub_seed(seed, number)) for number in range(rounds)]
     cells = StartCells.around(maps, axis_xy, observations.bounds_m)
 
     def evidence(bodies: Bodies) -> Float64[np.ndarray, "pair"]:
-        # The same seed for all: what differs is the posture.
-        points = cells.density(bodies).draw(GAUSSIANS, np.random.default_rng(seed))
-        normals = outward_normals(points, bodies)
-        return np.array([sample.log_likelihood(points, normals) for sample in samples])
+        density, logs = cells.density(bodies), []
+        for number, drawn in enumerate(samples):
+            # The same seed for all postures.
+            points = density.draw(GAUSSIANS, np.random.default_rng(sub_seed(seed, number)))
+            normals = outward_normals(points, bodies)
+            logs.append([sample.log_likelihood(points, normals) for sample in drawn])
+        return np.mean(logs, axis=0)
 
     def seated(knees_rad: float) -> Bodies:
         return Bodies(axis_xy, np.array([knees_rad]))
 
-    most = MOST_PER_PAIR if len(samples) >= FEWEST_PAIRS else np.inf
+    most = MOST_PER_PAIR if pairs >= FEWEST_PAIRS else np.inf
     step = 2 * np.pi / DIRECTIONS
     angles = step * np.arange(DIRECTIONS)
     upright, *sitting = _all(evidence, [Bodies.standing(axis_xy), *map(seated, angles)])

@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Float, Float64, Int
 from scipy.optimize import linear_sum_assignment
 
+from rfgs_core.pose.score import identity_kept
 from rfgs_core.train.body_prior import nearest_axis
 
 #: A person is found if the body's centroid is this close [m].
@@ -80,19 +81,12 @@ def match_people(
     )
 
 
-def identity_kept(matches: Sequence[Sequence[tuple[int, int]]]) -> float | None:
-    """Share of matches (body, person), frame by frame, with the person a body had at first."""
-    first: dict[int, int] = {}
-    kept = [first.setdefault(body, person) == person for row in matches for body, person in row]
-    return float(np.mean(kept)) if kept else None
-
-
 def people_metrics(frames: Sequence[FramePeople]) -> dict[str, Any]:
     """The group `people` of `metrics.json`.
 
     Returns:
         `centroid_m`, mean distance of matched centroids; `found`, share of people with their
-        body's centroid within half a metre; `identity_kept`, see there; and `bodies`, mean
+        body's centroid within half a metre; `identity_kept`, see `pose.score`; and `bodies`, mean
         distance of each body. Values are None where nobody was matched.
     """
     distance = [far for frame in frames for far in frame.distance_m]

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence as Rows
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,6 @@ from jaxtyping import Float64, Int64
 from scipy.optimize import linear_sum_assignment
 
 from rfgs_core.dataset import Sequence
-from rfgs_core.evaluate.people import identity_kept
 from rfgs_core.pose.estimate import PoseEstimate
 from rfgs_core.skeleton import JOINTS
 
@@ -83,3 +83,10 @@ def _errors(
         "aligned_m": float(aligned.mean()),
         "joints_m": {name: float(each[:, j].mean()) for j, name in enumerate(JOINTS)},
     }
+
+
+def identity_kept(matches: Rows[Rows[tuple[int, int]]]) -> float | None:
+    """Share of matches (body, person), frame by frame, with the person a body had at first."""
+    first: dict[int, int] = {}
+    kept = [first.setdefault(body, person) == person for row in matches for body, person in row]
+    return float(np.mean(kept)) if kept else None

@@ -6,12 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rfgs_core.evaluate.people import (
-    identity_kept,
-    match_people,
-    people_metrics,
-    surface_centroids,
-)
+from rfgs_core.evaluate.people import match_people, people_metrics, surface_centroids
+from rfgs_core.pose.score import identity_kept
 
 PEOPLE = {3: np.array([1.0, 1.0, 0.9]), 7: np.array([3.0, 1.0, 0.9])}
 AXES = np.array([[3.0, 1.0], [1.0, 1.0]])

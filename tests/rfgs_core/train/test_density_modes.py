@@ -14,6 +14,7 @@ import torch
 from rfgs_core.errors import RfgsError
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.train import refine as refine_module
+from rfgs_core.train.body_prior import Bodies
 from rfgs_core.train.channel import Channel
 from rfgs_core.train.comparison import comparison_of
 from rfgs_core.train.config import TrainConfig
@@ -138,7 +139,7 @@ def test_a_gaussian_comes_where_the_residual_peaks(missing_one, head) -> None:
     noise = noise_per_link(seen, comparison.measured(), 0.5)
     density = ResidualDensity(
         *(ResidualRule(every=2, reach_m=2.0, least_energy=0.0), seen, channel, comparison, noise),
-        *(head, np.array([[2.3, 2.2]]), 10),
+        *(head, Bodies.standing(np.array([[2.3, 2.2]])), 10),
     )
     trained = TrainableGaussians(cloud, LearningRates())
     density.after_step(1, trained, None)
@@ -165,7 +166,8 @@ def test_gaussians_without_energy_go(missing_one, head) -> None:
     noise = torch.ones(len(channel.links))
     rule = ResidualRule(every=2, least_peak=1e9)
     density = ResidualDensity(
-        *(rule, silent, channel, comparison, noise, head, np.array([[2.0, 1.7]]), 10)
+        *(rule, silent, channel, comparison, noise, head),
+        *(Bodies.standing(np.array([[2.0, 1.7]])), 10),
     )
     trained = TrainableGaussians(cloud, LearningRates())
     density.after_step(2, trained, None)

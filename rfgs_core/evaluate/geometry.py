@@ -56,6 +56,15 @@ def voxel_budget(instances: Sequence[dict[str, Any]], voxel_m: float = VOXEL_M) 
     return round(VOXELS_PER_FACE * surface / voxel_m**2)
 
 
+def spanned(
+    vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "T 3"]
+) -> tuple[Float64[np.ndarray, "T 3 3"], Float64[np.ndarray, "T 3"], Float64[np.ndarray, "T"]]:
+    """Corners of triangles [m], and normals as long as twice their areas, and these lengths."""
+    corners = np.asarray(vertices, dtype=np.float64)[np.asarray(faces)]
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return corners, cross, np.linalg.norm(cross, axis=1)
+
+
 def surface_samples(
     vertices: Float[np.ndarray, "V 3"],
     faces: Int[np.ndarray, "T 3"],
@@ -67,10 +76,7 @@ def surface_samples(
     Raises:
         RfgsError: The mesh has no area.
     """
-    corners = np.asarray(vertices, dtype=np.float64)[np.asarray(faces)]
-    edge_a, edge_b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    cross = np.cross(edge_a, edge_b)
-    area = np.linalg.norm(cross, axis=1)
+    corners, cross, area = spanned(vertices, faces)
     if not area.sum() > 0.0:
         raise RfgsError(f"expected a moving mesh with area, got {len(faces)} faces of zero area")
     face = rng.choice(len(area), size=count, p=area / area.sum())
@@ -78,6 +84,7 @@ def surface_samples(
     u, v = rng.random((2, count))
     fold = u + v > 1.0
     u[fold], v[fold] = 1.0 - u[fold], 1.0 - v[fold]
+    edge_a, edge_b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     points = corners[face, 0] + u[:, None] * edge_a[face] + v[:, None] * edge_b[face]
     return points, cross[face] / np.maximum(area[face], 1e-30)[:, None]
 

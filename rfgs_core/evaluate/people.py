@@ -15,11 +15,9 @@ import numpy as np
 from jaxtyping import Float, Float64, Int
 from scipy.optimize import linear_sum_assignment
 
+from rfgs_core.evaluate.geometry import TRACKED_M, spanned
 from rfgs_core.pose.score import identity_kept
 from rfgs_core.train.body_prior import nearest_axis
-
-#: A person is found if the body's centroid is this close [m].
-FOUND_M = 0.5
 
 
 @dataclass(frozen=True)
@@ -42,9 +40,7 @@ def surface_centroids(
     instance: Int[np.ndarray, "T"],
 ) -> dict[int, Float64[np.ndarray, "3"]]:
     """Centroid of the surface of each instance [m], weighed by area."""
-    corners = np.asarray(vertices, dtype=np.float64)[np.asarray(faces)]
-    edges = corners[:, 1:] - corners[:, :1]
-    area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+    corners, _, area = spanned(vertices, faces)
     centre = corners.mean(axis=1)
     known = [int(number) for number in np.unique(instance) if area[instance == number].sum() > 0]
     return {
@@ -86,29 +82,15 @@ def people_metrics(frames: Sequence[FramePeople]) -> dict[str, Any]:
 
     Returns:
         `centroid_m`, mean distance of matched centroids; `found`, share of people with their
-        body's centroid within half a metre; `identity_kept`, see `pose.score`; and `bodies`, mean
-        distance of each body. Values are None where nobody was matched.
+        body's centroid within `TRACKED_M`; `identity_kept`, see `pose.score`. Values are None where
+        nobody was matched.
     """
     distance = [far for frame in frames for far in frame.distance_m]
     present = sum(frame.present for frame in frames)
-    numbers = sorted({body for frame in frames for body in frame.body})
     return {
         "centroid_m": float(np.mean(distance)) if distance else None,
-        "found": float(np.sum(np.array(distance) <= FOUND_M)) / present if present else None,
+        "found": float(np.sum(np.array(distance) <= TRACKED_M)) / present if present else None,
         "identity_kept": identity_kept(
             [list(zip(frame.body, frame.person, strict=True)) for frame in frames]
         ),
-        "bodies": {
-            str(number): float(
-                np.mean(
-                    [
-                        far
-                        for frame in frames
-                        for body, far in zip(frame.body, frame.distance_m, strict=True)
-                        if body == number
-                    ]
-                )
-            )
-            for number in numbers
-        },
     }

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence as Rows
 from typing import Any
 
 import numpy as np
@@ -85,7 +84,7 @@ def _errors(
     }
 
 
-def identity_kept(matches: Rows[Rows[tuple[int, int]]]) -> float | None:
+def identity_kept(matches: list[list[tuple[int, int]]]) -> float | None:
     """Share of matches (body, person), frame by frame, with the person a body had at first."""
     first: dict[int, int] = {}
     kept = [first.setdefault(body, person) == person for row in matches for body, person in row]

@@ -201,13 +201,13 @@ def _cards(metrics: dict[str, Any]) -> list[Card]:
                 tones.append(name == "oracle_init" or own[key] > value)
         tone = "" if not tones else "won" if all(tones) else "lost"
         cards.append(Card(show(own[key], 3), label, ", ".join(beside), tone))
-    cards.append(
-        Card(
-            f"{show(own['centroid_m'], 2)} m",
-            "centroid error",
-            f"tracked in {show(100 * own['tracked'], 0)} % of the frames",
-        )
-    )
+    people = metrics.get("people")
+    if people is None:
+        note = f"tracked in {show(100 * own['tracked'], 0)} % of the frames"
+        cards.append(Card(f"{show(own['centroid_m'], 2)} m", "centroid error", note))
+    else:
+        note = f"{show(100 * people['found'], 0)} % of the people found"
+        cards.append(Card(f"{show(people['centroid_m'], 2)} m", "centroid error, per person", note))
     rf = metrics["rf"]
     known = {
         name: part["rf"]["element_snr_db"]

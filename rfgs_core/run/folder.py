@@ -141,7 +141,7 @@ class Run:
         Raises:
             RfgsFormatError: The checkpoint is damaged, or of a version that told no postures.
         """
-        path = self.path / "checkpoints" / f"{frame:06d}.npz"
+        path = checkpoint_path(self.path, frame)
         if not path.exists():
             return None
         shapes = {"axes_xy": ("body", 2), "knees_rad": ("body",)}
@@ -244,6 +244,11 @@ def _sequence(run: Path, place: Path, name: str, fingerprint: str) -> Sequence:
             "dataset"
         )
     return dataset.sequence(name)
+
+
+def checkpoint_path(run: Path, frame: int) -> Path:
+    """State of a fitted frame in a run's folder."""
+    return run / "checkpoints" / f"{frame:06d}.npz"
 
 
 def relative_dataset(run: Path, dataset: Path) -> str:

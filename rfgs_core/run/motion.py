@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float64, Int64
 
 from rfgs_core.arrays import load_arrays
+from rfgs_core.run.folder import checkpoint_path
 
 _REMEDY = "delete it and run the same `rfgs train` again"
 _SHAPES = {"velocity_xy": ("body", 2), "time_s": (), "means": ("M", 3)}
@@ -34,7 +35,7 @@ def read_motion(run: Path, frames: Sequence[int]) -> Motion | None:
     Raises:
         RfgsFormatError: A checkpoint is damaged.
     """
-    paths = [run / "checkpoints" / f"{frame:06d}.npz" for frame in frames]
+    paths = [checkpoint_path(run, frame) for frame in frames]
     if not all(path.exists() for path in paths):
         return None
     rows = [load_arrays(path, _REMEDY, _SHAPES, ("velocity_xy",)) for path in paths]

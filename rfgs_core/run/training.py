@@ -30,7 +30,14 @@ from rfgs_core.run.encoders import (
     refuse_other_radios,
     run_encoder,
 )
-from rfgs_core.run.folder import BACKGROUND_FILE, SCHEMA, Run, open_run, relative_dataset
+from rfgs_core.run.folder import (
+    BACKGROUND_FILE,
+    SCHEMA,
+    Run,
+    checkpoint_path,
+    open_run,
+    relative_dataset,
+)
 from rfgs_core.run.log import Scalars, TrainingLog
 from rfgs_core.run.static import (
     has_static_set,
@@ -185,8 +192,10 @@ def fit_frame(
         bar.update(1)
         bar.set_postfix_str(f"frame {frame}, loss {loss:.3g}, {count} Gaussians")
 
-    checkpoint = run.path / "checkpoints" / f"{frame:06d}.partial.npz"
-    state = refine(observations, state, config, seed, checkpoint, on_step, encoder, scalars)
+    state = refine(
+        *(observations, state, config, seed, _partial_path(run, frame)),
+        *(on_step, encoder, scalars),
+    )
     if config.objective == "paper":
         state = solve_reflectivity(observations, state, config)
     return state
@@ -225,8 +234,8 @@ def _open_or_create(out: Path, settings: dict[str, Any]) -> Run:
     return run
 
 
-def _state_path(run: Run, frame: int) -> Path:
-    return run.path / "checkpoints" / f"{frame:06d}.npz"
+def _partial_path(run: Run, frame: int) -> Path:
+    return checkpoint_path(run.path, frame).with_suffix(".partial.npz")
 
 
 def _store(run: Run, frame: int, state: FrameState) -> None:
@@ -252,13 +261,14 @@ def _store(run: Run, frame: int, state: FrameState) -> None:
     arrays |= {"power": state.power.numpy(), "track_id": state.track_id}
     arrays["next_track"] = np.array(state.unused_track)
     arrays |= {name: np.asarray(value) for name, value in asdict(state.tracks).items()}
-    save_arrays(_state_path(run, frame), {**arrays, **{f"head.{k}": v for k, v in head.items()}})
-    (run.path / "checkpoints" / f"{frame:06d}.partial.npz").unlink(missing_ok=True)
+    arrays |= {f"head.{name}": value for name, value in head.items()}
+    save_arrays(checkpoint_path(run.path, frame), arrays)
+    _partial_path(run, frame).unlink(missing_ok=True)
 
 
 def _finished(run: Run, frame: int) -> FrameState | None:
     """The state of a frame that is already fitted, for the next one to start from."""
-    path = _state_path(run, frame)
+    path = checkpoint_path(run.path, frame)
     if not path.exists():
         return None
     arrays = load_arrays(path, "delete it to fit this frame again", _CHECKPOINT, _MAY_BE_NAN)

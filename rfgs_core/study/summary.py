@@ -132,22 +132,19 @@ def _marks(radio: str, values: Mapping[str, float | None]) -> dict[str, bool | N
         other = values[control]
         return above(name, None if other is None else other + lead)
 
+    kept = values["identity_kept"]
     shares = [share for share in (values["cut"], values["gap"]) if share is not None]
     return {
         "cut": max(shares) >= CUT_MARK[radio] if shares else None,
         **{f"template_{key}": better(key, f"template_{key}", 0.0) for key in TEMPLATE_MARKS[radio]},
         "centroid": _less(values["centroid_m"], CENTROID_MARK_M[radio]),
         "found": above("found", FOUND_MARK),
-        "identity": _none_or(values["identity_kept"], 1.0),
+        "identity": None if kept is None else kept == 1.0,
         "linear": better("element_snr_db", "linear_snr_db", ELEMENT_MARK_DB),
         "gaussian_process": better("element_snr_db", "gaussian_process_snr_db", 0.0),
         "pair_gain": _less(values["device_gain_mae_db"], values["control_device_gain_mae_db"]),
         "profiles": better("delay_profile_corr", "control_delay_profile_corr", 0.0),
     }
-
-
-def _none_or(value: float | None, wanted: float) -> bool | None:
-    return None if value is None else value == wanted
 
 
 def _less(value: float | None, mark: float | None) -> bool | None:

@@ -68,10 +68,16 @@ class _Limb:
         share = np.clip((points - self.start) @ along / (along @ along), 0.0, 1.0)
         return points - self.start - share[:, None] * along
 
-    def deviations(self, offsets: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 3"]:
-        """Standard deviations along x, y and z: an upright limb ends sharply."""
+    def log_density(self, offsets: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N"]:
+        """Unnormalised; an upright limb ends more sharply than it is wide."""
         upright = self.start[0] == self.end[0] and self.start[1] == self.end[1]
-        return offsets / [self.radius_m, self.radius_m, END_FALL_M if upright else self.radius_m]
+        deviation = [self.radius_m, self.radius_m, END_FALL_M if upright else self.radius_m]
+        return -0.5 * np.sum((offsets / deviation) ** 2, axis=1)
+
+    def away(self, offsets: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 3"]:
+        """Across the line, also beyond its ends [m]."""
+        along = (self.end - self.start) / np.linalg.norm(self.end - self.start)
+        return offsets - np.outer(offsets @ along, along)
 
 
 def _limbs(bodies: Bodies, body: int) -> list[_Limb]:
@@ -119,12 +125,10 @@ def surface_prior(
         own = np.flatnonzero(whose == body)
         for limb in _limbs(bodies, body):
             offsets = limb.offsets(points[own])
-            log = -0.5 * np.sum(limb.deviations(offsets) ** 2, axis=1)
+            log = limb.log_density(offsets)
             better = log > density[own]
-            # What lies beyond an end of the line still faces away from the line.
-            along = (limb.end - limb.start) / np.linalg.norm(limb.end - limb.start)
-            away = offsets - np.outer(offsets @ along, along)
-            density[own[better]], normals[own[better]] = log[better], away[better]
+            density[own[better]] = log[better]
+            normals[own[better]] = limb.away(offsets)[better]
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     return density, normals / np.maximum(length, 1e-9)
 

@@ -25,7 +25,7 @@ from rfgs_core.train.observations import Observations
 from rfgs_core.train.posture import tell_postures
 from rfgs_core.train.reflectivity import fitted_reflectivities
 from rfgs_core.train.sampling import encode
-from rfgs_core.train.start import StartDensity, gaussians_at
+from rfgs_core.train.start import StartCells, gaussians_at
 from rfgs_core.train.tracks import Tracks
 from rfgs_core.train.warm_start import Moving, at_pace, carry_over
 
@@ -105,16 +105,18 @@ def start_frame(
     tracks = _followed(before, maps, observations, config, seed)
     bodies = tell_postures(observations, maps, tracks.axes_xy, config, seed)
     tracks = replace(tracks, knees_rad=bodies.knees_rad)
-    density = StartDensity.of(maps, bodies, observations.bounds_m)
+    cells = StartCells.around(maps, bodies.axes_xy, observations.bounds_m)
+    density = cells.density(bodies)
     points = density.draw(config.num_gaussians, rng)
     track_id, goes_on, next_track = np.arange(len(points), dtype=np.int64), None, 0
     if before is not None:
-        room = before.moving, bodies, maps, observations.bounds_m
-        points, track_id = carry_over(*room, points, rng)
+        points, track_id = carry_over(before.moving, bodies, cells, density, points, rng)
         if config.density == "motion" and earlier is not None:
             pace_m_s = paces_m_s(tracks, novelty(observations, earlier))
             wanted = wanted_counts(config.num_gaussians, pace_m_s)
-            points, track_id = at_pace(*room, wanted, points, track_id, rng)
+            points, track_id = at_pace(
+                *(before.moving, bodies, cells, wanted, points, track_id, rng)
+            )
         goes_on, next_track = np.isin(track_id, before.track_id), before.unused_track
     gaussians = gaussians_at(points, outward_normals(points, bodies))
     power = fit_power(observations, gaussians, config)

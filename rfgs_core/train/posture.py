@@ -66,11 +66,14 @@ class PairSample:
     def log_likelihood(
         self, points: Float64[np.ndarray, "M 3"], normals: Float64[np.ndarray, "M 3"]
     ) -> float:
-        """Log evidence of Gaussians of equal power, at their best level and share of noise."""
+        """Log evidence of Gaussians of equal power, at their best level and share of noise.
+
+        Zero where nothing is heard, which speaks for no posture.
+        """
         response = self._responses(points, normals)
         covariance = response @ response.conj().T
         level = float(np.trace(covariance).real) / len(covariance)
-        if not level > 0.0:
+        if not (level > 0.0 and self.change.any()):
             return 0.0
         eigenvalues, vectors = eigh(covariance / level, lower=True, driver="evd")
         power = np.abs(vectors.conj().T @ self.change) ** 2
@@ -83,16 +86,16 @@ class PairSample:
     def _responses(
         self, points: Float64[np.ndarray, "M 3"], normals: Float64[np.ndarray, "M 3"]
     ) -> Complex64[np.ndarray, "entry M"]:
-        """The propagation model's answer of each link and tone to each Gaussian, γ = 1."""
-        transmitted, received = (
-            _leg(self.tx_xyz, points, normals),
-            _leg(self.rx_xyz, points, normals),
-        )
-        path_m, amplitude = transmitted[0] + received[0], transmitted[1] * received[1]
-        turns = (self.freq_hz[:, None] / SPEED_OF_LIGHT) * path_m[:, None]
+        """The propagation model's answer of each link and tone to each Gaussian of γ = 1.
+
+        Without its factor λ/(4π)^{3/2}, which hardly differs within a band: levels are fitted.
+        """
+        out_m, lit = _leg(self.tx_xyz, points, normals)
+        back_m, heard = _leg(self.rx_xyz, points, normals)
+        turns = (self.freq_hz[:, None] / SPEED_OF_LIGHT) * (out_m + back_m)[:, None]
         # Whole turns go in double precision: paths have thousands of wavelengths.
         phase = (-2 * np.pi * (turns - np.round(turns))).astype(np.float32)
-        response = amplitude[:, None].astype(np.float32) * np.exp(1j * phase)
+        response = (lit * heard)[:, None].astype(np.float32) * np.exp(1j * phase)
         return response.reshape(-1, len(points))
 
 
@@ -109,7 +112,7 @@ def _leg(
 
 
 def pair_samples(observations: Observations, seed: int) -> list[PairSample]:
-    """Entries of each device pair that hears something, drawn by chance."""
+    """Entries of each device pair, drawn by chance, in units of their root mean square."""
     rng = np.random.default_rng(seed)
     pair, names = observations.pairs
     visible = np.flatnonzero(observations.tones)
@@ -122,12 +125,10 @@ def pair_samples(observations: Observations, seed: int) -> list[PairSample]:
         tone = rng.choice(visible, min(len(visible), max(entries // count, 4)), replace=False)
         tx, rx, tone = tx[link], rx[link], np.sort(tone)
         change = observations.delta[tx[:, None], rx[:, None], tone].ravel()
-        scale = np.sqrt(np.mean(np.abs(change) ** 2))
-        if scale > 0:
-            layout = observations.layout
-            ends = layout.tx_xyz[tx], layout.rx_xyz[rx]
-            freq_hz = observations.freq_hz[tone]
-            result.append(PairSample(*ends, freq_hz, (change / scale).astype(np.complex64)))
+        scale = np.sqrt(np.mean(np.abs(change) ** 2)) or 1.0
+        ends = observations.layout.tx_xyz[tx], observations.layout.rx_xyz[rx]
+        freq_hz = observations.freq_hz[tone]
+        result.append(PairSample(*ends, freq_hz, (change / scale).astype(np.complex64)))
     return result
 
 

@@ -10,8 +10,7 @@ from jaxtyping import Float64, Int64
 
 from rfgs_core.train.body_prior import Bodies, nearest_axis
 from rfgs_core.train.density.motion import kept
-from rfgs_core.train.localise import PairMaps
-from rfgs_core.train.start import StartDensity
+from rfgs_core.train.start import StartCells, StartDensity
 
 
 @dataclass(frozen=True)
@@ -38,8 +37,8 @@ class Moving:
 def carry_over(
     before: Moving,
     bodies: Bodies,
-    maps: PairMaps,
-    bounds_m: Float64[np.ndarray, "2 3"],
+    cells: StartCells,
+    density: StartDensity,
     fresh: Float64[np.ndarray, "M 3"],
     rng: np.random.Generator,
 ) -> tuple[Float64[np.ndarray, "M 3"], Int64[np.ndarray, "M"]]:
@@ -48,20 +47,26 @@ def carry_over(
     Whoever has sat down or stood up is drawn anew: no Gaussian of one posture has a place in the
     other.
 
+    Args:
+        before: The fitted frame before.
+        bodies: The bodies now, in the same order.
+        cells: What the channel says around them.
+        density: Where all of them are drawn.
+        fresh: Points drawn from it [m].
+        rng: Draws who has sat down or stood up.
+
     Returns:
         Points [m], and their track numbers.
     """
     points = _moved_along(before, bodies)
     changed = before.bodies.sits != bodies.sits
     anew = changed[before.body]
-    support = StartDensity.of(maps, bodies, bounds_m).at(points)
     count = min(len(points) // 3, len(fresh), int((~anew).sum()))
-    weakest = np.argsort(np.where(anew, np.inf, support))[:count]
+    weakest = np.argsort(np.where(anew, np.inf, density.at(points)))[:count]
     points[weakest] = fresh[:count]
     for body in np.flatnonzero(changed):
         own = before.body == body
-        density = StartDensity.of(maps, bodies.only(body), bounds_m)
-        points[own] = density.draw(int(own.sum()), rng)
+        points[own] = cells.density(bodies.only(body)).draw(int(own.sum()), rng)
     anew[weakest] = True
     track_id = before.track_id.copy()
     track_id[anew] = before.unused_track + np.arange(int(anew.sum()))
@@ -81,8 +86,7 @@ def _moved_along(before: Moving, bodies: Bodies) -> Float64[np.ndarray, "M 3"]:
 def at_pace(
     before: Moving,
     bodies: Bodies,
-    maps: PairMaps,
-    bounds_m: Float64[np.ndarray, "2 3"],
+    cells: StartCells,
     wanted: Int64[np.ndarray, "body"],
     points: Float64[np.ndarray, "M 3"],
     track_id: Int64[np.ndarray, "M"],
@@ -95,7 +99,7 @@ def at_pace(
     points, track_id = points[keep], track_id[keep]
     have = np.bincount(nearest_axis(points, bodies.axes_xy), minlength=len(wanted))
     more = [
-        StartDensity.of(maps, bodies.only(body), bounds_m).draw(int(count), rng)
+        cells.density(bodies.only(body)).draw(int(count), rng)
         for body, count in enumerate(wanted - have)
         if count > 0
     ]

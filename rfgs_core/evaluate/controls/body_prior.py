@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from rfgs_core.evaluate.controls.template import WHY_NO_CHANNEL
 from rfgs_core.evaluate.evidence import ControlResult, Evidence
 from rfgs_core.train.body_prior import surface_prior
 
 WHY_NO_BODIES = "the method does not tell where its bodies stand or sit"
-WHY_NO_CHANNEL = "a shape only; it predicts no channel"
 
 
 def control(evidence: Evidence) -> ControlResult:

@@ -36,7 +36,6 @@ def test_each_person_is_held_against_its_own_body() -> None:
     metrics = people_metrics([found])
     assert metrics["centroid_m"] == pytest.approx(0.1)
     assert metrics["found"] == 1.0 and metrics["identity_kept"] == 1.0
-    assert metrics["bodies"] == pytest.approx({"0": 0.1, "1": 0.1})
 
 
 def test_a_body_without_voxels_has_lost_its_person() -> None:

@@ -107,6 +107,26 @@ def test_only_what_is_visible_is_sampled(make_observations: Callable[..., Observ
         assert not (entry.rx_xyz == seen.layout.rx_xyz[5]).all(axis=1).any()
 
 
+def test_pairs_that_hear_nothing_keep_their_place_and_say_nothing(
+    make_observations: Callable[..., Observations], cloud
+) -> None:
+    """Of few pairs several rounds are averaged, pair by pair."""
+    empty = make_observations(own_device_links="only")
+    seen = echoing(empty, Bodies(AXIS, np.array([0.0])), seed=3)
+    pair, names = seen.pairs
+    tx, rx = np.nonzero(pair == 1)
+    delta = seen.delta.copy()
+    # All links of one pair, and all but one of another: a round may miss that one.
+    delta[pair == 0] = 0.0
+    delta[tx[1:], rx[1:]] = 0.0
+    quiet = seen.with_delta(delta)
+    samples = pair_samples(quiet, 0)
+    assert len(samples) == len(names) == 4
+    assert samples[0].log_likelihood(*cloud) == 0.0 != samples[2].log_likelihood(*cloud)
+    told = tell_postures(quiet, pair_maps(quiet), AXIS, TrainConfig(), 0)
+    assert told.knees_rad.shape == (1,)
+
+
 def echoing(empty: Observations, bodies: Bodies, seed: int) -> Observations:
     """Random scatterers drawn from the prior, an antenna behind the tangent plane sees nothing."""
     rng = np.random.default_rng(seed)

@@ -151,6 +151,24 @@ def test_static_gaussians_come_first(own_run: Path, make_gaussians) -> None:
     assert len(joined) == 40
 
 
+def test_bodies_are_those_of_the_checkpoint(own_run: Path) -> None:
+    path = own_run / "checkpoints" / "000001.npz"
+    arrays = load_arrays(path, "try again", unknown=("velocity_xy", "knees_rad"))
+    save_arrays(path, {**arrays, "knees_rad": np.array([0.5])})
+    bodies = open_run(own_run).bodies(1)
+    assert bodies is not None
+    np.testing.assert_array_equal(bodies.axes_xy, arrays["axes_xy"])
+    assert bodies.knees_rad.tolist() == [0.5]
+    # Versions that told no postures kept none.
+    save_arrays(path, {name: value for name, value in arrays.items() if name != "knees_rad"})
+    with pytest.raises(
+        RfgsFormatError, match=r"000001\.npz: .*missing knees_rad; train this run again"
+    ):
+        open_run(own_run).bodies(1)
+    path.unlink()
+    assert open_run(own_run).bodies(1) is None
+
+
 def test_a_folder_without_a_run_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RfgsError, match=r"is not a run: it has no config\.json"):
         open_run(tmp_path)

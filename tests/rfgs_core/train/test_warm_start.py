@@ -8,7 +8,7 @@ import pytest
 
 from rfgs_core.train.body_prior import Bodies, nearest_axis, surface_prior
 from rfgs_core.train.localise import PairMaps
-from rfgs_core.train.start import StartDensity
+from rfgs_core.train.start import StartCells, StartDensity
 from rfgs_core.train.warm_start import Moving, carry_over
 
 BOUNDS_M = np.array([[0.0, 0.0, 0.0], [5.0, 4.0, 2.4]])
@@ -25,8 +25,9 @@ def fitted(bodies: Bodies) -> Moving:
 
 def carried(before: Moving, bodies: Bodies) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(1)
-    fresh = StartDensity.of(EVEN, bodies, BOUNDS_M).draw(COUNT, rng)
-    return carry_over(before, bodies, EVEN, BOUNDS_M, fresh, rng)
+    cells = StartCells.around(EVEN, bodies.axes_xy, BOUNDS_M)
+    density = cells.density(bodies)
+    return carry_over(before, bodies, cells, density, density.draw(COUNT, rng), rng)
 
 
 @pytest.mark.parametrize(("knees", "turn"), [(np.nan, 0.0), (0.3, 0.0), (0.3, 1.1)])

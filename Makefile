@@ -47,7 +47,7 @@ $(READY): pyproject.toml constraints.txt
 	  echo "error: Python 3.11 is needed (bpy 4.5 has no wheels for others); found $$($(PYTHON_FOUND) --version 2>&1). Install it, or run: make PYTHON=/path/to/python3.11 ..."; exit 2; }
 	$(PYTHON_FOUND) -m venv .venv
 	$(VENV)/python -m pip install --quiet --upgrade pip
-	@echo "Installing the pinned packages (about 2 GB on disk, several minutes) ..."
+	@echo "Installing the pinned packages (about 4 GB on disk, several minutes) ..."
 	$(VENV)/python -m pip install --quiet --constraint constraints.txt --editable ".[dev,cluster,scenes]"
 	@touch $(READY)
 

@@ -15,6 +15,7 @@ import torch
 from jaxtyping import Complex, Float
 from torch import Tensor
 
+from rfgs_core.device import finish_device
 from rfgs_core.propagation import (
     EnvironmentPaths,
     Links,
@@ -57,6 +58,8 @@ class PropagationBench:
     """Runs of the fast twin; the plain one runs twice. The best counts."""
     seed: int = 0
     """Seed of the random cloud."""
+    device: str = "cpu"
+    """Where both twins run."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +74,7 @@ class _Scene:
 
 
 def bench_propagation(config: PropagationBench | None = None) -> dict[str, float | int | str]:
-    """Times the compiled propagation model beside its plain torch twin.
+    """Times the compiled propagation model beside its plain torch twin, on one device.
 
     Both compute the full model in float32: scattering and shadowed environment paths. The twin
     works through the Gaussians in blocks, as otherwise its arrays of [gaussian, link, tone]
@@ -155,7 +158,8 @@ def _scene(config: PropagationBench) -> _Scene:
     csi_shape = (links, config.num_tones)
     grad = torch.complex(normal(*csi_shape), normal(*csi_shape)).to(torch.complex64)
     paths = _paths(link_rows, config.paths_per_link, wavelength_m, uniform)
-    return _Scene(gaussians, link_rows, tones, paths, grad)
+    there = torch.device(config.device)
+    return _Scene(gaussians.to(there), link_rows.to(there), tones, paths.to(there), grad.to(there))
 
 
 def _paths(
@@ -245,16 +249,18 @@ def _best(run: Callable[[], _Result], repeats: int) -> tuple[float, _Result]:
     """Shortest time of `repeats` runs [s], and the last result."""
     start = time.perf_counter()
     result = run()
+    finish_device()
     best_s = time.perf_counter() - start
     for _ in range(repeats - 1):
         start = time.perf_counter()
         result = run()
+        finish_device()
         best_s = min(best_s, time.perf_counter() - start)
     return best_s, result
 
 
 def hardware() -> dict[str, str | int]:
-    """Processor and number of cores that times belong to."""
+    """Processor, its cores and the GPU, if any, that times belong to."""
     cpu_info = Path("/proc/cpuinfo")
     names = [
         line.split(":", 1)[1].strip()
@@ -264,4 +270,5 @@ def hardware() -> dict[str, str | int]:
     return {
         "cpu": names[0] if names else platform.processor(),
         "cores": os.cpu_count() or 1,
+        "gpu": torch.cuda.get_device_name(0) if torch.cuda.is_available() else "none",
     }

@@ -15,6 +15,9 @@ from jaxtyping import install_import_hook
 
 import rfgs_core  # noqa: F401  before torch, as programs do: it tells OpenMP how threads wait
 
+# isort: split
+import torch
+
 if TYPE_CHECKING:
     from rfgs_core.run import Run
 
@@ -23,6 +26,10 @@ ROOT = Path(__file__).resolve().parents[1]
 # Packages with numba kernels are left out: the hook would wrap a kernel that calls another, and
 # numba's cache cannot store the wrapper.
 install_import_hook(["rfgs_core.radio", "rfgs_core.gaussians"], "beartype.beartype")
+
+if not torch.cuda.is_available():
+    # Kernels for a GPU then run in Triton's interpreter; triton reads it when it is imported.
+    os.environ["TRITON_INTERPRET"] = "1"
 
 
 @pytest.fixture(scope="session")

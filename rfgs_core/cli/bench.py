@@ -12,6 +12,8 @@ from typing import Any, Literal
 
 import tyro
 
+from rfgs_core.device import Device
+
 
 @dataclass(frozen=True)
 class BenchArgs:
@@ -21,7 +23,7 @@ class BenchArgs:
     and with gradients. raster: 20,000 Gaussians at 256 x 256 pixels. blender: 1,000,000 Gaussians
     imported and 100,000 per frame played by the add-on, in Blender as a program of its own.
     training: 20,000 Gaussians on one frame of a dataset, until the loss of links that are set
-    aside changes by under 1 % over 50 steps.
+    aside changes by under 1 % over 50 steps; or --gaussians and --steps of your own.
     """
 
     part: tyro.conf.Positional[Literal["propagation", "raster", "blender", "training"]]
@@ -34,6 +36,12 @@ class BenchArgs:
     """Radio for the part `training`."""
     frame: int | None = None
     """Frame for the part `training`; the first one when left out."""
+    gaussians: int = 20_000
+    """Gaussians for the parts `propagation` and `training`."""
+    steps: int | None = None
+    """Adam steps for the part `training`; left out: until the loss stands still."""
+    device: Device = "cpu"
+    """Where the parts `propagation` and `training` run: cpu, or cuda, the current GPU."""
     json: Path | None = None
     """Also write the numbers to this file, as one flat dictionary."""
 
@@ -50,19 +58,26 @@ def _bench(args: BenchArgs) -> Callable[[], dict[str, Any]]:
         from rfgs_core.render.bench import bench_raster
 
         return bench_raster
-    from rfgs_core.bench import bench_propagation
+    return partial(_propagation, args)
 
-    return bench_propagation
+
+def _propagation(args: BenchArgs) -> dict[str, Any]:
+    from rfgs_core.bench import PropagationBench, bench_propagation
+    from rfgs_core.device import need_device
+
+    need_device(args.device)
+    return bench_propagation(PropagationBench(num_gaussians=args.gaussians, device=args.device))
 
 
 def _training(args: BenchArgs) -> dict[str, Any]:
     from rfgs_core.bench import hardware
     from rfgs_core.errors import RfgsError
-    from rfgs_core.train.bench import bench_training
+    from rfgs_core.train.bench import TrainingBench, bench_training
 
     if args.dataset is None:
         raise RfgsError("bench training: expected --dataset FOLDER, see `rfgs-factory generate`")
-    return {**bench_training(args.dataset, args.radio, args.frame), **hardware()}
+    bench = TrainingBench(args.gaussians, args.steps, args.device)
+    return {**bench_training(args.dataset, args.radio, args.frame, bench), **hardware()}
 
 
 def run(args: BenchArgs) -> int:

@@ -18,7 +18,7 @@ PACKAGES = (
 )
 OPTIONAL = {
     "anny": "builds the people of the scenes: pip install 'rfgs[scenes]'",
-    "gsplat": "rasterises on CUDA: pip install 'rfgs[gpu]'",
+    "triton": "compiles the kernels of --device cuda: pip install 'rfgs[gpu]'",
     "lpips": "the LPIPS picture metric: pip install lpips",
     "distributed": "generation on a cluster: pip install 'rfgs[cluster]'",
 }

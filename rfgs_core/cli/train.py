@@ -11,6 +11,7 @@ from typing import Annotated
 import tyro
 
 from rfgs_core.dataset.observed import Observed
+from rfgs_core.device import Device
 from rfgs_core.train.config import (
     Background,
     Calibrate,
@@ -77,6 +78,8 @@ class TrainArgs:
     clocks (timing) or both. From the empty room first, then together with the Gaussians."""
     seed: int = 0
     """Root seed; 0 is a seed like any other."""
+    device: Device = "cpu"
+    """Where reflectivities are solved and Gaussians refined: cpu, or cuda, the current GPU."""
     iterations: int | None = None
     """Adam steps per frame; the recipe's own number when left out."""
     gaussians: int | None = None
@@ -128,6 +131,7 @@ def run(args: TrainArgs) -> int:
         coarse_share=args.coarse,
         settle_share=args.settle,
         posture=args.posture,
+        device=args.device,
         power_trust=args.power_trust,
         temporal=args.temporal,
         without=args.without,

@@ -8,15 +8,16 @@
 k = 2 pi f / c, u the unit vectors from a Gaussian to the two antennas. The Gaussian factor is
 the Fourier transform of a Gaussian cloud of scatterers, so a flat one reflects like a mirror.
 
-`scatter` and `shadow` exist twice: compiled for the CPU (`backend="numba"`, the default) and in
-plain torch (`backend="torch"`), which is the definition that tests compare the former with.
+`scatter` and `shadow` exist three times: compiled for the CPU (`backend="numba"`), for a GPU
+(`backend="triton"`), and in plain torch (`backend="torch"`), which is the definition that tests
+compare the others with. Where none is named, the device of the Gaussians decides.
 """
 
 from __future__ import annotations
 
 import importlib
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from types import ModuleType
 from typing import Literal, get_args
 
@@ -37,7 +38,8 @@ __all__ = [
     "shadow",
 ]
 
-Backend = Literal["numba", "torch"]
+Backend = Literal["numba", "triton", "torch"]
+_MODULES = {"numba": "fast", "triton": "gpu", "torch": "reference"}
 
 
 def scatter(
@@ -51,7 +53,7 @@ def scatter(
     sharpness: float = 0.0,
     visibility: Float[Tensor, "gaussian group"] | None = None,
     *,
-    backend: Backend = "numba",
+    backend: Backend | None = None,
 ) -> Complex[Tensor, "link subcarrier"]:
     """CSI that Gaussians scatter, the second sum of the module's formula.
 
@@ -64,12 +66,12 @@ def scatter(
         scales_rf: Standard deviations of the reflecting cloud [m], positive.
         gamma: Reflectivity [m], the complex root of the radar cross-section, at knots spread
             evenly over the band and linear in between.
-        links: Pairs of antennas.
+        links: Pairs of antennas, on any device.
         tones: Subcarriers.
         normals: Outward unit normals; None: every Gaussian is seen from all sides.
         sharpness: How fast a Gaussian disappears behind its tangent plane; 0: never.
         visibility: Weight per Gaussian and group of links (`links.group`); None: 1.
-        backend: Which twin computes it.
+        backend: Which twin computes it; None: the one for the device of `means`.
 
     Returns:
         CSI, one row per link and one column per selected tone.
@@ -86,7 +88,8 @@ def scatter(
         1.0
     """
     _check_groups(links, visibility)
-    return _twin(backend).scatter(
+    links = links.to(means.device)
+    return _twin(backend, means.device).scatter(
         *(means, quats, scales_rf, gamma, links, tones, normals, sharpness, visibility)
     )
 
@@ -98,7 +101,7 @@ def shadow(
     alpha: Float[Tensor, "gaussian"],
     paths: EnvironmentPaths,
     *,
-    backend: Backend = "numba",
+    backend: Backend | None = None,
 ) -> Complex[Tensor, "path"]:
     """Share of each environment path that passes the Gaussians.
 
@@ -112,13 +115,14 @@ def shadow(
         quats: Orientations, w first, need not be normalised.
         scales: Standard deviations of the opaque shape [m], positive; not the reflecting one.
         alpha: Opacities, from 0 up to but not including 1.
-        paths: Environment paths; only their legs matter here.
-        backend: Which twin computes it.
+        paths: Environment paths, on any device; only their legs matter here.
+        backend: Which twin computes it; None: the one for the device of `means`.
 
     Returns:
         One complex factor per path, 1 where nothing stands in the way.
     """
-    return _twin(backend).shadow(means, quats, scales, alpha, paths)
+    paths = paths.to(means.device)
+    return _twin(backend, means.device).shadow(means, quats, scales, alpha, paths)
 
 
 def environment(
@@ -135,11 +139,12 @@ def environment(
         tones: Subcarriers.
         num_links: Rows of the result.
     """
-    turns = paths.delay_s.to(torch.float64)[:, None] * tones.freq_hz
+    device, paths = transmission.device, paths.to(transmission.device)
+    turns = paths.delay_s.to(torch.float64)[:, None] * tones.freq_hz.to(device)
     phase = (-2 * math.pi) * (turns - turns.detach().round())
     phasors = torch.polar(torch.ones_like(phase), phase).to(transmission.dtype)
     terms = (transmission * paths.amplitude.to(transmission.dtype))[:, None] * phasors
-    total = torch.zeros(num_links, tones.num_selected, dtype=terms.dtype)
+    total = torch.zeros(num_links, tones.num_selected, dtype=terms.dtype, device=device)
     return total.index_add(0, paths.link, terms)
 
 
@@ -166,6 +171,13 @@ class RadioGaussians:
     visibility: Float[Tensor, "gaussian group"] | None = None
     """Weight per group of links."""
 
+    def to(self, device: torch.device) -> RadioGaussians:
+        """The Gaussians on a device."""
+        named = {field.name: getattr(self, field.name) for field in fields(self)}
+        return replace(
+            self, **{name: x.to(device) for name, x in named.items() if isinstance(x, Tensor)}
+        )
+
 
 def propagate(
     gaussians: RadioGaussians,
@@ -173,7 +185,7 @@ def propagate(
     tones: Tones,
     paths: EnvironmentPaths | None = None,
     *,
-    backend: Backend = "numba",
+    backend: Backend | None = None,
 ) -> Complex[Tensor, "link subcarrier"]:
     """CSI of Gaussians within an environment: both sums of the module's formula.
 
@@ -182,7 +194,7 @@ def propagate(
         links: Pairs of antennas.
         tones: Subcarriers.
         paths: Paths of the empty scene; None: only what the Gaussians scatter.
-        backend: Which twin computes it.
+        backend: Which twin computes it; None: the one for the device of `means`.
     """
     g = gaussians
     total = scatter(
@@ -196,13 +208,14 @@ def propagate(
     return total + environment(transmission, paths, tones, len(links))
 
 
-def _twin(backend: Backend) -> ModuleType:
+def _twin(backend: Backend | None, device: torch.device) -> ModuleType:
     """The module that implements a backend."""
+    if backend is None:
+        backend = "numba" if device.type == "cpu" else "triton"
     if backend not in get_args(Backend):
         raise ValueError(f"expected backend to be one of {get_args(Backend)}, got {backend!r}")
-    # numba takes a second to import: only for those who use it.
-    name = "reference" if backend == "torch" else "fast"
-    return importlib.import_module(f"rfgs_core.propagation.{name}")
+    # numba and triton take a second to import: only for those who use them.
+    return importlib.import_module(f"rfgs_core.propagation.{_MODULES[backend]}")
 
 
 def _check_groups(links: Links, visibility: Float[Tensor, "gaussian group"] | None) -> None:

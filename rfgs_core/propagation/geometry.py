@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
 
 import torch
 from jaxtyping import Complex, Float, Float64, Int64
@@ -36,6 +37,11 @@ class Links:
 
     def __len__(self) -> int:
         return self.tx_xyz.shape[0]
+
+    def to(self, device: torch.device) -> Links:
+        """The links on a device."""
+        group = None if self.group is None else self.group.to(device)
+        return Links(self.tx_xyz.to(device), self.rx_xyz.to(device), group)
 
 
 @dataclass(frozen=True)
@@ -124,3 +130,16 @@ class EnvironmentPaths:
 
     def __len__(self) -> int:
         return self.link.shape[0]
+
+    def rows(self, chosen: slice | Tensor) -> EnvironmentPaths:
+        """Some of the paths; `link` keeps its meaning."""
+        return self._each(lambda value: value[chosen])
+
+    def to(self, device: torch.device) -> EnvironmentPaths:
+        """The paths on a device."""
+        return self._each(lambda value: value.to(device))
+
+    def _each(self, change: Callable[[Tensor], Tensor]) -> EnvironmentPaths:
+        named = {field.name: getattr(self, field.name) for field in fields(self)}
+        tensors = {name: change(x) for name, x in named.items() if isinstance(x, Tensor)}
+        return replace(self, **tensors)

@@ -28,7 +28,9 @@ def gamma_at_tones(
     knots = gamma.shape[1]
     if knots == 1:
         return gamma.expand(-1, tones.num_selected)
-    position = tones.indices.to(gamma.real.dtype) * ((knots - 1) / max(tones.count - 1, 1))
+    position = tones.indices.to(gamma.device, gamma.real.dtype) * (
+        (knots - 1) / max(tones.count - 1, 1)
+    )
     left = position.floor().clamp(max=knots - 2)
     share = position - left
     index = left.to(torch.int64)
@@ -72,7 +74,7 @@ def scatter(
     visibility: Float[Tensor, "gaussian group"] | None = None,
 ) -> Complex[Tensor, "link subcarrier"]:
     """Twin of `rfgs_core.propagation.scatter`: the same sum, written out."""
-    total = torch.zeros(len(links), tones.num_selected, dtype=gamma.dtype)
+    total = gamma.new_zeros(len(links), tones.num_selected)
     rows = max(1, MAX_ELEMENTS // max(1, len(links) * tones.num_selected))
     # At least once: without Gaussians the result still hangs on the graph.
     for first in range(0, max(means.shape[0], 1), rows):
@@ -134,7 +136,7 @@ def echoes(
 
     q = to_tx + to_rx
     spread = torch.einsum("mla,mab,mlb->ml", q, shape, q)
-    freq_hz = tones.freq_hz
+    freq_hz = tones.freq_hz.to(means.device)
     wavenumber = (2 * math.pi / SPEED_OF_LIGHT * freq_hz).to(real)
     turns = (distance_tx + distance_rx)[..., None] * (freq_hz / SPEED_OF_LIGHT)
     phase = (-2 * math.pi) * (turns - turns.detach().round()).to(real)

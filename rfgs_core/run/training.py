@@ -14,6 +14,7 @@ from tqdm import tqdm
 
 from rfgs_core.arrays import Shape, load_arrays, save_arrays
 from rfgs_core.dataset import Dataset, Sequence
+from rfgs_core.device import need_device
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json, write_json
 from rfgs_core.gaussians import Gaussians
@@ -106,6 +107,7 @@ def train_sequence(
     need_still_antennas(sequence, radio)
     need_shared_links(sequence, radio, config)
     need_phases(config)
+    need_device(config.device)
     if config.encoder == "paths":
         dataset.need("paths")
     if encoder_file is not None:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ import torch
 from tqdm import tqdm
 
 from rfgs_core.dataset import open_dataset
+from rfgs_core.device import Device, finish_device, need_device
 from rfgs_core.errors import RfgsError
 from rfgs_core.frames import chosen_frames
 from rfgs_core.seeds import sub_seed
@@ -25,8 +26,6 @@ from rfgs_core.train.losses import channel_loss
 from rfgs_core.train.observations import Observations, observe
 from rfgs_core.train.refine import refine
 
-#: Gaussians of the timed frame.
-GAUSSIANS = 20_000
 #: The loss stands still when it changes by less than this …
 STILL = 0.01
 #: … over as many steps.
@@ -35,7 +34,21 @@ WINDOW = 50
 LIMIT = 1000
 
 
-def bench_training(dataset: Path, radio: str, frame: int | None) -> dict[str, Any]:
+@dataclass(frozen=True)
+class TrainingBench:
+    """What is trained, and for how long."""
+
+    gaussians: int = 20_000
+    """Gaussians of the timed frame."""
+    steps: int | None = None
+    """Adam steps; None: until the loss stands still."""
+    device: Device = "cpu"
+    """Where reflectivities are solved and Gaussians refined."""
+
+
+def bench_training(
+    dataset: Path, radio: str, frame: int | None, bench: TrainingBench | None = None
+) -> dict[str, Any]:
     """Trains one frame until the loss of links that training does not see stands still.
 
     A tenth of the visible links is set aside for that, by chance. What is timed is everything
@@ -45,14 +58,17 @@ def bench_training(dataset: Path, radio: str, frame: int | None) -> dict[str, An
         dataset: Folder of the dataset.
         radio: Name of the radio.
         frame: Frame number; None for the first.
+        bench: Gaussians, steps and device.
 
     Returns:
-        `train_s` of the training whose last window stands still, its `start_s`, `steps`,
-        `loss_start`, `loss_end`, `still`, and what was trained.
+        `train_s` of the training whose last window stands still, or of the steps asked for, its
+        `start_s`, `steps`, `loss_start`, `loss_end`, `still`, and what was trained.
 
     Raises:
-        RfgsError: There is no such radio or frame.
+        RfgsError: There is no such radio, frame or device.
     """
+    bench = bench or TrainingBench()
+    need_device(bench.device)
     sequence = open_dataset(dataset).sequence()
     if radio not in sequence.radios:
         raise RfgsError(f"{dataset} has no radio {radio!r}; it has {', '.join(sequence.radios)}")
@@ -65,31 +81,38 @@ def bench_training(dataset: Path, radio: str, frame: int | None) -> dict[str, An
         links=whole.links & ~aside,
         delta=np.where(aside[..., None], 0, whole.delta).astype(np.complex64),
     )
-    config = TrainConfig(num_gaussians=GAUSSIANS)
+    config = TrainConfig(num_gaussians=bench.gaussians, device=bench.device)
     seed = sub_seed(0, "bench training", "fit")
     begin = time.perf_counter()
     start = solve_reflectivity(seen, start_frame(seen, config, seed, None), config)
     start_s = time.perf_counter() - begin
-    losses, train_s = [_validation(whole, aside, start, config)], start_s
-    with tqdm(total=LIMIT, desc="bench training", unit="step") as bar:
-        for steps in range(WINDOW, LIMIT + 1, WINDOW):
+    losses, train_s, steps, still = [_validation(whole, aside, start, config)], start_s, 0, False
+    lengths = range(WINDOW, LIMIT + 1, WINDOW) if bench.steps is None else [bench.steps]
+    with tqdm(total=lengths[-1], desc="bench training", unit="step") as bar:
+
+        def on_step(_loss: float, _count: int) -> None:
+            bar.update(1)
+
+        for steps in lengths:
             # From the start each time: what is timed is one training of so many steps.
+            bar.reset()
             begin = time.perf_counter()
-            state = refine(seen, start, replace(config, iterations=steps), seed)
+            state = refine(*(seen, start, replace(config, iterations=steps), seed), on_step=on_step)
+            finish_device()
             train_s = start_s + time.perf_counter() - begin
             losses.append(_validation(whole, aside, state, config))
-            bar.update(WINDOW)
             bar.set_postfix_str(f"validation loss {losses[-1]:.4g}")
             still = abs(losses[-1] - losses[-2]) < STILL * losses[-2]
             if still:
                 break
     return {
-        "gaussians": GAUSSIANS,
+        "device": bench.device,
+        "gaussians": bench.gaussians,
         "links": int(seen.links.sum()),
         "tones": int(seen.tones.sum()),
         "train_s": train_s,
         "start_s": start_s,
-        "steps": WINDOW * (len(losses) - 1),
+        "steps": steps,
         "loss_start": losses[0],
         "loss_end": losses[-1],
         "still": still,

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -60,12 +60,10 @@ class Channel:
         position[torch.from_numpy(chosen)] = torch.arange(len(chosen))
         moved = position[self.paths.link]
         keep = moved >= 0
-        fields = ("amplitude", "delay_s", "a_xyz", "b_xyz", "extra_a_m", "extra_b_m")
-        kept = {name: getattr(self.paths, name)[keep] for name in fields}
         return Channel(
             links=Links(self.links.tx_xyz[chosen], self.links.rx_xyz[chosen]),
             tones=self.tones,
-            paths=EnvironmentPaths(link=moved[keep], wavelength_m=self.paths.wavelength_m, **kept),
+            paths=replace(self.paths.rows(keep), link=moved[keep]),
             tx=self.tx[chosen],
             rx=self.rx[chosen],
         )
@@ -85,7 +83,8 @@ class Channel:
     def shadowed(self, head: RadioHead, gaussians: Gaussians) -> Complex[Tensor, "link subcarrier"]:
         """What the Gaussians take away from the direct paths: (T − 1) a e^{−j2πfτ}."""
         if len(self.paths) == 0:
-            return torch.zeros(len(self.links), self.tones.num_selected, dtype=torch.complex64)
+            size = len(self.links), self.tones.num_selected
+            return gaussians.means.new_zeros(size, dtype=torch.complex64)
         g = head.radio_gaussians(gaussians)
         passed = shadow(g.means, g.quats, g.scales, g.alpha, self.paths)
         lost = environment(passed - 1.0, self.paths, self.tones, len(self.links))

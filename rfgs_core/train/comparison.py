@@ -42,6 +42,10 @@ class Comparison(Protocol):
         """The observations less what the change of all links explains of them."""
         ...
 
+    def to(self, device: torch.device) -> Comparison:
+        """The comparison for changes on a device."""
+        ...
+
 
 @dataclass(frozen=True)
 class ComplexComparison:
@@ -70,7 +74,11 @@ class ComplexComparison:
         self, observations: Observations, change: Complex[Tensor, "link subcarrier"]
     ) -> Observations:
         """The residual channel."""
-        return observations.with_entries((self.target - change).numpy())
+        return observations.with_entries((self.target - change).cpu().numpy())
+
+    def to(self, device: torch.device) -> ComplexComparison:
+        """See `Comparison`."""
+        return ComplexComparison(self.target.to(device))
 
 
 @dataclass(frozen=True)
@@ -121,7 +129,11 @@ class PowerComparison:
         left = self.target - self.predicted(change, np.arange(len(self.target)))
         wave = direct_wave(observations.layout, observations.freq_hz)
         wave = wave[observations.links][:, observations.tones]
-        return observations.with_entries(left.numpy() * wave)
+        return observations.with_entries(left.cpu().numpy() * wave)
+
+    def to(self, device: torch.device) -> PowerComparison:
+        """See `Comparison`."""
+        return PowerComparison(self.target.to(device), self.empty.to(device), self.level.to(device))
 
 
 @dataclass(frozen=True)
@@ -154,7 +166,7 @@ class DelayComparison:
     ) -> Float[Tensor, "batch delay"]:
         """|Δh(τ)| of the windowed band."""
         size = self.target.shape[1]
-        band = torch.zeros(len(change), size, dtype=change.dtype)
+        band = change.new_zeros(len(change), size)
         band = band.index_copy(1, self.tones, change * self.window[self.tones])
         return torch.fft.ifft(band, dim=1, norm="forward").abs()
 
@@ -168,8 +180,14 @@ class DelayComparison:
         """Amplitudes above the predicted ones."""
         left = self.target - self.predicted(change, np.arange(len(self.target)))
         delay_change = np.zeros((*observations.links.shape, left.shape[1]), dtype=np.float32)
-        delay_change[observations.links] = left.clamp(min=0.0).numpy()
+        delay_change[observations.links] = left.clamp(min=0.0).cpu().numpy()
         return replace(observations, delay_change=delay_change)
+
+    def to(self, device: torch.device) -> DelayComparison:
+        """See `Comparison`."""
+        return DelayComparison(
+            self.target.to(device), self.window.to(device), self.tones.to(device)
+        )
 
 
 def comparison_of(observations: Observations) -> Comparison:

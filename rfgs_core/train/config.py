@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from rfgs_core.dataset.observed import Observed
+from rfgs_core.device import Device
 
 Objective = Literal["paper", "csi", "both"]
 Recipe = Literal["rfgs", "paper"]
@@ -83,6 +84,8 @@ class TrainConfig:
     """What gives φ (eq. 2)."""
     encoder_sha256: str = ""
     """Digest of the learned encoder's file; empty for the others."""
+    device: Device = "cpu"
+    """Where reflectivities are solved and Gaussians refined."""
     unexplained: float = 0.5
     """Share of each device pair's power that the model is not asked to explain."""
     calibrate: Calibrate = "none"

@@ -68,7 +68,7 @@ def noise_per_link(
     """Variance per link: a share of the mean power of its device pair."""
     pair, names = observations.pairs
     index = pair[observations.links]
-    power = (target.abs() ** 2).mean(dim=1).numpy()
+    power = (target.abs() ** 2).mean(dim=1).cpu().numpy()
     mean = np.bincount(index, power, len(names)) / np.bincount(index, minlength=len(names))
     floor = 1e-3 * mean.max() if len(mean) else 0.0
     return torch.from_numpy((share * np.maximum(mean, floor * 1e-3))[index].astype(np.float32))

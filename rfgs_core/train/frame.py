@@ -51,6 +51,15 @@ class FrameState:
     next_track: int = 0
     """Numbers below it were given out, some of them to Gaussians that are gone."""
 
+    def to(self, device: torch.device) -> FrameState:
+        """The state with what a device computes with on it."""
+        return replace(
+            self,
+            gaussians=self.gaussians.to(device),
+            power=self.power.to(device),
+            head=self.head.to(device),
+        )
+
     @property
     def unused_track(self) -> int:
         """The first number that no Gaussian has had."""
@@ -152,12 +161,12 @@ def solve_reflectivity(
     Powers per delay know nothing of phases: there each Gaussian gets the root of its reflected
     power and a phase drawn for it, the model that the power fit assumes.
     """
+    there = state.to(torch.device(config.device))
     gamma = fitted_reflectivities(
-        *(observations, state.head, state.gaussians, state.power),
+        *(observations, there.head, there.gaussians, there.power),
         *(config.unexplained, config.solver_steps),
     )
-    if gamma is None:
-        gamma = _drawn_phases(state, config.seed)
+    gamma = _drawn_phases(state, config.seed) if gamma is None else gamma.cpu()
     features = state.head.with_gamma(state.gaussians.features, gamma)
     return replace(state, gaussians=replace(state.gaussians, features=features))
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -25,12 +26,12 @@ class LastGood:
         self._arrays: dict[str, np.ndarray] = {}
         self._left = 0
 
-    def remember(self, arrays: dict[str, np.ndarray]) -> None:
+    def remember(self, arrays: Callable[[], dict[str, np.ndarray]]) -> None:
         """Copies the state that gave a finite loss, when its turn has come."""
         if self._checkpoint is None:
             return
         if self._left == 0:
-            self._arrays = {name: value.copy() for name, value in arrays.items()}
+            self._arrays = {name: value.copy() for name, value in arrays().items()}
             self._left = COPY_EVERY
         self._left -= 1
 

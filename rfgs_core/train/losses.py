@@ -16,6 +16,9 @@ from rfgs_core.gaussians import Gaussians
 #: Weights λ1, λ2, λ3 of eq. 4 (paper section 3.4).
 POSITION_WEIGHT, FEATURE_WEIGHT, REGULARISATION_WEIGHT = 1.0, 0.1, 0.001
 
+#: Distances that are in memory at a time where no tree is used.
+MOST_DISTANCES = 1 << 26
+
 
 @dataclass(frozen=True)
 class SamplePoints:
@@ -26,6 +29,10 @@ class SamplePoints:
     features: Float[Tensor, "N 32"]
     """φ(p_k), which the losses take as a constant."""
 
+    def to(self, device: torch.device) -> SamplePoints:
+        """The points on a device."""
+        return SamplePoints(self.xyz.to(device), self.features.to(device))
+
     def rows(self, chosen: Int64[Tensor, "batch"]) -> SamplePoints:
         """Some of the points."""
         return SamplePoints(self.xyz[chosen], self.features[chosen])
@@ -35,8 +42,23 @@ def nearest_gaussian(
     points: Float[Tensor, "N 3"], means: Float[Tensor, "M 3"]
 ) -> tuple[Int64[Tensor, "N"], Float[Tensor, "N"]]:
     """Index of and distance [m] to the Gaussian closest to each point."""
+    if means.device.type != "cpu":
+        return _nearest_in_batches(points, means.detach())
     distance, index = KDTree(means.detach().numpy()).query(points.numpy())
     return torch.from_numpy(np.asarray(index)), torch.from_numpy(np.asarray(distance)).float()
+
+
+def _nearest_in_batches(
+    points: Float[Tensor, "N 3"], means: Float[Tensor, "M 3"]
+) -> tuple[Int64[Tensor, "N"], Float[Tensor, "N"]]:
+    """Twin of the tree for a GPU: all distances, some points at a time."""
+    rows = max(1, MOST_DISTANCES // max(1, len(means)))
+    found = [
+        # No matrix product: |a|² + |b|² − 2ab loses millimetres in single precision.
+        torch.cdist(part, means, compute_mode="donot_use_mm_for_euclid_dist").min(dim=1)
+        for part in points.split(rows)
+    ]
+    return torch.cat([row.indices for row in found]), torch.cat([row.values for row in found])
 
 
 def position_loss(

@@ -21,6 +21,7 @@ GAUSSIAN_SHAPES: dict[str, Shape] = {
 }
 
 _STATE = ("exp_avg", "exp_avg_sq")
+_KEPT = (*_STATE, "step")
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class TrainableGaussians:
     def __init__(self, gaussians: Gaussians, rates: LearningRates) -> None:
         self.rates = rates
         #: Row at the start that each Gaussian is or stems from; −1: none.
-        self.origin = torch.arange(len(gaussians))
+        self.origin = torch.arange(len(gaussians), device=gaussians.means.device)
         #: Whether rows have come or gone since the start.
         self.edited = False
         # Row-major whatever came: kernels round differently on another layout, and a checkpoint
@@ -63,6 +64,11 @@ class TrainableGaussians:
                 for name, leaf in self.leaves.items()
             ]
         )
+
+    @property
+    def device(self) -> torch.device:
+        """Where the Gaussians are."""
+        return self.origin.device
 
     @property
     def gaussians(self) -> Gaussians:
@@ -94,9 +100,9 @@ class TrainableGaussians:
         if new is not None or not bool(keep.all()):
             self.edited = True
         old = {name: self.optimiser.state.get(leaf, {}) for name, leaf in self.leaves.items()}
-        added = dict((new or Gaussians.none()).items())
+        added = dict((new or Gaussians.none()).to(self.device).items())
         count = len(added["means"])
-        stems = torch.full((count,), -1) if parents is None else self.origin[parents]
+        stems = self.origin.new_full((count,), -1) if parents is None else self.origin[parents]
         self.origin = torch.cat([self.origin[keep], stems])
         values = {name: leaf.detach() for name, leaf in self.leaves.items()} | dict(replaced or {})
         self._adopt(
@@ -115,16 +121,20 @@ class TrainableGaussians:
 
     def state(self) -> dict[str, np.ndarray]:
         """Parameters and moments as arrays, for a checkpoint without pickle."""
-        arrays = {"edited": np.array(self.edited), "origin": self.origin.numpy()}
+        arrays = {"edited": np.array(self.edited), "origin": self.origin.cpu().numpy()}
         for name, leaf in self.leaves.items():
-            arrays[name] = leaf.detach().numpy()
+            arrays[name] = leaf.detach().cpu().numpy()
             state = self.optimiser.state.get(leaf, {})
-            for key in (*_STATE, "step") if state else ():
-                arrays[f"{name}.{key}"] = state[key].numpy()
+            for key in _KEPT if state else ():
+                arrays[f"{name}.{key}"] = state[key].cpu().numpy()
         return arrays
 
     @staticmethod
-    def restore(arrays: dict[str, np.ndarray], rates: LearningRates) -> TrainableGaussians:
+    def restore(
+        arrays: dict[str, np.ndarray],
+        rates: LearningRates,
+        device: torch.device | str = "cpu",
+    ) -> TrainableGaussians:
         """Rebuilds what `state` returned, bit for bit.
 
         Raises:
@@ -132,15 +142,15 @@ class TrainableGaussians:
         """
         try:
             fields = {name: torch.from_numpy(arrays[name].copy()) for name in GAUSSIAN_SHAPES}
-            result = TrainableGaussians(Gaussians(**fields), rates)
+            result = TrainableGaussians(Gaussians(**fields).to(torch.device(device)), rates)
             result.edited = bool(arrays["edited"])
-            result.origin = torch.from_numpy(arrays["origin"].copy())
+            result.origin = torch.from_numpy(arrays["origin"].copy()).to(device)
             for name, leaf in result.leaves.items():
                 if f"{name}.step" in arrays:
-                    result.optimiser.state[leaf] = {
-                        key: torch.from_numpy(arrays[f"{name}.{key}"].copy())
-                        for key in (*_STATE, "step")
-                    }
+                    kept = {key: torch.from_numpy(arrays[f"{name}.{key}"].copy()) for key in _KEPT}
+                    # Adam counts steps on the CPU.
+                    moments = {key: kept[key].to(device) for key in _STATE}
+                    result.optimiser.state[leaf] = {**moments, "step": kept["step"]}
                     if any(result.optimiser.state[leaf][key].shape != leaf.shape for key in _STATE):
                         raise RfgsFormatError(
                             f"checkpoint whose moments of {name} have another shape than "

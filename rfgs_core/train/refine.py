@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -63,6 +64,16 @@ class Task:
     """Sample points of the paper's losses; None without them."""
     weighted: bool
     """Whether eq. 5 weighs its points by ‖φ‖."""
+
+    def to(self, device: torch.device) -> Task:
+        """The task for Gaussians on a device; links and paths go there when they are used."""
+        return replace(
+            self,
+            comparison=self.comparison.to(device),
+            target=self.target.to(device),
+            noise=self.noise.to(device),
+            points=None if self.points is None else self.points.to(device),
+        )
 
     @staticmethod
     def of(observations: Observations, config: TrainConfig, seed: int, encoder: Encoder) -> Task:
@@ -126,7 +137,7 @@ def _loss(
     points: SamplePoints | None,
     band: slice,
 ) -> Float[Tensor, ""]:
-    loss = torch.zeros(())
+    loss = gaussians.means.new_zeros(())
     if points is not None:
         loss = loss + paper_loss(gaussians, points, task.weighted)
     if len(links):
@@ -162,7 +173,9 @@ def refine(
     Raises:
         RfgsError: The loss is not a number; the last good state is then in `checkpoint`.
     """
-    task = Task.of(observations, config, seed, encoder)
+    device = torch.device(config.device)
+    task = Task.of(observations, config, seed, encoder).to(device)
+    before, state = state, state.to(device)
     rates = LearningRates() if config.recipe == "paper" else CHANNEL_RATES
     trained, first, memory = _resume(checkpoint, state.gaussians, rates)
     density = density_control(observations, state, config, seed, task)
@@ -178,7 +191,7 @@ def refine(
             loss = loss + continuity.loss(trained.gaussians, trained.origin)
         if not torch.isfinite(loss):
             last_good.stop(step, loss, task.target, trained)
-        last_good.remember(_arrays(step - 1, trained, density))
+        last_good.remember(partial(_arrays, step - 1, trained, density))
         trained.slow_to(rate_of_step(step, config))
         trained.optimiser.zero_grad()
         loss.backward()
@@ -190,14 +203,15 @@ def refine(
             scalars(step, {"loss": float(loss.detach()), "Gaussians": len(trained.gaussians)})
         if on_step is not None:
             on_step(float(loss.detach()), len(trained.gaussians))
-    return _with_gaussians(state, trained, config)
+    return _with_gaussians(before, trained, config)
 
 
 def _continuity(state: FrameState, config: TrainConfig) -> Continuity | None:
     if state.goes_on is None or config.temporal == 0.0:
         return None
     means = state.gaussians.means.detach().clone()
-    return Continuity(means, torch.from_numpy(state.goes_on), config.temporal)
+    goes_on = torch.from_numpy(state.goes_on).to(means.device)
+    return Continuity(means, goes_on, config.temporal)
 
 
 def density_control(
@@ -239,7 +253,7 @@ def _arrays(
 
 def _resume(
     checkpoint: Path | None, start: Gaussians, rates: LearningRates
-) -> tuple[TrainableGaussians, int, dict[str, np.ndarray]]:
+) -> tuple[TrainableGaussians, int, dict[str, Tensor]]:
     if checkpoint is None or not checkpoint.exists():
         return TrainableGaussians(start, rates), 0, {}
     arrays = load_arrays(
@@ -247,9 +261,14 @@ def _resume(
         "delete it to start this frame over",
         {**GAUSSIAN_SHAPES, "edited": (), "origin": ("M",), "finished_steps": ()},
     )
-    mark = "density."
-    memory = {k.removeprefix(mark): v for k, v in arrays.items() if k.startswith(mark)}
-    return TrainableGaussians.restore(arrays, rates), int(arrays["finished_steps"]), memory
+    mark, device = "density.", start.means.device
+    memory = {
+        name.removeprefix(mark): torch.from_numpy(value.copy()).to(device)
+        for name, value in arrays.items()
+        if name.startswith(mark)
+    }
+    trained = TrainableGaussians.restore(arrays, rates, device)
+    return trained, int(arrays["finished_steps"]), memory
 
 
 def _with_gaussians(
@@ -259,10 +278,10 @@ def _with_gaussians(
 
     With the paper's objective features are no reflectivities, and all powers are new.
     """
-    gaussians = trained.gaussians.detach()
+    gaussians = trained.gaussians.detach().to(state.gaussians.means.device)
     if not trained.edited:
         return replace(state, gaussians=gaussians)
-    origin = trained.origin
+    origin = trained.origin.to(gaussians.means.device)
     unused = state.unused_track
     tracks = {"track_id": _tracks(state.track_id, origin.numpy(), unused), "next_track": unused}
     if config.objective == "paper":

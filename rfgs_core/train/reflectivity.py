@@ -44,14 +44,15 @@ def fitted_reflectivities(
     Returns:
         One per Gaussian; None where the radio reports powers per delay, which have no phases.
     """
-    comparison = comparison_of(observations)
+    device = gaussians.means.device
+    comparison = comparison_of(observations).to(device)
     channel = Channel.of(observations, observations.links, observations.tones)
     with torch.no_grad():
         shadow = comparison.linear(channel.shadowed(head, gaussians))
     if shadow is None:
         return None
     measured = comparison.measured()
-    noise = noise_per_link(observations, measured, unexplained)
+    noise = noise_per_link(observations, measured, unexplained).to(device)
     target = measured - shadow
     return posterior_mean(channel, head, gaussians, target, noise, power, iterations, comparison)
 
@@ -79,7 +80,7 @@ def posterior_mean(
         comparison: What of the change is reported; None: all of it.
     """
     root, weight = torch.sqrt(power), torch.rsqrt(noise)[:, None]
-    zero = torch.zeros(len(gaussians), dtype=torch.complex64, requires_grad=True)
+    zero = torch.zeros_like(root, dtype=torch.complex64).requires_grad_(True)
 
     def reported(gamma: Tensor) -> Tensor:
         change = channel.scattered(head, gaussians, gamma)

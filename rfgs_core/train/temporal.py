@@ -40,6 +40,6 @@ class Continuity:
         """
         rows = torch.nonzero((origin >= 0) & self.goes_on[origin.clamp(min=0)])[:, 0]
         if not len(rows):
-            return torch.zeros(())
+            return gaussians.means.new_zeros(())
         step = (gaussians.means[rows] - self.expected[origin[rows]]) / STEP_M
         return self.weight * torch.mean(torch.sum(step**2, dim=1))

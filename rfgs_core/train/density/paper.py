@@ -71,12 +71,12 @@ def redundant(
     means: Float[Tensor, "M 3"], opacities: Float[Tensor, "M"], spacing_m: float
 ) -> Bool[Tensor, "M"]:
     """Gaussians that have a more opaque neighbour within `spacing_m`."""
-    close = KDTree(means.detach().numpy()).query_pairs(spacing_m, output_type="ndarray")
+    close = KDTree(means.detach().cpu().numpy()).query_pairs(spacing_m, output_type="ndarray")
     marked = np.zeros(len(means), dtype=bool)
-    alpha = opacities.detach().numpy()
+    alpha = opacities.detach().cpu().numpy()
     first, second = close[:, 0], close[:, 1]
     marked[np.where(alpha[first] < alpha[second], first, second)] = True
-    return torch.from_numpy(marked)
+    return torch.from_numpy(marked).to(means.device)
 
 
 @dataclass
@@ -104,8 +104,8 @@ class PaperDensity:
     def _watch(self, step: int, trained: TrainableGaussians, points: SamplePoints) -> None:
         since_prune = step % self.rule.prune_every or self.rule.prune_every
         if len(self.error_sum) != len(trained.gaussians) or since_prune == 1:
-            self.error_sum = torch.zeros(len(trained.gaussians))
-            self.error_count = torch.zeros(len(trained.gaussians))
+            self.error_sum = trained.leaves["means"].new_zeros(len(trained.gaussians))
+            self.error_count = torch.zeros_like(self.error_sum)
         if since_prune <= self.rule.prune_every - self.rule.error_window:
             return
         with torch.no_grad():
@@ -132,26 +132,29 @@ class PaperDensity:
         chosen = torch.nonzero(add)[:room, 0]
         if len(chosen) == 0:
             return
-        quats = torch.zeros(len(chosen), 4)
+        xyz = points.xyz[chosen]
+        quats = xyz.new_zeros(len(chosen), 4)
         quats[:, 0] = 1.0
         new = Gaussians(
-            means=points.xyz[chosen],
+            means=xyz,
             quats=quats,
-            log_scales=torch.full((len(chosen), 3), math.log(self.rule.scale_m)),
-            logit_opacities=torch.full(
+            log_scales=torch.full_like(xyz, math.log(self.rule.scale_m)),
+            logit_opacities=xyz.new_full(
                 (len(chosen),), math.log(self.rule.opacity / (1 - self.rule.opacity))
             ),
             features=points.features[chosen],
         )
-        trained.edit_rows(torch.ones(len(trained.gaussians), dtype=torch.bool), new)
+        trained.edit_rows(torch.ones_like(trained.origin, dtype=torch.bool), new)
         self.error_sum = torch.zeros(0)
 
     def state(self) -> dict[str, np.ndarray]:
         """Feature errors of the current window."""
-        return {"error_sum": self.error_sum.numpy(), "error_count": self.error_count.numpy()}
+        return {
+            "error_sum": self.error_sum.cpu().numpy(),
+            "error_count": self.error_count.cpu().numpy(),
+        }
 
-    def resume(self, arrays: Mapping[str, np.ndarray]) -> None:
+    def resume(self, memory: Mapping[str, Tensor]) -> None:
         """See `DensityControl`."""
-        if "error_sum" in arrays:
-            self.error_sum = torch.from_numpy(arrays["error_sum"].copy())
-            self.error_count = torch.from_numpy(arrays["error_count"].copy())
+        if "error_sum" in memory:
+            self.error_sum, self.error_count = memory["error_sum"], memory["error_count"]

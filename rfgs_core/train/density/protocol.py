@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
+from torch import Tensor
 
 from rfgs_core.train.losses import SamplePoints
 from rfgs_core.train.parameters import TrainableGaussians
@@ -31,8 +32,8 @@ class DensityControl(Protocol):
         """What it remembers from step to step, for a checkpoint."""
         ...
 
-    def resume(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """Takes up what `state` returned; missing names start over."""
+    def resume(self, memory: Mapping[str, Tensor]) -> None:
+        """Takes up what `state` returned, on the Gaussians' device; missing names start over."""
         ...
 
 
@@ -48,5 +49,5 @@ class NoDensity:
         """Nothing."""
         return {}
 
-    def resume(self, arrays: Mapping[str, np.ndarray]) -> None:
+    def resume(self, memory: Mapping[str, Tensor]) -> None:
         """Nothing."""

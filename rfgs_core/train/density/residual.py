@@ -111,11 +111,12 @@ class ResidualDensity:
         room = min(self.rule.cap - len(g), max(1, int(self.rule.most_share * len(g))))
         if not left.changed or room <= 0:
             return Gaussians.none()
-        points = residual_peaks(pair_maps(left), g.means.double().numpy(), self.rule)[:room]
-        new = gaussians_at(points, outward_normals(points, self.bodies))
+        near_m = g.means.double().cpu().numpy()
+        points = residual_peaks(pair_maps(left), near_m, self.rule)[:room]
+        new = gaussians_at(points, outward_normals(points, self.bodies)).to(g.means.device)
         new = replace(new, logit_opacities=g.logit_opacities.median().expand(len(new)).clone())
         power = energy.median().expand(len(new))
-        gamma = torch.polar(power.sqrt(), torch.zeros(len(new)))
+        gamma = torch.polar(power.sqrt(), torch.zeros_like(power))
         if len(new) and left.kind != "delay_power":
             residual = self.comparison.measured() - self.comparison.predicted(
                 change, np.arange(len(self.channel.links))
@@ -137,5 +138,5 @@ class ResidualDensity:
         """Nothing: the residual follows from the parameters."""
         return {}
 
-    def resume(self, arrays: Mapping[str, np.ndarray]) -> None:
+    def resume(self, memory: Mapping[str, Tensor]) -> None:
         """See `DensityControl`."""

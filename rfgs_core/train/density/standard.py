@@ -71,7 +71,9 @@ class StandardRule:
 def _children(parents: Gaussians, shrink: float, generator: torch.Generator) -> Gaussians:
     """Two narrower Gaussians drawn from each parent: all first ones, then all second ones."""
     twice = Gaussians.join(parents, parents)
-    drawn = torch.randn(twice.means.shape, generator=generator) * twice.scales
+    # Drawn on the CPU: the same numbers whatever the device.
+    drawn = torch.randn(twice.means.shape, generator=generator).to(twice.means.device)
+    drawn = drawn * twice.scales
     offset = torch.einsum("mij,mj->mi", twice.rotations, drawn)
     return replace(
         twice, means=twice.means + offset, log_scales=twice.log_scales - math.log(shrink)
@@ -112,11 +114,12 @@ class StandardDensity:
         if step % rule.reset_every == 0:
             top = math.log(rule.reset_opacity / (1 - rule.reset_opacity))
             logits = trained.gaussians.logit_opacities.detach().clamp(max=top)
-            everyone = torch.ones(len(logits), dtype=torch.bool)
+            everyone = torch.ones_like(logits, dtype=torch.bool)
             trained.edit_rows(everyone, replaced={"logit_opacities": logits})
 
     def _forget(self, trained: TrainableGaussians) -> None:
-        self.gradient_sum, self.steps = torch.zeros(len(trained.gaussians)), 0
+        self.gradient_sum = trained.leaves["means"].new_zeros(len(trained.gaussians))
+        self.steps = 0
 
     def _densify(self, step: int, trained: TrainableGaussians) -> None:
         g = trained.gaussians.detach()
@@ -130,7 +133,7 @@ class StandardDensity:
         clone, split = hot & ~large, hot & large
         generator = torch.Generator().manual_seed(sub_seed(self.seed, "split", step))
         children = _children(g.select(split), self.rule.shrink, generator)
-        rows = torch.arange(len(g))
+        rows = torch.arange(len(g), device=trained.device)
         trained.edit_rows(
             ~drop & ~split,
             Gaussians.join(g.select(clone), children),
@@ -148,10 +151,11 @@ class StandardDensity:
 
     def state(self) -> dict[str, np.ndarray]:
         """Gradients since the last densification."""
-        return {"gradient_sum": self.gradient_sum.numpy(), "gradient_steps": np.array(self.steps)}
+        gradient_sum = self.gradient_sum.cpu().numpy()
+        return {"gradient_sum": gradient_sum, "gradient_steps": np.array(self.steps)}
 
-    def resume(self, arrays: Mapping[str, np.ndarray]) -> None:
+    def resume(self, memory: Mapping[str, Tensor]) -> None:
         """See `DensityControl`."""
-        if "gradient_sum" in arrays:
-            self.gradient_sum = torch.from_numpy(arrays["gradient_sum"].copy())
-            self.steps = int(arrays["gradient_steps"])
+        if "gradient_sum" in memory:
+            self.gradient_sum = memory["gradient_sum"]
+            self.steps = int(memory["gradient_steps"])

@@ -18,8 +18,12 @@ from rfgs_core.radio import Radio, layout, place_devices
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.run import Run
 from rfgs_core.run.training import train_sequence
+from rfgs_core.train.channel import Channel
 from rfgs_core.train.config import TrainConfig
+from rfgs_core.train.frame import FrameState
+from rfgs_core.train.head import RadioHead
 from rfgs_core.train.observations import Observations
+from rfgs_core.train.tracks import Tracks
 
 BOUNDS_M = np.array([[0.0, 0.0, 0.0], [4.0, 3.5, 2.5]])
 
@@ -101,6 +105,32 @@ def make_gaussians() -> Callable[..., Gaussians]:
         )
 
     return make
+
+
+@pytest.fixture
+def head() -> RadioHead:
+    """A head for Wi-Fi."""
+    return RadioHead.create(0, 0.0517, 0.04, 0.02)
+
+
+@pytest.fixture
+def observations(make_observations, make_gaussians, head) -> Observations:
+    """What a dozen Gaussians do to the channel."""
+    empty = make_observations()
+    channel = Channel.of(empty, empty.links, empty.tones)
+    delta = np.zeros_like(empty.delta)
+    delta[channel.tx, channel.rx] = channel.change(head, make_gaussians(12)).numpy()
+    return empty.with_delta(delta)
+
+
+@pytest.fixture
+def state(make_gaussians, head) -> FrameState:
+    """The same Gaussians a little off."""
+    gaussians = make_gaussians(12)
+    gaussians.means += 0.01 * torch.randn(12, 3, generator=torch.Generator().manual_seed(7))
+    gaussians.features *= 0.5
+    tracks = Tracks.begun(np.array([[2.0, 1.7]]), time_s=0.0)
+    return FrameState(gaussians, torch.full((12,), 1e-3), head, tracks, np.arange(12))
 
 
 @pytest.fixture(scope="session")

@@ -17,36 +17,9 @@ from rfgs_core.train.comparison import comparison_of
 from rfgs_core.train.config import TrainConfig
 from rfgs_core.train.first_powers import noise_per_link
 from rfgs_core.train.frame import FrameState
-from rfgs_core.train.head import RadioHead
 from rfgs_core.train.losses import channel_loss
 from rfgs_core.train.observations import Observations
 from rfgs_core.train.refine import refine
-from rfgs_core.train.tracks import Tracks
-
-
-@pytest.fixture
-def head() -> RadioHead:
-    return RadioHead.create(0, 0.0517, 0.04, 0.02)
-
-
-@pytest.fixture
-def observations(make_observations, make_gaussians, head) -> Observations:
-    """What a dozen Gaussians do to the channel."""
-    empty = make_observations()
-    channel = Channel.of(empty, empty.links, empty.tones)
-    delta = np.zeros_like(empty.delta)
-    delta[channel.tx, channel.rx] = channel.change(head, make_gaussians(12)).numpy()
-    return empty.with_delta(delta)
-
-
-@pytest.fixture
-def state(make_gaussians, head) -> FrameState:
-    """The same Gaussians a little off."""
-    gaussians = make_gaussians(12)
-    gaussians.means += 0.01 * torch.randn(12, 3, generator=torch.Generator().manual_seed(7))
-    gaussians.features *= 0.5
-    tracks = Tracks.begun(np.array([[2.0, 1.7]]), time_s=0.0)
-    return FrameState(gaussians, torch.full((12,), 1e-3), head, tracks, np.arange(12))
 
 
 def cost(observations: Observations, state: FrameState, config: TrainConfig) -> float:

@@ -14,20 +14,23 @@ from rfgs_core.train import bench
 def test_it_stops_when_the_loss_stands_still(
     tiny_dataset: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for name, value in {"GAUSSIANS": 40, "WINDOW": 5, "LIMIT": 15}.items():
-        monkeypatch.setattr(bench, name, value)
-    found = bench.bench_training(tiny_dataset, "wifi", None)
+    monkeypatch.setattr(bench, "WINDOW", 5)
+    monkeypatch.setattr(bench, "LIMIT", 15)
+    few = bench.TrainingBench(gaussians=40)
+    found = bench.bench_training(tiny_dataset, "wifi", None, few)
     assert found["steps"] in (5, 10, 15)
     assert found["still"] or found["steps"] == 15
     assert 0.0 < found["start_s"] < found["train_s"]
     # Any change counts as standing still, or none does.
     monkeypatch.setattr(bench, "STILL", 1e9)
-    eager = bench.bench_training(tiny_dataset, "wifi", None)
+    eager = bench.bench_training(tiny_dataset, "wifi", None, few)
     assert eager["still"] and eager["steps"] == 5
     assert eager["loss_start"] == found["loss_start"]
     monkeypatch.setattr(bench, "STILL", 0.0)
-    patient = bench.bench_training(tiny_dataset, "wifi", None)
+    patient = bench.bench_training(tiny_dataset, "wifi", None, few)
     assert not patient["still"] and patient["steps"] == 15
+    asked = bench.bench_training(tiny_dataset, "wifi", None, bench.TrainingBench(40, steps=7))
+    assert asked["steps"] == 7 and asked["gaussians"] == 40
 
 
 def test_unknown_radios_are_named(tiny_dataset: Path) -> None:

@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The device that a fit computes on: whether it is there, and whether it is done."""
+
+from __future__ import annotations
+
+import importlib.util
+from typing import Literal
+
+import torch
+
+from rfgs_core.errors import MissingToolError
+
+#: cuda: the current GPU.
+Device = Literal["cpu", "cuda"]
+
+
+def need_device(device: Device) -> None:
+    """Refuses a GPU that is not there.
+
+    Raises:
+        MissingToolError: torch finds no GPU, or the compiler of its kernels is missing.
+    """
+    if device == "cpu":
+        return
+    if not torch.cuda.is_available():
+        raise MissingToolError(
+            f"--device cuda: torch {torch.__version__} finds no GPU; expected an NVIDIA driver and "
+            "a torch built for CUDA, or --device cpu; `rfgs info` shows what is there"
+        )
+    if importlib.util.find_spec("triton") is None:
+        raise MissingToolError("--device cuda compiles its kernels with triton: pip install triton")
+
+
+def finish_device() -> None:
+    """Waits for what a GPU has been asked to do, so that it can be timed."""
+    if torch.cuda.is_available():
+        torch.cuda.synchronize()

@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The propagation model on a GPU, differentiable in torch.
+
+Scattering goes through kernels of our own; shadows, of which there are far fewer, through the
+plain twin on the device, some paths at a time. Results are single precision.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import torch
+from jaxtyping import Complex, Float
+from torch import Tensor
+from torch.autograd.function import once_differentiable
+from torch.utils.checkpoint import checkpoint
+
+from rfgs_core.propagation import reference
+from rfgs_core.propagation.covariance import packed_covariances
+from rfgs_core.propagation.geometry import EnvironmentPaths, Links, Tones
+from rfgs_core.propagation.kernels_triton import (
+    BY_GAIN,
+    BY_GROUP,
+    BY_MEANS,
+    BY_NORMALS,
+    BY_SHAPE,
+    ROWS,
+    TONES,
+    scatter_backward,
+    scatter_forward,
+)
+from rfgs_core.radio.constants import SPEED_OF_LIGHT
+
+#: Programs that keep a large GPU busy; fewer links or Gaussians are split further.
+PROGRAMS = 2048
+#: Splits never go below this many Gaussians or links.
+LEAST_GAUSSIANS, LEAST_LINKS = 8 * ROWS, 8
+#: Path–Gaussian pairs whose shadows are in memory at a time.
+MOST_SHADOWS = 1 << 24
+
+
+class _Chunks:
+    """Runs of neighbouring tones, at most `TONES` long, among those marked."""
+
+    def __init__(self, tones: Tones, marked: Tensor, device: torch.device) -> None:
+        rows, frequencies, column = [], [], 0
+        for start, count in tones.spans:
+            wanted = marked[column : column + count].tolist()
+            at = 0
+            while at < count:
+                end = at
+                while end < min(count, at + TONES) and wanted[end]:
+                    end += 1
+                if end > at:
+                    rows.append((column + at, end - at))
+                    frequencies.append((tones.f0 + tones.df * (start + at), tones.df))
+                at = max(end, at + 1)
+            column += count
+        cycles = torch.tensor(frequencies, dtype=torch.float64) / SPEED_OF_LIGHT
+        self.columns = column
+        self.table = torch.tensor(rows, dtype=torch.int32).to(device)
+        self.cycles_per_m = cycles.to(device)
+
+
+class _Scatter(torch.autograd.Function):
+    """H[link, tone] less its wavelengths; all tensors have the Gaussian axis last."""
+
+    @staticmethod
+    def forward(
+        ctx: Any,
+        means: Tensor,
+        shape: Tensor,
+        gain: Tensor,
+        visibility: Tensor,
+        normals: Tensor,
+        setting: tuple[float, Tensor, Tensor, _Chunks],
+    ) -> Tensor:
+        """Args: as `kernels_scatter.Cloud`; no visibility or normals: rows of length 0."""
+        sharpness, ends, group, chunks = setting
+        cloud = (
+            means.detach().double().contiguous(),
+            *(x.detach().float().contiguous() for x in (shape, gain, visibility, normals)),
+        )
+        flags = {"FACING": normals.shape[1] > 0, "WEIGHED": visibility.shape[1] > 0}
+        links, total, parts = len(ends), means.shape[1], len(chunks.table)
+        splits = _splits(links * parts, total, LEAST_GAUSSIANS)
+        per_split = -(-total // splits // ROWS) * ROWS
+        sums = means.new_zeros(splits, links, 2, chunks.columns, dtype=torch.float32)
+        if links and total and parts:
+            _launch(
+                *(scatter_forward, (links, parts, splits), flags),
+                *(*cloud, ends, group, chunks.table, chunks.cycles_per_m, sums),
+                *(total, chunks.columns, per_split, sharpness),
+            )
+        ctx.state = (cloud, setting, flags)
+        ctx.dtypes = tuple(x.dtype for x in (means, shape, gain, visibility, normals))
+        real, imaginary = sums.sum(dim=0).unbind(1)
+        return torch.complex(real, imaginary)
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, *grads: Tensor) -> tuple[Tensor | None, ...]:
+        """Chains the gradient of H to everything but the setting."""
+        cloud, (sharpness, ends, group, chunks), flags = ctx.state
+        means, _, _, visibility, normals = cloud
+        seed = torch.view_as_real(grads[0].conj().resolve_conj())
+        seed = seed.permute(0, 2, 1).float().contiguous()
+        links, total, parts = len(ends), means.shape[1], len(chunks.table)
+        rows = BY_GROUP + len(visibility)
+        splits = _splits(-(-total // ROWS), links, LEAST_LINKS)
+        per_split = -(-links // splits)
+        out = means.new_zeros(splits, rows, total, dtype=torch.float32)
+        if links and total and parts:
+            _launch(
+                *(scatter_backward, (-(-total // ROWS), splits), flags),
+                *(*cloud, ends, group, chunks.table, chunks.cycles_per_m, seed, out),
+                *(total, links, parts, chunks.columns, rows, per_split, sharpness),
+            )
+        summed = out.sum(dim=0)
+        result = (
+            summed[BY_MEANS:BY_SHAPE],
+            summed[BY_SHAPE:BY_GAIN],
+            summed[BY_GAIN:BY_NORMALS],
+            summed[BY_GROUP:] if flags["WEIGHED"] else visibility,
+            summed[BY_NORMALS:BY_GROUP] if flags["FACING"] else normals,
+        )
+        return (*(x.to(dtype) for x, dtype in zip(result, ctx.dtypes, strict=True)), None)
+
+
+def _launch(kernel: Any, grid: tuple[int, ...], flags: dict[str, bool], *args: Any) -> None:
+    """Runs a kernel: one program per place of the grid."""
+    kernel[grid](*args, **flags, ROWS=ROWS, TONES=TONES)
+
+
+def _splits(programs: int, count: int, least: int) -> int:
+    """Into how many parts a sum of `count` terms is cut so that the device has enough to do."""
+    return max(1, min(-(-PROGRAMS // max(programs, 1)), count // least))
+
+
+def scatter(
+    means: Float[Tensor, "gaussian 3"],
+    quats: Float[Tensor, "gaussian 4"],
+    scales_rf: Float[Tensor, "gaussian 3"],
+    gamma: Complex[Tensor, "gaussian knot"],
+    links: Links,
+    tones: Tones,
+    normals: Float[Tensor, "gaussian 3"] | None = None,
+    sharpness: float = 0.0,
+    visibility: Float[Tensor, "gaussian group"] | None = None,
+) -> Complex[Tensor, "link subcarrier"]:
+    """Twin of `rfgs_core.propagation.scatter` on the device of `means`, in single precision."""
+    device, knots = means.device, gamma.shape[1]
+    shape = packed_covariances(quats, scales_rf)
+    group = links.group
+    if visibility is None:
+        visibility, group = means.new_zeros(0, 1), None
+    if group is None:
+        group = torch.zeros(len(links), dtype=torch.int64, device=device)
+    if normals is None or sharpness == 0.0:
+        normals = means.new_zeros(0, 3)
+    ends = torch.cat([links.tx_xyz, links.rx_xyz], dim=1).double().contiguous()
+    total = means.new_zeros(len(links), tones.num_selected, dtype=torch.complex64)
+    for knot in range(knots):
+        weight = reference.gamma_at_tones(torch.eye(knots, dtype=torch.float64)[[knot]], tones)[0]
+        setting = (sharpness, ends, group, _Chunks(tones, weight > 0, device))
+        gain = torch.stack([gamma[:, knot].real, gamma[:, knot].imag])
+        part = _Scatter.apply(means.T, shape, gain, visibility.T, normals.T, setting)
+        total = total + part * weight.to(device, torch.float32)
+    wavelength_m = (SPEED_OF_LIGHT / tones.freq_hz).to(device, torch.float32)
+    return (total * (wavelength_m / (4 * math.pi) ** 1.5)).to(gamma.dtype)
+
+
+def shadow(
+    means: Float[Tensor, "gaussian 3"],
+    quats: Float[Tensor, "gaussian 4"],
+    scales: Float[Tensor, "gaussian 3"],
+    alpha: Float[Tensor, "gaussian"],
+    paths: EnvironmentPaths,
+) -> Complex[Tensor, "path"]:
+    """Twin of `rfgs_core.propagation.shadow`: the plain one, computed again for gradients."""
+    rows = max(1, MOST_SHADOWS // max(1, len(means)))
+    parts = [
+        checkpoint(
+            *(reference.shadow, means, quats, scales, alpha, paths.rows(slice(at, at + rows))),
+            use_reentrant=False,
+        )
+        for at in range(0, len(paths), rows)
+    ]
+    if not parts:
+        return torch.zeros(0, dtype=scales.dtype.to_complex(), device=means.device)
+    return torch.cat(parts)

@@ -1,0 +1,264 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scattering of radio Gaussians on a GPU: forward sum and hand-derived gradients.
+
+The formulas are those of `kernels_scatter` and `kernels_scatter_gradient`. Lengths and the turns
+of a chunk's first tone are double; everything that exists per link, tone and Gaussian is single
+precision and lives in registers. Half precision has no place here: no matrix is multiplied, and a
+phase of 10 bits would be worse than the quantisation of a radio. Sums run in a fixed order, so
+the same device gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import triton
+import triton.language as tl
+
+#: Gaussians and tones of one tile: sixteen terms per thread of four warps.
+ROWS, TONES = 64, 32
+#: Rows of the gradient: positions, covariances, real and imaginary gain, normals; then groups.
+BY_MEANS, BY_SHAPE, BY_GAIN, BY_NORMALS, BY_GROUP = 0, 3, 9, 11, 14
+
+_TWO_PI = tl.constexpr(6.283185307179586)
+#: Where rows behind the last Gaussian stand [m]: nowhere near an antenna.
+_FAR_M = tl.constexpr(1e3)
+
+
+@triton.jit
+def _leg(end, px, py, pz):
+    """Length (double), unit vector and inverse length (single) from Gaussians to an antenna."""
+    x, y, z = tl.load(end) - px, tl.load(end + 1) - py, tl.load(end + 2) - pz
+    length = tl.sqrt(x * x + y * y + z * z)
+    inverse = 1.0 / length.to(tl.float32)
+    return (
+        length,
+        x.to(tl.float32) * inverse,
+        y.to(tl.float32) * inverse,
+        z.to(tl.float32) * inverse,
+        inverse,
+    )
+
+
+@triton.jit
+def _three(table, row, mask, total, other):
+    """Three rows of a table."""
+    return (
+        tl.load(table + row, mask, other=other),
+        tl.load(table + total + row, mask, other=other),
+        tl.load(table + 2 * total + row, mask, other=other),
+    )
+
+
+@triton.jit
+def _spread(shape, row, mask, total, qx, qy, qz):
+    """Σ q and q^T Σ q of packed covariances."""
+    xx, yy, zz = _three(shape, row, mask, total, 0.0)
+    xy, xz, yz = _three(shape + 3 * total, row, mask, total, 0.0)
+    sx, sy, sz = (
+        xx * qx + xy * qy + xz * qz,
+        xy * qx + yy * qy + yz * qz,
+        xz * qx + yz * qy + zz * qz,
+    )
+    return sx, sy, sz, sx * qx + sy * qy + sz * qz
+
+
+@triton.jit
+def _sine_cosine(turns):
+    """Sine and cosine of 2 pi `turns` in [-0.5, 0.5], as `lanes` has them: no branch, no table."""
+    x = turns * turns
+    s = -0.0070283 * x + 0.08205035
+    s = s * x - 0.59925219
+    s = s * x + 2.55016332
+    s = s * x - 5.16771276
+    s = (s * x + 3.14159265) * turns
+    c = 1.83999059e-3 * x - 2.57763173e-2
+    c = c * x + 0.235325437
+    c = c * x - 1.33526232
+    c = c * x + 4.05871211
+    c = c * x - 4.93480220
+    c = c * x + 1.0
+    return 2.0 * s * c, 1.0 - 2.0 * s * s
+
+
+@triton.jit
+def _echo(length_m, spread, tone, TONES: tl.constexpr):
+    """Re z, Im z [row, tone] and wavenumbers of a chunk, z = exp(-k^2 Q / 2 - jkd)."""
+    cycles, step = tl.load(tone), tl.load(tone + 1)
+    turns, turn = length_m * cycles, length_m * step
+    turns = (turns - tl.floor(turns + 0.5)).to(tl.float32)
+    turn = (turn - tl.floor(turn + 0.5)).to(tl.float32)
+    offset = tl.arange(0, TONES).to(tl.float32)
+    k = _TWO_PI * (cycles.to(tl.float32) + step.to(tl.float32) * offset)
+    turns = turns[:, None] + turn[:, None] * offset[None, :]
+    sine, cosine = _sine_cosine(turns - tl.floor(turns + 0.5))
+    size = tl.exp(-0.5 * spread[:, None] * (k * k)[None, :])
+    return size * cosine, -size * sine, k
+
+
+# One binary whatever the counts: density control changes them all the time.
+@triton.jit(do_not_specialize=["total", "columns", "per_split"])
+def scatter_forward(
+    means,
+    shape,
+    gain,
+    visibility,
+    normals,
+    ends,
+    group,
+    chunk,
+    tone,
+    out,
+    total,
+    columns,
+    per_split,
+    sharpness,
+    FACING: tl.constexpr,
+    WEIGHED: tl.constexpr,
+    ROWS: tl.constexpr,
+    TONES: tl.constexpr,
+):
+    """Writes out[split, link, re/im, column]: sums over a split of the Gaussians, one chunk."""
+    link, part, split = tl.program_id(0), tl.program_id(1), tl.program_id(2)
+    offset = tl.arange(0, TONES)
+    real, imaginary = tl.zeros([TONES], tl.float32), tl.zeros([TONES], tl.float32)
+    for first in range(split * per_split, tl.minimum(total, (split + 1) * per_split), ROWS):
+        row = first + tl.arange(0, ROWS)
+        mask = row < total
+        px, py, pz = _three(means, row, mask, total, _FAR_M)
+        d_t, tx, ty, tz, by_t = _leg(ends + 6 * link, px, py, pz)
+        d_r, rx, ry, rz, by_r = _leg(ends + 6 * link + 3, px, py, pz)
+        _, _, _, spread = _spread(shape, row, mask, total, tx + rx, ty + ry, tz + rz)
+        weight = by_t * by_r
+        if FACING:
+            nx, ny, nz = _three(normals, row, mask, total, 0.0)
+            weight *= tl.sigmoid(sharpness * (nx * tx + ny * ty + nz * tz))
+            weight *= tl.sigmoid(sharpness * (nx * rx + ny * ry + nz * rz))
+        if WEIGHED:
+            weight *= tl.load(visibility + tl.load(group + link) * total + row, mask, other=0.0)
+        g = weight * tl.load(gain + row, mask, other=0.0)
+        h = weight * tl.load(gain + total + row, mask, other=0.0)
+        zr, zi, _ = _echo(d_t + d_r, spread, tone + 2 * part, TONES)
+        real += tl.sum(g[:, None] * zr - h[:, None] * zi, axis=0)
+        imaginary += tl.sum(g[:, None] * zi + h[:, None] * zr, axis=0)
+    column, count = tl.load(chunk + 2 * part), tl.load(chunk + 2 * part + 1)
+    target = out + ((split * tl.num_programs(0) + link) * 2).to(tl.int64) * columns + column
+    tl.store(target + offset, real, offset < count)
+    tl.store(target + columns + offset, imaginary, offset < count)
+
+
+@triton.jit
+def _across(x, y, z, ux, uy, uz):
+    """Part of a vector that is perpendicular to the unit vector u."""
+    along = x * ux + y * uy + z * uz
+    return x - along * ux, y - along * uy, z - along * uz
+
+
+@triton.jit
+def _store_three(out, row, mask, total, x, y, z):
+    tl.store(out + row, x, mask)
+    tl.store(out + total + row, y, mask)
+    tl.store(out + 2 * total + row, z, mask)
+
+
+@triton.jit(do_not_specialize=["total", "links", "chunks", "columns", "rows_out", "per_split"])
+def scatter_backward(
+    means,
+    shape,
+    gain,
+    visibility,
+    normals,
+    ends,
+    group,
+    chunk,
+    tone,
+    seed,
+    out,
+    total,
+    links,
+    chunks,
+    columns,
+    rows_out,
+    per_split,
+    sharpness,
+    FACING: tl.constexpr,
+    WEIGHED: tl.constexpr,
+    ROWS: tl.constexpr,
+    TONES: tl.constexpr,
+):
+    """Writes out[split, rows_out, gaussian], given seed[link, re/im, column] = conj(dL/dH)."""
+    split = tl.program_id(1)
+    row = tl.program_id(0) * ROWS + tl.arange(0, ROWS)
+    mask = row < total
+    offset = tl.arange(0, TONES)
+    px, py, pz = _three(means, row, mask, total, _FAR_M)
+    g, h = tl.load(gain + row, mask, other=0.0), tl.load(gain + total + row, mask, other=0.0)
+    none = tl.zeros([ROWS], tl.float32)
+    gx, gy, gz, by_gain_r, by_gain_i = none, none, none, none, none
+    gxx, gyy, gzz, gxy, gxz, gyz = none, none, none, none, none, none
+    normal_x, normal_y, normal_z, nx, ny, nz = none, none, none, none, none, none
+    if FACING:
+        nx, ny, nz = _three(normals, row, mask, total, 0.0)
+    base = out + (split * rows_out).to(tl.int64) * total
+    for link in range(split * per_split, tl.minimum(links, (split + 1) * per_split)):
+        d_t, tx, ty, tz, by_t = _leg(ends + 6 * link, px, py, pz)
+        d_r, rx, ry, rz, by_r = _leg(ends + 6 * link + 3, px, py, pz)
+        qx, qy, qz = tx + rx, ty + ry, tz + rz
+        sx, sy, sz, spread = _spread(shape, row, mask, total, qx, qy, qz)
+        seen, hide_t, hide_r = by_t * by_r, none, none
+        if FACING:
+            hide_t = tl.sigmoid(-sharpness * (nx * tx + ny * ty + nz * tz))
+            hide_r = tl.sigmoid(-sharpness * (nx * rx + ny * ry + nz * rz))
+            seen *= (1.0 - hide_t) * (1.0 - hide_r)
+        weight = seen
+        if WEIGHED:
+            weight *= tl.load(visibility + tl.load(group + link) * total + row, mask, other=0.0)
+        by_weight, by_length, by_spread = none, none, none
+        for part in range(chunks):
+            zr, zi, k = _echo(d_t + d_r, spread, tone + 2 * part, TONES)
+            source = seed + 2 * link * columns + tl.load(chunk + 2 * part)
+            inside = offset < tl.load(chunk + 2 * part + 1)
+            u = tl.load(source + offset, inside, other=0.0)[None, :]
+            v = tl.load(source + columns + offset, inside, other=0.0)[None, :]
+            p, q = zr * u - zi * v, zr * v + zi * u
+            by_gain_r += weight * tl.sum(p, axis=1)
+            by_gain_i -= weight * tl.sum(q, axis=1)
+            s, t = g[:, None] * p - h[:, None] * q, g[:, None] * q + h[:, None] * p
+            by_weight += tl.sum(s, axis=1)
+            by_length += weight * tl.sum(k[None, :] * t, axis=1)
+            by_spread -= 0.5 * weight * tl.sum((k * k)[None, :] * s, axis=1)
+        # dd/dp = -u and du/dp = -(I - u u^T)/d for each antenna.
+        twice = 2.0 * by_spread
+        gxx += by_spread * qx * qx
+        gyy += by_spread * qy * qy
+        gzz += by_spread * qz * qz
+        gxy += twice * qx * qy
+        gxz += twice * qx * qz
+        gyz += twice * qy * qz
+        x1, y1, z1 = _across(twice * sx, twice * sy, twice * sz, tx, ty, tz)
+        x2, y2, z2 = _across(twice * sx, twice * sy, twice * sz, rx, ry, rz)
+        scale = by_weight * weight
+        near_t, near_r = scale * by_t - by_length, scale * by_r - by_length
+        gx += near_t * tx + near_r * rx - x1 * by_t - x2 * by_r
+        gy += near_t * ty + near_r * ry - y1 * by_t - y2 * by_r
+        gz += near_t * tz + near_r * rz - z1 * by_t - z2 * by_r
+        if FACING:
+            facing_t, facing_r = sharpness * scale * hide_t, sharpness * scale * hide_r
+            normal_x += facing_t * tx + facing_r * rx
+            normal_y += facing_t * ty + facing_r * ry
+            normal_z += facing_t * tz + facing_r * rz
+            x1, y1, z1 = _across(nx, ny, nz, tx, ty, tz)
+            x2, y2, z2 = _across(nx, ny, nz, rx, ry, rz)
+            facing_t, facing_r = facing_t * by_t, facing_r * by_r
+            gx -= facing_t * x1 + facing_r * x2
+            gy -= facing_t * y1 + facing_r * y2
+            gz -= facing_t * z1 + facing_r * z2
+        if WEIGHED:
+            # Nobody else adds here; atomic, since a warp must see what another one has stored.
+            target = base + (14 + tl.load(group + link)) * total + row
+            tl.atomic_add(target, by_weight * seen, mask)
+    _store_three(base, row, mask, total, gx, gy, gz)
+    _store_three(base + 3 * total, row, mask, total, gxx, gyy, gzz)
+    _store_three(base + 6 * total, row, mask, total, gxy, gxz, gyz)
+    tl.store(base + 9 * total + row, by_gain_r, mask)
+    tl.store(base + 10 * total + row, by_gain_i, mask)
+    if FACING:
+        _store_three(base + 11 * total, row, mask, total, normal_x, normal_y, normal_z)

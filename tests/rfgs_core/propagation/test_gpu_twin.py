@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The model on a GPU against its plain twin; without one, in Triton's interpreter on the CPU."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+import torch
+
+pytest.importorskip("triton", reason="kernels for a GPU need triton: pip install triton")
+
+from rfgs_core.propagation import Links, Tones, gpu, scatter, shadow
+
+DEVICE = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+SCATTER = ("means", "quats", "scales_rf", "gamma", "normals", "visibility")
+BANDS = [(5.72e9, 2.5e6, 1), (60e9, 12.5e6, 1), (3.1e9, 12.3e6, 4)]
+
+
+def value_and_gradients(run, cloud, backend, real) -> dict[str, torch.Tensor]:
+    """Output and gradients of a random real function of it."""
+    leaves = {
+        name: value.detach()
+        .to(DEVICE, real.to_complex() if value.is_complex() else real)
+        .requires_grad_(True)
+        for name, value in cloud.items()
+    }
+    output = run(leaves, backend)
+    generator = torch.Generator().manual_seed(5)
+    weight = torch.randn(*output.shape, 2, generator=generator, dtype=torch.float64).to(DEVICE)
+    grads = torch.autograd.grad((torch.view_as_real(output) * weight).sum(), list(leaves.values()))
+    return {"output": output.detach(), **dict(zip(leaves, grads, strict=True))}
+
+
+def assert_twins_agree(run, cloud) -> None:
+    fast = value_and_gradients(run, cloud, "triton", torch.float32)
+    plain = value_and_gradients(run, cloud, "torch", torch.float64)
+    for name, expected in plain.items():
+        error = (fast[name] - expected).norm() / expected.norm()
+        assert error < 1e-4, f"{name}: {error:.1e}"
+        assert expected.norm() > 0, name
+
+
+@pytest.mark.parametrize(("f0", "df", "knots"), BANDS)
+def test_scatter_is_the_plain_sum(make_cloud, make_links, monkeypatch, f0, df, knots) -> None:
+    # Three splits of the Gaussians and two of the links, the last ones not full.
+    monkeypatch.setattr(gpu, "LEAST_GAUSSIANS", 64)
+    monkeypatch.setattr(gpu, "LEAST_LINKS", 3)
+    every = make_cloud(145, f0, knots)
+    cloud = {name: every[name] for name in SCATTER}
+    links, tones = make_links(7), Tones(f0, df, 80, blocks=((0, 35), (60, 20)))
+
+    def run(values, backend):
+        return scatter(**values, links=links, tones=tones, sharpness=3.0, backend=backend)
+
+    assert_twins_agree(run, cloud)
+
+
+@pytest.mark.parametrize("left_out", [("normals",), ("visibility",), ("normals", "visibility")])
+def test_what_is_left_out_weighs_nothing(make_cloud, make_links, left_out) -> None:
+    every = make_cloud(3)
+    cloud = {name: every[name] for name in SCATTER if name not in left_out}
+    links, tones = make_links(2), Tones(5.72e9, 2.5e6, 5)
+
+    def run(values, backend):
+        return scatter(**values, links=links, tones=tones, sharpness=3.0, backend=backend)
+
+    assert_twins_agree(run, cloud)
+
+
+def test_shadows_are_the_same_some_paths_at_a_time(make_cloud, make_paths, monkeypatch) -> None:
+    monkeypatch.setattr(gpu, "MOST_SHADOWS", 3 * 41)
+    every = make_cloud(41)
+    cloud = {name: every[name] for name in ("means", "quats", "scales", "alpha")}
+    paths = make_paths(7, 0.05)
+
+    def run(values, backend):
+        return shadow(**values, paths=paths, backend=backend)
+
+    assert_twins_agree(run, cloud)
+
+
+def test_nothing_scatters_nothing(make_cloud, make_links, make_paths) -> None:
+    every = {name: value.detach().to(DEVICE) for name, value in make_cloud(0).items()}
+    means = every["means"].requires_grad_(True)
+    cloud = {name: every[name] for name in ("quats", "scales_rf", "gamma", "normals")}
+    tones = Tones(5e9, 1e6, 5)
+    csi = scatter(means, **cloud, links=make_links(3), tones=tones, backend="triton")
+    assert csi.shape == (3, 5) and not csi.any()
+    csi.abs().sum().backward()
+    assert means.grad is not None and means.grad.shape == (0, 3)
+    none = Links(torch.zeros(0, 3), torch.zeros(0, 3))
+    some = {name: value.detach().to(DEVICE) for name, value in make_cloud(2).items()}
+    cloud = {name: some[name] for name in ("means", "quats", "scales_rf", "gamma")}
+    assert scatter(**cloud, links=none, tones=tones, backend="triton").shape == (0, 5)
+    screens = {name: some[name] for name in ("means", "quats", "scales", "alpha")}
+    assert shadow(**screens, paths=make_paths(0, 0.05), backend="triton").shape == (0,)
+
+
+COMPILE = """
+from triton.backends.compiler import GPUTarget
+from triton.compiler import ASTSource, compile
+from rfgs_core.propagation import kernels_triton as kernels
+
+types = dict.fromkeys(("means", "ends", "tone"), "*fp64") | {"group": "*i64", "chunk": "*i32"}
+counts = ("total", "links", "chunks", "columns", "rows_out", "per_split")
+types |= dict.fromkeys(counts, "i32") | {"sharpness": "fp32"}
+constants = {"FACING": True, "WEIGHED": True, "ROWS": kernels.ROWS, "TONES": kernels.TONES}
+for kernel in (kernels.scatter_forward, kernels.scatter_backward):
+    names = kernel.arg_names
+    signature = {n: "constexpr" if n in constants else types.get(n, "*fp32") for n in names}
+    source = ASTSource(fn=kernel, signature=signature, constexprs=constants)
+    print(len(compile(source, target=GPUTarget("cuda", 80, 32)).asm["cubin"]))
+"""
+
+
+def test_kernels_compile_for_a_gpu_that_is_not_there(tmp_path) -> None:
+    environment = {k: v for k, v in os.environ.items() if k != "TRITON_INTERPRET"}
+    environment["TRITON_CACHE_DIR"] = str(tmp_path)
+    done = subprocess.run(
+        [sys.executable, "-c", COMPILE], env=environment, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    assert [int(line) > 10_000 for line in done.stdout.split()] == [True, True]

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A descent on a GPU: what can be told without one, and the same result where there is one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from rfgs_core.device import need_device
+from rfgs_core.errors import MissingToolError
+from rfgs_core.train import losses
+from rfgs_core.train.frame import FrameState, solve_reflectivity
+from rfgs_core.train.losses import nearest_gaussian
+from rfgs_core.train.observations import Observations
+from rfgs_core.train.refine import refine
+
+
+def test_a_gpu_that_is_not_there_is_named(monkeypatch) -> None:
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    with pytest.raises(MissingToolError, match=r"--device cuda: torch .* finds no GPU; expected"):
+        need_device("cuda")
+    need_device("cpu")
+
+
+def test_the_nearest_gaussian_is_the_trees(monkeypatch) -> None:
+    generator = torch.Generator().manual_seed(0)
+    points, means = (torch.randn(count, 3, generator=generator) for count in (101, 57))
+    # Batches of two points, the last one of one.
+    monkeypatch.setattr(losses, "MOST_DISTANCES", 2 * 57)
+    index, distance = losses._nearest_in_batches(points, means)
+    expected, far = nearest_gaussian(points, means)
+    assert torch.equal(index, expected)
+    torch.testing.assert_close(distance, far)
+
+
+def test_kernels_of_the_gpu_descend_as_those_of_the_cpu(
+    observations: Observations, state: FrameState, quick_config, monkeypatch
+) -> None:
+    """Without a GPU in Triton's interpreter, on the CPU."""
+    pytest.importorskip("triton", reason="kernels for a GPU need triton: pip install triton")
+    from rfgs_core.propagation import gpu
+
+    config = replace(quick_config, batch_entries=64)
+    plain = refine(observations, solve_reflectivity(observations, state, config), config, 0)
+    monkeypatch.setattr("rfgs_core.propagation._twin", lambda backend, device: gpu)
+    other = refine(observations, solve_reflectivity(observations, state, config), config, 0)
+    for name, value in plain.gaussians.items():
+        torch.testing.assert_close(getattr(other.gaussians, name), value, rtol=1e-3, atol=1e-4)
+    assert not torch.equal(plain.gaussians.means, state.gaussians.means)
+
+
+@pytest.mark.gpu
+@pytest.mark.parametrize("density", ["none", "3dgs", "residual", "paper"])
+def test_a_gpu_descends_as_the_cpu_does(
+    density, observations: Observations, state: FrameState, quick_config
+) -> None:
+    if not torch.cuda.is_available():
+        pytest.skip("needs a CUDA device")
+    objective = "both" if density == "paper" else "csi"
+    config = replace(quick_config, objective=objective, density=density, iterations=40)
+    ends = []
+    for device in ("cpu", "cuda"):
+        chosen = replace(config, device=device)
+        solved = solve_reflectivity(observations, state, chosen)
+        ends.append(refine(observations, solved, chosen, 0).gaussians)
+    assert len(ends[0]) == len(ends[1])
+    for name, value in ends[0].items():
+        torch.testing.assert_close(getattr(ends[1], name), value, rtol=1e-2, atol=1e-3)

@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 import importlib.util
+import os
+import shutil
 from typing import Literal
-
-import torch
 
 from rfgs_core.errors import MissingToolError
 
@@ -22,6 +22,8 @@ def need_device(device: Device) -> None:
     """
     if device == "cpu":
         return
+    import torch
+
     if not torch.cuda.is_available():
         raise MissingToolError(
             f"--device cuda: torch {torch.__version__} finds no GPU; expected an NVIDIA driver and "
@@ -29,9 +31,16 @@ def need_device(device: Device) -> None:
         )
     if importlib.util.find_spec("triton") is None:
         raise MissingToolError("--device cuda compiles its kernels with triton: pip install triton")
+    if not any(shutil.which(name) for name in (os.environ.get("CC", "gcc"), "gcc", "clang")):
+        raise MissingToolError(
+            "--device cuda needs a C compiler and Python's headers, with which triton builds its "
+            "launcher: apt-get install gcc python3.11-dev, or name a compiler in CC"
+        )
 
 
 def finish_device() -> None:
     """Waits for what a GPU has been asked to do, so that it can be timed."""
+    import torch
+
     if torch.cuda.is_available():
         torch.cuda.synchronize()

@@ -59,7 +59,8 @@ def _gpu_row() -> tuple[str, str, str]:
 
     if torch.cuda.is_available():
         return ("GPU", torch.cuda.get_device_name(0), "")
-    return ("GPU", "none", "not needed; everything runs on the CPU")
+    built = torch.version.cuda or "the CPU only"
+    return ("GPU", "none", f"not needed; --device cuda wants one, and torch is built for {built}")
 
 
 def find_blender() -> Path | None:

@@ -64,7 +64,7 @@ def _fit_from_surface(run: EvaluatedRun, config: TrainConfig, frame: int) -> Fra
 
 def oracle_scores(scene: Scene) -> dict[int, Float32[np.ndarray, "x y z"]]:
     """Score volume of each frame after the run's own fit from the true surface."""
-    names = {field.name for field in fields(TrainConfig)}
+    names = {field.name for field in fields(TrainConfig)} - {"device"}
     run, grid = scene.run, scene.grid
     missing = sorted(names - run.config.keys())
     if missing:

@@ -2,7 +2,7 @@
 """The propagation model on a GPU, differentiable in torch.
 
 Scattering goes through kernels of our own; shadows, of which there are far fewer, through the
-plain twin on the device, some paths at a time. Results are single precision.
+plain twin on the device, some paths at a time and in double precision. Results are single.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ PROGRAMS = 2048
 #: Splits never go below this many Gaussians or links.
 LEAST_GAUSSIANS, LEAST_LINKS = 8 * ROWS, 8
 #: Path–Gaussian pairs whose shadows are in memory at a time.
-MOST_SHADOWS = 1 << 24
+MOST_SHADOWS = 1 << 21
 
 
 class _Chunks:
@@ -157,6 +157,7 @@ def scatter(
         visibility, group = means.new_zeros(0, 1), None
     if group is None:
         group = torch.zeros(len(links), dtype=torch.int64, device=device)
+    group = group.to(torch.int64).contiguous()
     if normals is None or sharpness == 0.0:
         normals = means.new_zeros(0, 3)
     ends = torch.cat([links.tx_xyz, links.rx_xyz], dim=1).double().contiguous()
@@ -178,15 +179,21 @@ def shadow(
     alpha: Float[Tensor, "gaussian"],
     paths: EnvironmentPaths,
 ) -> Complex[Tensor, "path"]:
-    """Twin of `rfgs_core.propagation.shadow`: the plain one, computed again for gradients."""
+    """Twin of `rfgs_core.propagation.shadow`: the plain one, computed again for gradients.
+
+    In double: of a thin Gaussian seen edge-on, the determinant of the spread cancels in single.
+    """
+    result = scales.dtype.to_complex()
+    quats, scales, alpha = quats.double(), scales.double(), alpha.double()
     rows = max(1, MOST_SHADOWS // max(1, len(means)))
     parts = [
         checkpoint(
             *(reference.shadow, means, quats, scales, alpha, paths.rows(slice(at, at + rows))),
             use_reentrant=False,
+            preserve_rng_state=False,
         )
         for at in range(0, len(paths), rows)
     ]
     if not parts:
-        return torch.zeros(0, dtype=scales.dtype.to_complex(), device=means.device)
-    return torch.cat(parts)
+        return torch.zeros(0, dtype=result, device=means.device)
+    return torch.cat(parts).to(result)

@@ -125,6 +125,8 @@ def train_sequence(
         # As it is read back.
         "without": list(config.without),
     }
+    # Not a property of the result: a run may go on elsewhere.
+    del settings["device"]
     run = _open_or_create(out, settings)
     if encoder_file is not None and not (out / ENCODER_FILE).exists():
         keep_encoder(encoder_file, out)

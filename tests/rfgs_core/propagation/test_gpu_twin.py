@@ -82,6 +82,19 @@ def test_shadows_are_the_same_some_paths_at_a_time(make_cloud, make_paths, monke
     assert_twins_agree(run, cloud)
 
 
+def test_shadows_of_thin_gaussians_have_the_right_gradients(make_cloud, make_paths) -> None:
+    """Seen edge-on, the spread's determinant would cancel in single precision."""
+    every = make_cloud(41)
+    thin = every["scales"].detach() * torch.tensor([1.0, 1.0, 1e-4])
+    cloud = {name: every[name] for name in ("means", "quats", "alpha")} | {"scales": thin}
+    paths = make_paths(7, 0.05)
+
+    def run(values, backend):
+        return shadow(**values, paths=paths, backend=backend)
+
+    assert_twins_agree(run, cloud)
+
+
 def test_nothing_scatters_nothing(make_cloud, make_links, make_paths) -> None:
     every = {name: value.detach().to(DEVICE) for name, value in make_cloud(0).items()}
     means = every["means"].requires_grad_(True)

@@ -14,12 +14,17 @@ from rfgs_core.train import losses
 from rfgs_core.train.frame import FrameState, solve_reflectivity
 from rfgs_core.train.losses import nearest_gaussian
 from rfgs_core.train.observations import Observations
+from rfgs_core.train.phase_free import delay_amplitude
 from rfgs_core.train.refine import refine
 
 
 def test_a_gpu_that_is_not_there_is_named(monkeypatch) -> None:
     monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
     with pytest.raises(MissingToolError, match=r"--device cuda: torch .* finds no GPU; expected"):
+        need_device("cuda")
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
+    monkeypatch.setenv("PATH", "")
+    with pytest.raises(MissingToolError, match="needs a C compiler"):
         need_device("cuda")
     need_device("cpu")
 
@@ -38,7 +43,9 @@ def test_the_nearest_gaussian_is_the_trees(monkeypatch) -> None:
 def test_kernels_of_the_gpu_descend_as_those_of_the_cpu(
     observations: Observations, state: FrameState, quick_config, monkeypatch
 ) -> None:
-    """Without a GPU in Triton's interpreter, on the CPU."""
+    """In Triton's interpreter, on the CPU."""
+    if torch.cuda.is_available():
+        pytest.skip("kernels are compiled for the GPU here; the tests marked gpu descend on it")
     pytest.importorskip("triton", reason="kernels for a GPU need triton: pip install triton")
     from rfgs_core.propagation import gpu
 
@@ -51,20 +58,49 @@ def test_kernels_of_the_gpu_descend_as_those_of_the_cpu(
     assert not torch.equal(plain.gaussians.means, state.gaussians.means)
 
 
+needs_gpu = pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a CUDA device")
+
+
 @pytest.mark.gpu
-@pytest.mark.parametrize("density", ["none", "3dgs", "residual", "paper"])
+@needs_gpu
+@pytest.mark.parametrize("kind", ["complex", "power", "delay_power"])
 def test_a_gpu_descends_as_the_cpu_does(
-    density, observations: Observations, state: FrameState, quick_config
+    kind, observations: Observations, state: FrameState, quick_config
 ) -> None:
-    if not torch.cuda.is_available():
-        pytest.skip("needs a CUDA device")
-    objective = "both" if density == "paper" else "csi"
-    config = replace(quick_config, objective=objective, density=density, iterations=40)
+    profile = np.abs(delay_amplitude(observations.static, observations.tones))
+    seen = replace(observations, kind=kind, delay_change=profile)
     ends = []
     for device in ("cpu", "cuda"):
-        chosen = replace(config, device=device)
-        solved = solve_reflectivity(observations, state, chosen)
-        ends.append(refine(observations, solved, chosen, 0).gaussians)
-    assert len(ends[0]) == len(ends[1])
+        config = replace(quick_config, device=device, iterations=40)
+        ends.append(refine(seen, solve_reflectivity(seen, state, config), config, 0).gaussians)
     for name, value in ends[0].items():
         torch.testing.assert_close(getattr(ends[1], name), value, rtol=1e-2, atol=1e-3)
+
+
+@pytest.mark.gpu
+@needs_gpu
+@pytest.mark.parametrize("density", ["3dgs", "residual", "paper"])
+def test_density_control_on_a_gpu_resumes(
+    density, observations: Observations, state: FrameState, quick_config, tmp_path, monkeypatch
+) -> None:
+    """Past the first densification and pruning of every rule."""
+    monkeypatch.setattr(refine_module, "CHECKPOINT_EVERY", 60)
+    objective = "both" if density == "paper" else "csi"
+    config = replace(
+        quick_config, objective=objective, density=density, iterations=130, device="cuda"
+    )
+    undisturbed = refine(observations, state, config, 0).gaussians
+    assert all(value.isfinite().all() for _, value in undisturbed.items())
+    checkpoint = tmp_path / "000001.partial.npz"
+    steps = []
+
+    def stop(loss: float, count: int) -> None:
+        steps.append(count)
+        if len(steps) == 65:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        refine(observations, state, config, 0, checkpoint, stop)
+    again = refine(observations, state, config, 0, checkpoint).gaussians
+    assert len(again) == len(undisturbed) != len(state.gaussians)
+    torch.testing.assert_close(again.means, undisturbed.means, rtol=1e-3, atol=1e-4)

@@ -53,7 +53,8 @@ body = np.concatenate([points[:200] + 0.1 * rng.normal(size=(200, 3)) for _ in r
 still, turn = np.zeros((20, 1)), np.broadcast_to(np.eye(3), (20, 1, 3, 3)).copy()
 past = np.ones((20, 4, 8, 5), dtype=np.complex128)
 _shade(
-    corners, (still, still, turn, turn, np.full(20, silhouette.FAR)),
+    corners, np.ones((20, 1), dtype=bool),
+    (still, still, turn, turn, np.full(20, silhouette.FAR)),
     rng.normal(size=(20, 4, 3)) * 0.1, rng.normal(size=(20, 8, 3)) * 0.1,
     body, np.arange(600).reshape(3, 200).T.copy(), 3e8 / np.linspace(5.7e9, 5.9e9, 5),
     silhouette.FRESNEL, False, past,

@@ -15,7 +15,7 @@ import torch
 from jaxtyping import Complex, Float
 from torch import Tensor
 
-from rfgs_core.device import finish_device
+from rfgs_core.device import finish_device, on_device
 from rfgs_core.propagation import (
     EnvironmentPaths,
     Links,
@@ -158,8 +158,7 @@ def _scene(config: PropagationBench) -> _Scene:
     csi_shape = (links, config.num_tones)
     grad = torch.complex(normal(*csi_shape), normal(*csi_shape)).to(torch.complex64)
     paths = _paths(link_rows, config.paths_per_link, wavelength_m, uniform)
-    there = torch.device(config.device)
-    return _Scene(gaussians.to(there), link_rows.to(there), tones, paths.to(there), grad.to(there))
+    return on_device(_Scene(gaussians, link_rows, tones, paths, grad), config.device)
 
 
 def _paths(

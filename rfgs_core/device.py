@@ -3,15 +3,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib.util
 import os
 import shutil
-from typing import Literal
+from typing import Any, Literal, TypeVar, cast
 
 from rfgs_core.errors import MissingToolError
 
 #: cuda: the current GPU.
 Device = Literal["cpu", "cuda"]
+
+_Value = TypeVar("_Value")
 
 
 def need_device(device: Device) -> None:
@@ -36,6 +39,18 @@ def need_device(device: Device) -> None:
             "--device cuda needs a C compiler and Python's headers, with which triton builds its "
             "launcher: apt-get install gcc python3.11-dev, or name a compiler in CC"
         )
+
+
+def on_device(value: _Value, device: Any) -> _Value:
+    """A tensor, or a dataclass with all tensors in it, on a device; anything else as it is."""
+    import torch
+
+    if isinstance(value, torch.Tensor):
+        return cast(_Value, value.to(device))
+    if not dataclasses.is_dataclass(value) or isinstance(value, type):
+        return value
+    moved = {f.name: on_device(getattr(value, f.name), device) for f in dataclasses.fields(value)}
+    return dataclasses.replace(value, **moved)
 
 
 def finish_device() -> None:

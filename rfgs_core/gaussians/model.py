@@ -68,10 +68,6 @@ class Gaussians:
         """A copy that shares no memory and carries no gradient."""
         return Gaussians(**{name: value.detach().clone() for name, value in self.items()})
 
-    def to(self, device: torch.device) -> Gaussians:
-        """The Gaussians on a device."""
-        return Gaussians(**{name: value.to(device) for name, value in self.items()})
-
     @staticmethod
     def join(first: Gaussians, second: Gaussians) -> Gaussians:
         """Both sets, rows of `first` before rows of `second`."""

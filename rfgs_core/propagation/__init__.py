@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import importlib
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from types import ModuleType
 from typing import Literal, get_args
 
@@ -25,6 +25,7 @@ import torch
 from jaxtyping import Complex, Float
 from torch import Tensor
 
+from rfgs_core.device import on_device
 from rfgs_core.propagation.geometry import EnvironmentPaths, Links, Tones
 
 __all__ = [
@@ -88,7 +89,7 @@ def scatter(
         1.0
     """
     _check_groups(links, visibility)
-    links = links.to(means.device)
+    links = on_device(links, means.device)
     return _twin(backend, means.device).scatter(
         *(means, quats, scales_rf, gamma, links, tones, normals, sharpness, visibility)
     )
@@ -121,7 +122,7 @@ def shadow(
     Returns:
         One complex factor per path, 1 where nothing stands in the way.
     """
-    paths = paths.to(means.device)
+    paths = on_device(paths, means.device)
     return _twin(backend, means.device).shadow(means, quats, scales, alpha, paths)
 
 
@@ -139,7 +140,8 @@ def environment(
         tones: Subcarriers.
         num_links: Rows of the result.
     """
-    device, paths = transmission.device, paths.to(transmission.device)
+    device = transmission.device
+    paths = on_device(paths, device)
     turns = paths.delay_s.to(torch.float64)[:, None] * tones.freq_hz.to(device)
     phase = (-2 * math.pi) * (turns - turns.detach().round())
     phasors = torch.polar(torch.ones_like(phase), phase).to(transmission.dtype)
@@ -170,13 +172,6 @@ class RadioGaussians:
     """How fast a Gaussian disappears behind its tangent plane."""
     visibility: Float[Tensor, "gaussian group"] | None = None
     """Weight per group of links."""
-
-    def to(self, device: torch.device) -> RadioGaussians:
-        """The Gaussians on a device."""
-        named = {field.name: getattr(self, field.name) for field in fields(self)}
-        return replace(
-            self, **{name: x.to(device) for name, x in named.items() if isinstance(x, Tensor)}
-        )
 
 
 def propagate(

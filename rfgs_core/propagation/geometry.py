@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 
 import torch
@@ -37,11 +36,6 @@ class Links:
 
     def __len__(self) -> int:
         return self.tx_xyz.shape[0]
-
-    def to(self, device: torch.device) -> Links:
-        """The links on a device."""
-        group = None if self.group is None else self.group.to(device)
-        return Links(self.tx_xyz.to(device), self.rx_xyz.to(device), group)
 
 
 @dataclass(frozen=True)
@@ -133,13 +127,5 @@ class EnvironmentPaths:
 
     def rows(self, chosen: slice | Tensor) -> EnvironmentPaths:
         """Some of the paths; `link` keeps its meaning."""
-        return self._each(lambda value: value[chosen])
-
-    def to(self, device: torch.device) -> EnvironmentPaths:
-        """The paths on a device."""
-        return self._each(lambda value: value.to(device))
-
-    def _each(self, change: Callable[[Tensor], Tensor]) -> EnvironmentPaths:
         named = {field.name: getattr(self, field.name) for field in fields(self)}
-        tensors = {name: change(x) for name, x in named.items() if isinstance(x, Tensor)}
-        return replace(self, **tensors)
+        return replace(self, **{k: x[chosen] for k, x in named.items() if isinstance(x, Tensor)})

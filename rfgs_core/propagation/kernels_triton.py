@@ -18,6 +18,8 @@ ROWS, TONES = 64, 32
 #: Rows of the gradient: positions, covariances, real and imaginary gain, normals; then groups.
 BY_MEANS, BY_SHAPE, BY_GAIN, BY_NORMALS, BY_GROUP = 0, 3, 9, 11, 14
 
+_SHAPE, _GAIN, _NORMALS = tl.constexpr(BY_SHAPE), tl.constexpr(BY_GAIN), tl.constexpr(BY_NORMALS)
+_GROUP = tl.constexpr(BY_GROUP)
 _TWO_PI = tl.constexpr(6.283185307179586)
 #: Where rows behind the last Gaussian stand [m]: nowhere near an antenna.
 _FAR_M = tl.constexpr(1e3)
@@ -253,12 +255,12 @@ def scatter_backward(
             gz -= facing_t * z1 + facing_r * z2
         if WEIGHED:
             # Nobody else adds here; atomic, since a warp must see what another one has stored.
-            target = base + (14 + tl.load(group + link)) * total + row
+            target = base + (_GROUP + tl.load(group + link)) * total + row
             tl.atomic_add(target, by_weight * seen, mask)
     _store_three(base, row, mask, total, gx, gy, gz)
-    _store_three(base + 3 * total, row, mask, total, gxx, gyy, gzz)
-    _store_three(base + 6 * total, row, mask, total, gxy, gxz, gyz)
-    tl.store(base + 9 * total + row, by_gain_r, mask)
-    tl.store(base + 10 * total + row, by_gain_i, mask)
+    _store_three(base + _SHAPE * total, row, mask, total, gxx, gyy, gzz)
+    _store_three(base + (_SHAPE + 3) * total, row, mask, total, gxy, gxz, gyz)
+    tl.store(base + _GAIN * total + row, by_gain_r, mask)
+    tl.store(base + (_GAIN + 1) * total + row, by_gain_i, mask)
     if FACING:
-        _store_three(base + 11 * total, row, mask, total, normal_x, normal_y, normal_z)
+        _store_three(base + _NORMALS * total, row, mask, total, normal_x, normal_y, normal_z)

@@ -42,10 +42,6 @@ class Comparison(Protocol):
         """The observations less what the change of all links explains of them."""
         ...
 
-    def to(self, device: torch.device) -> Comparison:
-        """The comparison for changes on a device."""
-        ...
-
 
 @dataclass(frozen=True)
 class ComplexComparison:
@@ -75,10 +71,6 @@ class ComplexComparison:
     ) -> Observations:
         """The residual channel."""
         return observations.with_entries((self.target - change).cpu().numpy())
-
-    def to(self, device: torch.device) -> ComplexComparison:
-        """See `Comparison`."""
-        return ComplexComparison(self.target.to(device))
 
 
 @dataclass(frozen=True)
@@ -131,10 +123,6 @@ class PowerComparison:
         wave = wave[observations.links][:, observations.tones]
         return observations.with_entries(left.cpu().numpy() * wave)
 
-    def to(self, device: torch.device) -> PowerComparison:
-        """See `Comparison`."""
-        return PowerComparison(self.target.to(device), self.empty.to(device), self.level.to(device))
-
 
 @dataclass(frozen=True)
 class DelayComparison:
@@ -182,12 +170,6 @@ class DelayComparison:
         delay_change = np.zeros((*observations.links.shape, left.shape[1]), dtype=np.float32)
         delay_change[observations.links] = left.clamp(min=0.0).cpu().numpy()
         return replace(observations, delay_change=delay_change)
-
-    def to(self, device: torch.device) -> DelayComparison:
-        """See `Comparison`."""
-        return DelayComparison(
-            self.target.to(device), self.window.to(device), self.tones.to(device)
-        )
 
 
 def comparison_of(observations: Observations) -> Comparison:

@@ -10,6 +10,7 @@ import torch
 from jaxtyping import Bool, Complex, Float, Int64
 from torch import Tensor
 
+from rfgs_core.device import on_device
 from rfgs_core.encode import MATCHED_FILTER, Encoder
 from rfgs_core.errors import RfgsError
 from rfgs_core.gaussians import Gaussians
@@ -50,15 +51,6 @@ class FrameState:
 
     next_track: int = 0
     """Numbers below it were given out, some of them to Gaussians that are gone."""
-
-    def to(self, device: torch.device) -> FrameState:
-        """The state with what a device computes with on it."""
-        return replace(
-            self,
-            gaussians=self.gaussians.to(device),
-            power=self.power.to(device),
-            head=self.head.to(device),
-        )
 
     @property
     def unused_track(self) -> int:
@@ -161,7 +153,7 @@ def solve_reflectivity(
     Powers per delay know nothing of phases: there each Gaussian gets the root of its reflected
     power and a phase drawn for it, the model that the power fit assumes.
     """
-    there = state.to(torch.device(config.device))
+    there = on_device(state, config.device)
     gamma = fitted_reflectivities(
         *(observations, there.head, there.gaussians, there.power),
         *(config.unexplained, config.solver_steps),

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -54,10 +54,6 @@ class RadioHead:
         directions = torch.from_numpy(np.linalg.qr(matrix)[0].T.copy()).float()
         rho = min(START_PHASE_SPREAD * wavelength_m / (4 * math.pi * scale_m), 0.99)
         return RadioHead(directions, gamma_scale_m, math.log(rho / (1 - rho)))
-
-    def to(self, device: torch.device) -> RadioHead:
-        """The head for Gaussians on a device."""
-        return replace(self, directions=self.directions.to(device))
 
     def arrays(self) -> dict[str, np.ndarray]:
         """The head as arrays for a file, named as its fields."""

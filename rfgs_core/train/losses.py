@@ -29,10 +29,6 @@ class SamplePoints:
     features: Float[Tensor, "N 32"]
     """φ(p_k), which the losses take as a constant."""
 
-    def to(self, device: torch.device) -> SamplePoints:
-        """The points on a device."""
-        return SamplePoints(self.xyz.to(device), self.features.to(device))
-
     def rows(self, chosen: Int64[Tensor, "batch"]) -> SamplePoints:
         """Some of the points."""
         return SamplePoints(self.xyz[chosen], self.features[chosen])

@@ -12,6 +12,7 @@ from jaxtyping import Bool, Int64
 from torch import Tensor
 
 from rfgs_core.arrays import Shape
+from rfgs_core.device import on_device
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.gaussians import Gaussians
 
@@ -100,7 +101,7 @@ class TrainableGaussians:
         if new is not None or not bool(keep.all()):
             self.edited = True
         old = {name: self.optimiser.state.get(leaf, {}) for name, leaf in self.leaves.items()}
-        added = dict((new or Gaussians.none()).to(self.device).items())
+        added = dict(on_device(new or Gaussians.none(), self.device).items())
         count = len(added["means"])
         stems = self.origin.new_full((count,), -1) if parents is None else self.origin[parents]
         self.origin = torch.cat([self.origin[keep], stems])
@@ -142,7 +143,7 @@ class TrainableGaussians:
         """
         try:
             fields = {name: torch.from_numpy(arrays[name].copy()) for name in GAUSSIAN_SHAPES}
-            result = TrainableGaussians(Gaussians(**fields).to(torch.device(device)), rates)
+            result = TrainableGaussians(on_device(Gaussians(**fields), device), rates)
             result.edited = bool(arrays["edited"])
             result.origin = torch.from_numpy(arrays["origin"].copy()).to(device)
             for name, leaf in result.leaves.items():

@@ -14,6 +14,7 @@ from jaxtyping import Float, Int64
 from torch import Tensor
 
 from rfgs_core.arrays import load_arrays, save_arrays
+from rfgs_core.device import Device, on_device
 from rfgs_core.encode import MATCHED_FILTER, Encoder
 from rfgs_core.errors import RfgsError
 from rfgs_core.gaussians import Gaussians
@@ -65,15 +66,9 @@ class Task:
     weighted: bool
     """Whether eq. 5 weighs its points by ‖φ‖."""
 
-    def to(self, device: torch.device) -> Task:
+    def on(self, device: Device) -> Task:
         """The task for Gaussians on a device; links and paths go there when they are used."""
-        return replace(
-            self,
-            comparison=self.comparison.to(device),
-            target=self.target.to(device),
-            noise=self.noise.to(device),
-            points=None if self.points is None else self.points.to(device),
-        )
+        return replace(on_device(self, device), channel=self.channel)
 
     @staticmethod
     def of(observations: Observations, config: TrainConfig, seed: int, encoder: Encoder) -> Task:
@@ -173,9 +168,8 @@ def refine(
     Raises:
         RfgsError: The loss is not a number; the last good state is then in `checkpoint`.
     """
-    device = torch.device(config.device)
-    task = Task.of(observations, config, seed, encoder).to(device)
-    before, state = state, state.to(device)
+    task = Task.of(observations, config, seed, encoder).on(config.device)
+    before, state = state, on_device(state, config.device)
     rates = LearningRates() if config.recipe == "paper" else CHANNEL_RATES
     trained, first, memory = _resume(checkpoint, state.gaussians, rates)
     density = density_control(observations, state, config, seed, task)
@@ -278,7 +272,7 @@ def _with_gaussians(
 
     With the paper's objective features are no reflectivities, and all powers are new.
     """
-    gaussians = trained.gaussians.detach().to(state.gaussians.means.device)
+    gaussians = on_device(trained.gaussians.detach(), state.gaussians.means.device)
     if not trained.edited:
         return replace(state, gaussians=gaussians)
     origin = trained.origin.to(gaussians.means.device)

@@ -15,6 +15,7 @@ import torch
 from jaxtyping import Complex, Float
 from torch import Tensor
 
+from rfgs_core.device import on_device
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.train.channel import Channel
 from rfgs_core.train.comparison import Comparison, comparison_of
@@ -45,7 +46,7 @@ def fitted_reflectivities(
         One per Gaussian; None where the radio reports powers per delay, which have no phases.
     """
     device = gaussians.means.device
-    comparison = comparison_of(observations).to(device)
+    comparison = on_device(comparison_of(observations), device)
     channel = Channel.of(observations, observations.links, observations.tones)
     with torch.no_grad():
         shadow = comparison.linear(channel.shadowed(head, gaussians))

@@ -18,6 +18,7 @@ from scipy.ndimage import maximum_filter
 from scipy.spatial import KDTree
 from torch import Tensor
 
+from rfgs_core.device import on_device
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.train.body_prior import Bodies, outward_normals
 from rfgs_core.train.channel import Channel
@@ -113,7 +114,8 @@ class ResidualDensity:
             return Gaussians.none()
         near_m = g.means.double().cpu().numpy()
         points = residual_peaks(pair_maps(left), near_m, self.rule)[:room]
-        new = gaussians_at(points, outward_normals(points, self.bodies)).to(g.means.device)
+        new = gaussians_at(points, outward_normals(points, self.bodies))
+        new = on_device(new, g.means.device)
         new = replace(new, logit_opacities=g.logit_opacities.median().expand(len(new)).clone())
         power = energy.median().expand(len(new))
         gamma = torch.polar(power.sqrt(), torch.zeros_like(power))

@@ -92,3 +92,33 @@ def make_paths() -> Callable[..., EnvironmentPaths]:
         )
 
     return make
+
+
+def _value_and_gradients(run, cloud, backend, real, device) -> dict[str, torch.Tensor]:
+    """Output and gradients of a random real function of it."""
+    leaves = {
+        name: value.detach()
+        .to(device, real.to_complex() if value.is_complex() else real)
+        .requires_grad_(True)
+        for name, value in cloud.items()
+    }
+    output = run(leaves, backend)
+    generator = torch.Generator().manual_seed(5)
+    weight = torch.randn(*output.shape, 2, generator=generator, dtype=torch.float64).to(device)
+    grads = torch.autograd.grad((torch.view_as_real(output) * weight).sum(), list(leaves.values()))
+    return {"output": output.detach(), **dict(zip(leaves, grads, strict=True))}
+
+
+@pytest.fixture
+def assert_twins_agree() -> Callable[..., None]:
+    """Holds a twin in single precision against the plain one in double, gradients too."""
+
+    def check(run, cloud, backend: str = "numba", device: str = "cpu") -> None:
+        fast = _value_and_gradients(run, cloud, backend, torch.float32, device)
+        plain = _value_and_gradients(run, cloud, "torch", torch.float64, device)
+        for name, expected in plain.items():
+            error = (fast[name] - expected).norm() / expected.norm()
+            assert error < 1e-4, f"{name}: {error:.1e}"
+            assert expected.norm() > 0, name
+
+    return check

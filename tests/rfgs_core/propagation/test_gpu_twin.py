@@ -19,32 +19,10 @@ SCATTER = ("means", "quats", "scales_rf", "gamma", "normals", "visibility")
 BANDS = [(5.72e9, 2.5e6, 1), (60e9, 12.5e6, 1), (3.1e9, 12.3e6, 4)]
 
 
-def value_and_gradients(run, cloud, backend, real) -> dict[str, torch.Tensor]:
-    """Output and gradients of a random real function of it."""
-    leaves = {
-        name: value.detach()
-        .to(DEVICE, real.to_complex() if value.is_complex() else real)
-        .requires_grad_(True)
-        for name, value in cloud.items()
-    }
-    output = run(leaves, backend)
-    generator = torch.Generator().manual_seed(5)
-    weight = torch.randn(*output.shape, 2, generator=generator, dtype=torch.float64).to(DEVICE)
-    grads = torch.autograd.grad((torch.view_as_real(output) * weight).sum(), list(leaves.values()))
-    return {"output": output.detach(), **dict(zip(leaves, grads, strict=True))}
-
-
-def assert_twins_agree(run, cloud) -> None:
-    fast = value_and_gradients(run, cloud, "triton", torch.float32)
-    plain = value_and_gradients(run, cloud, "torch", torch.float64)
-    for name, expected in plain.items():
-        error = (fast[name] - expected).norm() / expected.norm()
-        assert error < 1e-4, f"{name}: {error:.1e}"
-        assert expected.norm() > 0, name
-
-
 @pytest.mark.parametrize(("f0", "df", "knots"), BANDS)
-def test_scatter_is_the_plain_sum(make_cloud, make_links, monkeypatch, f0, df, knots) -> None:
+def test_scatter_is_the_plain_sum(
+    make_cloud, make_links, monkeypatch, f0, df, knots, assert_twins_agree
+) -> None:
     # Three splits of the Gaussians and two of the links, the last ones not full.
     monkeypatch.setattr(gpu, "LEAST_GAUSSIANS", 64)
     monkeypatch.setattr(gpu, "LEAST_LINKS", 3)
@@ -55,11 +33,13 @@ def test_scatter_is_the_plain_sum(make_cloud, make_links, monkeypatch, f0, df, k
     def run(values, backend):
         return scatter(**values, links=links, tones=tones, sharpness=3.0, backend=backend)
 
-    assert_twins_agree(run, cloud)
+    assert_twins_agree(run, cloud, "triton", DEVICE)
 
 
 @pytest.mark.parametrize("left_out", [("normals",), ("visibility",), ("normals", "visibility")])
-def test_what_is_left_out_weighs_nothing(make_cloud, make_links, left_out) -> None:
+def test_what_is_left_out_weighs_nothing(
+    make_cloud, make_links, left_out, assert_twins_agree
+) -> None:
     every = make_cloud(3)
     cloud = {name: every[name] for name in SCATTER if name not in left_out}
     links, tones = make_links(2), Tones(5.72e9, 2.5e6, 5)
@@ -67,10 +47,12 @@ def test_what_is_left_out_weighs_nothing(make_cloud, make_links, left_out) -> No
     def run(values, backend):
         return scatter(**values, links=links, tones=tones, sharpness=3.0, backend=backend)
 
-    assert_twins_agree(run, cloud)
+    assert_twins_agree(run, cloud, "triton", DEVICE)
 
 
-def test_shadows_are_the_same_some_paths_at_a_time(make_cloud, make_paths, monkeypatch) -> None:
+def test_shadows_are_the_same_some_paths_at_a_time(
+    make_cloud, make_paths, monkeypatch, assert_twins_agree
+) -> None:
     monkeypatch.setattr(gpu, "MOST_SHADOWS", 3 * 41)
     every = make_cloud(41)
     cloud = {name: every[name] for name in ("means", "quats", "scales", "alpha")}
@@ -79,10 +61,12 @@ def test_shadows_are_the_same_some_paths_at_a_time(make_cloud, make_paths, monke
     def run(values, backend):
         return shadow(**values, paths=paths, backend=backend)
 
-    assert_twins_agree(run, cloud)
+    assert_twins_agree(run, cloud, "triton", DEVICE)
 
 
-def test_shadows_of_thin_gaussians_have_the_right_gradients(make_cloud, make_paths) -> None:
+def test_shadows_of_thin_gaussians_have_the_right_gradients(
+    make_cloud, make_paths, assert_twins_agree
+) -> None:
     """Seen edge-on, the spread's determinant would cancel in single precision."""
     every = make_cloud(41)
     thin = every["scales"].detach() * torch.tensor([1.0, 1.0, 1e-4])
@@ -92,7 +76,7 @@ def test_shadows_of_thin_gaussians_have_the_right_gradients(make_cloud, make_pat
     def run(values, backend):
         return shadow(**values, paths=paths, backend=backend)
 
-    assert_twins_agree(run, cloud)
+    assert_twins_agree(run, cloud, "triton", DEVICE)
 
 
 def test_nothing_scatters_nothing(make_cloud, make_links, make_paths) -> None:

@@ -16,36 +16,8 @@ SHADOW = ("means", "quats", "scales", "alpha")
 BANDS = [(5.72e9, 2.5e6, 1), (60e9, 12.5e6, 1), (3.1e9, 12.3e6, 4)]
 
 
-def doubled(cloud: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
-    """The same values in double precision, as fresh leaves."""
-    return {
-        name: value.detach()
-        .to(torch.complex128 if value.is_complex() else torch.float64)
-        .requires_grad_(True)
-        for name, value in cloud.items()
-    }
-
-
-def value_and_gradients(run, cloud) -> dict[str, torch.Tensor]:
-    """Output and gradients of a random real function of it."""
-    output = run(cloud)
-    generator = torch.Generator().manual_seed(5)
-    weight = torch.randn(*output.shape, 2, generator=generator, dtype=torch.float64)
-    grads = torch.autograd.grad((torch.view_as_real(output) * weight).sum(), list(cloud.values()))
-    return {"output": output.detach(), **dict(zip(cloud, grads, strict=True))}
-
-
-def assert_twins_agree(run, cloud, tolerance: float = 1e-4) -> None:
-    fast = value_and_gradients(lambda values: run(values, "numba"), cloud)
-    plain = value_and_gradients(lambda values: run(values, "torch"), doubled(cloud))
-    for name, expected in plain.items():
-        error = (fast[name] - expected).norm() / expected.norm()
-        assert error < tolerance, f"{name}: {error:.1e}"
-        assert expected.norm() > 0, name
-
-
 @pytest.mark.parametrize(("f0", "df", "knots"), BANDS)
-def test_scatter_twins_agree(make_cloud, make_links, f0, df, knots) -> None:
+def test_scatter_twins_agree(make_cloud, make_links, f0, df, knots, assert_twins_agree) -> None:
     every = make_cloud(301, f0, knots)
     cloud = {name: every[name] for name in SCATTER}
     links, tones = make_links(13), Tones(f0, df, 131, blocks=((0, 70), (90, 41)))
@@ -57,7 +29,7 @@ def test_scatter_twins_agree(make_cloud, make_links, f0, df, knots) -> None:
 
 
 @pytest.mark.parametrize("wavelength_m", [0.052, 0.0048])
-def test_shadow_twins_agree(make_cloud, make_paths, wavelength_m) -> None:
+def test_shadow_twins_agree(make_cloud, make_paths, wavelength_m, assert_twins_agree) -> None:
     every = make_cloud(201)
     cloud = {name: every[name] for name in SHADOW}
     paths = make_paths(17, wavelength_m)
@@ -69,7 +41,9 @@ def test_shadow_twins_agree(make_cloud, make_paths, wavelength_m) -> None:
 
 
 @pytest.mark.parametrize("count", [1, 127, 128, 129])
-def test_any_number_of_gaussians_will_do(make_cloud, make_links, make_paths, count) -> None:
+def test_any_number_of_gaussians_will_do(
+    make_cloud, make_links, make_paths, count, assert_twins_agree
+) -> None:
     every = make_cloud(count)
     links, tones, paths = make_links(3), Tones(5.72e9, 2.5e6, 7), make_paths(3, 0.05)
     assert_twins_agree(

@@ -15,7 +15,6 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 import sionna.rt as rt
-from sionna.rt.path_solvers.sb_candidate_generator import SBCandidateGenerator
 from sionna.rt.rcs import ConstantCPM, ConstantRCS, RCSSolver, ScatteringModel, SensingTarget
 
 from dataset_factory.trace.direct import PosedPoints
@@ -37,8 +36,8 @@ BUFFER = {2: 128, 3: 512}
 #: Paths weaker than this share of the strongest are left out: facets damped to nothing.
 NEGLIGIBLE = 1e-4
 
-# The solver's default reserves 8 MB per scattering point; the result is the same.
-SBCandidateGenerator.MIN_SPEC_COUNT_SIZE = 4096
+#: Places in which a point's legs are told apart; Sionna's default reserves 8 MB per point.
+TABLE = 4096
 
 
 class JoiningSolver(RCSSolver):
@@ -55,6 +54,8 @@ class JoiningSolver(RCSSolver):
         self._measured = measured
         if depth == 2:
             self._candidate_generator = LegCandidates()
+        # Of this generator alone: every other solver needs Sionna's own, or it loses paths.
+        self._candidate_generator.MIN_SPEC_COUNT_SIZE = TABLE
 
     def _pair_legs(
         self, from_tx_paths: Any, to_rx_paths: Any, max_depth: int

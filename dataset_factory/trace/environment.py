@@ -4,15 +4,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import sionna.rt as rt
 
 from dataset_factory.bundle import Bundle
-from dataset_factory.trace.band_solver import BandSolver
+from dataset_factory.trace.fields import Fields, SceneMeshes
 from dataset_factory.trace.movers import Movers
-from dataset_factory.trace.paths import PathSet, joined, merged, path_set, united
+from dataset_factory.trace.paths import PathSet, joined, merged, path_set
 from dataset_factory.trace.scene import (
     Group,
     add_antennas,
@@ -24,13 +25,15 @@ from dataset_factory.trace.scene import (
 )
 from dataset_factory.trace.steering import steer
 from rfgs_core.radio import Layout, Radio
+from rfgs_core.radio.images import DIFFUSE
 from rfgs_core.radio.layout import DevicePose
+from rfgs_core.simulate import SpecularPaths, faces_of, specular_paths
 
 #: Interactions of an environment path; a fourth would change bistatic links by −39 dB.
 MAX_DEPTH = 3
-#: Rays per transmitter; with these the path set has converged to −107 dB.
+#: Rays per transmitter, for diffuse reflections.
 NUM_SAMPLES = 300_000
-#: Room for candidates; fewer lose paths silently.
+#: Room for diffuse paths per transmitter.
 MAX_PATHS = 20_000
 #: Above this fractional bandwidth materials are evaluated at several frequencies.
 WIDE_BAND = 0.05
@@ -81,15 +84,24 @@ class Environment:
         self._vehicles = vehicles
         self._scatters = any(row["scattering_coefficient"] > 0.0 for row in bundle.materials)
         self._scene = environment_scene(bundle, radio, vehicles)
-        self._solver = BandSolver(deterministic=True)
+        self._meshes = SceneMeshes(bundle, vehicles)
+        self._fields, self._solver = Fields(), rt.PathSolver(deterministic=True)
 
     @property
     def scene(self) -> rt.Scene:
         """The scene that is traced."""
         return self._scene
 
+    @property
+    def reflects(self) -> bool:
+        """Whether there is anything to bounce off."""
+        return len(self._meshes.names) > 0
+
     def paths(self, vertices: np.ndarray | None = None) -> PathSet:
         """Traces the scene; the result does not depend on what was traced before.
+
+        Specular paths are found by images, without rays, so that both directions have the same
+        ones. Diffuse reflections alone come from rays.
 
         Args:
             vertices: Where the vehicles' vertices are [m], shape (V, 3).
@@ -101,34 +113,28 @@ class Environment:
         """
         if self._vehicles is not None and vertices is not None:
             move_vehicles(self._scene, self._vehicles, vertices)
+        ends = centres(self._layout)
+        faces = faces_of(*self._meshes.triangles(vertices))
+        found = specular_paths(faces, *ends, measured_pairs(self._layout), MAX_DEPTH)
         parts = []
         for group in self._groups:
             add_antennas(self._scene, self._layout, self._devices, group)
-            parts.append(self._between(group))
-        return parts[0] if len(parts) == 1 else merged(parts)
+            parts.append(self._at_nodes(self._specular(found, group), group))
+            if self._scatters:
+                rays = self._at_nodes(self._scattered, group)
+                parts.append(rays.select((rays.kinds == DIFFUSE).any(axis=1)))
+        return merged(parts)
 
-    def _between(self, group: Group) -> PathSet:
-        """Paths between the sites of a group, whose antennas are in the scene."""
-        nodes = node_frequencies(self._radio)
-        centre_hz = self._radio.centre_hz
-        if len(nodes) == NARROW_BAND_NODES:
-            traced = self._read(self._traced(centre_hz), group, centre_hz)
-            # Walls hardly change over a narrow band.
-            return replace(traced, amplitude=np.repeat(traced.amplitude, len(nodes), axis=2))
-        if not self._radio.ultra_wide:
-            return joined([self._read(self._traced(float(f)), group, float(f)) for f in nodes])
-        sets = []
-        # An ultra-wide band has too many frequencies to find the paths anew at each.
-        # Rays choose by the material whether to go through, so each edge finds paths of its own.
-        for edge_hz in (self._radio.freq_min_hz, self._radio.freq_max_hz):
-            found = self._traced(edge_hz)
-            every = self._solver.at_frequencies(self._scene, found, nodes, NUM_SAMPLES)
-            parts = zip(every, nodes, strict=True)
-            sets.append(joined([self._read(part, group, float(f)) for part, f in parts]))
-        return united(sets)
+    def _specular(self, found: SpecularPaths, group: Group) -> Callable[[float], rt.Paths]:
+        """What gives waves along the paths of a group, whose antennas are in the scene."""
+        here = np.isin(found.tx, group[0]) & np.isin(found.rx, group[1])
+        some = SpecularPaths(*(column[here] for column in found))
+        tx, rx = np.searchsorted(group[0], some.tx), np.searchsorted(group[1], some.rx)
+        some = some._replace(tx=tx, rx=rx)
+        return lambda freq_hz: self._fields.along(self._scene, self._meshes, some, freq_hz)
 
-    def _traced(self, freq_hz: float) -> rt.Paths:
-        """Paths at one frequency."""
+    def _scattered(self, freq_hz: float) -> rt.Paths:
+        """Paths found by rays at one frequency, those with diffuse reflections among them."""
         set_frequency(self._scene, freq_hz)
         return self._solver(
             self._scene,
@@ -136,10 +142,19 @@ class Environment:
             samples_per_src=NUM_SAMPLES,
             max_num_paths_per_src=MAX_PATHS,
             synthetic_array=True,
-            diffuse_reflection=self._scatters,
+            diffuse_reflection=True,
             refraction=True,
             seed=self._seed,
         )
+
+    def _at_nodes(self, traced: Callable[[float], rt.Paths], group: Group) -> PathSet:
+        """Paths between the sites of a group with one amplitude for each node frequency."""
+        nodes, centre_hz = node_frequencies(self._radio), self._radio.centre_hz
+        if self._radio.bandwidth_hz / centre_hz > WIDE_BAND:
+            return joined([self._read(traced(float(f)), group, float(f)) for f in nodes])
+        at_centre = self._read(traced(centre_hz), group, centre_hz)
+        # Walls hardly change over a narrow band.
+        return replace(at_centre, amplitude=np.repeat(at_centre.amplitude, len(nodes), axis=2))
 
     def _read(self, paths: rt.Paths, group: Group, freq_hz: float) -> PathSet:
         """Sionna's paths between the sites of a group, one amplitude each."""

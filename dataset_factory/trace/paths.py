@@ -142,16 +142,6 @@ def joined(sets: list[PathSet]) -> PathSet:
     return replace(every.select(first), amplitude=amplitude).sorted()
 
 
-def united(sets: list[PathSet]) -> PathSet:
-    """Every path of several sets of equal depth and nodes once, the first of equal ones."""
-    filled = [paths for paths in sets if len(paths)]
-    if not filled:
-        return sets[0]
-    every = _concatenated(filled)
-    _, first = np.unique(_keys(every), axis=0, return_index=True)
-    return every.select(first).sorted()
-
-
 def _concatenated(sets: list[PathSet]) -> PathSet:
     """Sets of equal depth one after the other."""
     columns = (column.name for column in fields(PathSet))

@@ -68,7 +68,8 @@ class Tracer(BaseTracer):
         self._met = Met(bundle, environment.scene, bodies.vehicles)
         self._tables = TableMaker(radio, self._layout, devices, shadow)
         self._bounces: Bounces | None = None
-        if bodies.scatter and depth > 1:
+        # Where there is nothing to bounce off, a second interaction has nowhere to be.
+        if bodies.scatter and depth > 1 and environment.reflects:
             self._bounces = Bounces(
                 bodies.scene, self._layout, devices, depth, sub_seed(seed, "bounces")
             )

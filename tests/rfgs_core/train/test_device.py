@@ -8,14 +8,16 @@ from dataclasses import replace
 import pytest
 import torch
 
-from rfgs_core.device import need_device
+from rfgs_core.device import need_device, on_device
+from rfgs_core.encode import MATCHED_FILTER
 from rfgs_core.errors import MissingToolError
+from rfgs_core.propagation import reference
 from rfgs_core.train import losses
 from rfgs_core.train.frame import FrameState, solve_reflectivity
 from rfgs_core.train.losses import nearest_gaussian
 from rfgs_core.train.observations import Observations
 from rfgs_core.train.phase_free import delay_amplitude
-from rfgs_core.train.refine import refine
+from rfgs_core.train.refine import Task, refine
 
 
 def test_a_gpu_that_is_not_there_is_named(monkeypatch) -> None:
@@ -56,6 +58,30 @@ def test_kernels_of_the_gpu_descend_as_those_of_the_cpu(
     for name, value in plain.gaussians.items():
         torch.testing.assert_close(getattr(other.gaussians, name), value, rtol=1e-3, atol=1e-4)
     assert not torch.equal(plain.gaussians.means, state.gaussians.means)
+
+
+@pytest.mark.parametrize("kind", ["complex", "power", "delay_power"])
+def test_a_step_meets_no_tensor_of_another_device(
+    kind, observations: Observations, state: FrameState, quick_config, monkeypatch
+) -> None:
+    """Tensors of the device `meta` hold nothing, but refuse to meet those of the CPU."""
+    monkeypatch.setattr("rfgs_core.propagation._twin", lambda backend, device: reference)
+    profile = np.abs(delay_amplitude(observations.static, observations.tones))
+    seen = replace(observations, kind=kind, delay_change=profile)
+    config = replace(quick_config, objective="both")
+    task = Task.of(seen, config, 0, MATCHED_FILTER)
+    links, chosen = refine_module._batch(task, config, 0, 1)
+    there, moved = on_device(task, "meta"), on_device(state, "meta")
+    there = replace(there, channel=task.channel)
+    assert there.points is not None
+    loss = refine_module._loss(
+        *(there, moved, moved.gaussians, links, there.points.rows(chosen), slice(0, 20))
+    )
+    assert (
+        loss.device.type == moved.power.device.type == moved.head.directions.device.type == "meta"
+    )
+    with pytest.raises(RuntimeError, match="same device"):
+        refine_module._loss(task, moved, moved.gaussians, links, None, slice(0, 20))
 
 
 needs_gpu = pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a CUDA device")

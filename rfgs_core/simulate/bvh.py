@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a straight segment crosses: a bounding volume hierarchy over triangles, in double."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numba
+import numpy as np
+from jaxtyping import Float64
+
+#: Crossings nearer to each other than this are one: shared edges, surfaces laid on each other [m].
+SAME_M = 1e-6
+#: Most triangles of a leaf.
+_LEAF = 4
+#: Deepest tree that a traversal has room for.
+_STACK = 64
+#: Triangles reach this far beyond their edges, as a share of them: no ray slips through a seam.
+_SEAM = 1e-9
+
+
+class Bvh(NamedTuple):
+    """Triangles in the order of the leaves, and the boxes around them."""
+
+    corners: np.ndarray
+    """Corners of the triangles [m], shape (triangle, 3, 3)."""
+    triangle: np.ndarray
+    """Index of each among those given, shape (triangle,)."""
+    low: np.ndarray
+    """Lower corner of each node's box [m], shape (node, 3)."""
+    high: np.ndarray
+    """Upper corner of each node's box [m], shape (node, 3)."""
+    first: np.ndarray
+    """First triangle of a leaf; left child of other nodes, the right one follows it."""
+    count: np.ndarray
+    """Triangles of a leaf, 0 for other nodes."""
+
+
+def build_bvh(triangles: Float64[np.ndarray, "triangle 3 3"]) -> Bvh:
+    """Hierarchy over triangles, halved along the longest axis of their centres."""
+    triangles = np.ascontiguousarray(triangles, dtype=np.float64)
+    order, low, high, first, count = _built(triangles)
+    return Bvh(triangles[order], order, low, high, first, count)
+
+
+@numba.njit(cache=True)
+def _built(
+    triangles: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Order of the triangles, boxes, and first and count of each node."""
+    total = len(triangles)
+    order = np.arange(total)
+    centre = np.zeros((total, 3))
+    for i in range(total):
+        for axis in range(3):
+            corners = triangles[i, :, axis]
+            centre[i, axis] = 0.5 * (corners.min() + corners.max())
+    room = max(2 * total, 1)
+    low, high = np.full((room, 3), np.inf), np.full((room, 3), -np.inf)
+    first, count = np.zeros(room, dtype=np.int64), np.zeros(room, dtype=np.int64)
+    ends = np.zeros((room, 2), dtype=np.int64)
+    ends[0, 1] = total
+    node, nodes = 0, 1
+    while node < nodes:
+        begin, end = ends[node]
+        for i in order[begin:end]:
+            for axis in range(3):
+                low[node, axis] = min(low[node, axis], triangles[i, :, axis].min())
+                high[node, axis] = max(high[node, axis], triangles[i, :, axis].max())
+        if end - begin <= _LEAF:
+            first[node], count[node] = begin, end - begin
+        else:
+            here = order[begin:end].copy()
+            axis, widest = 0, -1.0
+            for a in range(3):
+                along = centre[here, a]
+                if along.max() - along.min() > widest:
+                    axis, widest = a, along.max() - along.min()
+            # Sorted all the way, so that equal centres split the same on every machine.
+            order[begin:end] = here[np.argsort(centre[here, axis], kind="mergesort")]
+            middle = (begin + end) // 2
+            first[node] = nodes
+            ends[nodes, 0], ends[nodes, 1] = begin, middle
+            ends[nodes + 1, 0], ends[nodes + 1, 1] = middle, end
+            nodes += 2
+        node += 1
+    return order, low[:nodes], high[:nodes], first[:nodes], count[:nodes]
+
+
+@numba.njit(cache=True, nogil=True)
+def crossings(
+    bvh: Bvh,
+    start: np.ndarray,
+    end: np.ndarray,
+    to_m: float,
+    at_m: np.ndarray,
+    triangle: np.ndarray,
+) -> int:
+    """Surfaces that a segment crosses, nearest first.
+
+    Args:
+        bvh: The triangles.
+        start: Where it starts [m], shape (3,); what is there does not count.
+        end: Where it leads to [m], shape (3,).
+        to_m: How far from the end it stops [m]; negative to go beyond.
+        at_m: Filled with the distance of each crossing from the start [m].
+        triangle: Filled with the triangle of each, the smallest of several at one place.
+
+    Returns:
+        Number of crossings; more than fit into `at_m` count as one more than that.
+    """
+    way = end - start
+    length = math.sqrt((way * way).sum())
+    if length < SAME_M:
+        return 0
+    way = way / length
+    reach = length - to_m
+    stack = np.zeros(_STACK, dtype=np.int64)
+    size, found = 1, 0
+    while size:
+        size -= 1
+        node = stack[size]
+        if not _enters(bvh.low[node], bvh.high[node], start, way, reach):
+            continue
+        if bvh.count[node] == 0 and len(bvh.first) > 1:
+            stack[size], stack[size + 1] = bvh.first[node] + 1, bvh.first[node]
+            size += 2
+            continue
+        for i in range(bvh.first[node], bvh.first[node] + bvh.count[node]):
+            at = _hit(bvh.corners[i], start, way)
+            if at <= SAME_M or at >= reach:
+                continue
+            found = _insert(at, bvh.triangle[i], at_m, triangle, found)
+            if found > len(at_m):
+                return found
+    return found
+
+
+@numba.njit(cache=True, nogil=True)
+def _insert(at: float, index: int, at_m: np.ndarray, triangle: np.ndarray, found: int) -> int:
+    """Puts a crossing in its place among those found; returns how many there are then."""
+    for i in range(found):
+        if abs(at_m[i] - at) <= SAME_M:
+            triangle[i] = min(triangle[i], index)
+            return found
+    if found == len(at_m):
+        return found + 1
+    place = found
+    while place > 0 and at_m[place - 1] > at:
+        at_m[place], triangle[place] = at_m[place - 1], triangle[place - 1]
+        place -= 1
+    at_m[place], triangle[place] = at, index
+    return found + 1
+
+
+@numba.njit(cache=True, nogil=True)
+def _enters(
+    low: np.ndarray, high: np.ndarray, start: np.ndarray, way: np.ndarray, reach: float
+) -> bool:
+    """Whether a segment meets a box."""
+    near, far = 0.0, reach
+    for axis in range(3):
+        below, above = low[axis] - SAME_M - start[axis], high[axis] + SAME_M - start[axis]
+        if abs(way[axis]) < 1e-15:
+            if below > 0.0 or above < 0.0:
+                return False
+            continue
+        a, b = below / way[axis], above / way[axis]
+        near, far = max(near, min(a, b)), min(far, max(a, b))
+    return near <= far
+
+
+@numba.njit(cache=True, nogil=True)
+def _hit(corners: np.ndarray, start: np.ndarray, way: np.ndarray) -> float:
+    """Distance at which a ray meets a triangle, −1 if not (Möller and Trumbore 1997)."""
+    ax, ay, az = corners[0, 0], corners[0, 1], corners[0, 2]
+    ux, uy, uz = corners[1, 0] - ax, corners[1, 1] - ay, corners[1, 2] - az
+    vx, vy, vz = corners[2, 0] - ax, corners[2, 1] - ay, corners[2, 2] - az
+    px = way[1] * vz - way[2] * vy
+    py = way[2] * vx - way[0] * vz
+    pz = way[0] * vy - way[1] * vx
+    det = ux * px + uy * py + uz * pz
+    if det == 0.0:
+        return -1.0
+    sx, sy, sz = start[0] - ax, start[1] - ay, start[2] - az
+    u = (sx * px + sy * py + sz * pz) / det
+    if u < -_SEAM or u > 1.0 + _SEAM:
+        return -1.0
+    qx, qy, qz = sy * uz - sz * uy, sz * ux - sx * uz, sx * uy - sy * ux
+    v = (way[0] * qx + way[1] * qy + way[2] * qz) / det
+    if v < -_SEAM or u + v > 1.0 + _SEAM:
+        return -1.0
+    return (vx * qx + vy * qy + vz * qz) / det

@@ -19,6 +19,7 @@ from sionna.rt.rcs import ConstantCPM, ConstantRCS, RCSSolver, ScatteringModel, 
 
 from dataset_factory.trace.direct import PosedPoints
 from dataset_factory.trace.environment import measured_pairs
+from dataset_factory.trace.held import follow
 from dataset_factory.trace.legs import LegCandidates
 from dataset_factory.trace.paths import PathSet, empty, merged, path_set
 from dataset_factory.trace.scene import add_antennas, centres
@@ -117,11 +118,14 @@ class Bounces:
     def paths(self, points: PosedPoints) -> PathSet:
         """Paths by way of each point and one or more walls, one amplitude each.
 
+        Rays are cast from outside the skin, lengths are those to the skin itself.
+
         Amplitudes are those of points of unit cross-section; `primitives` of the sensing
         interaction is the index of the point.
         """
         starts = range(0, len(points.areas), CHUNK)
-        return merged([self._chunk(points.lifted[i : i + CHUNK], i) for i in starts])
+        found = merged([self._chunk(points.lifted[i : i + CHUNK], i) for i in starts])
+        return follow(found, points.positions)
 
     def _chunk(self, places: np.ndarray, first: int) -> PathSet:
         """Paths through a few points; point indices count from `first`."""

@@ -32,7 +32,10 @@ class PosedPoints:
 
     @property
     def lifted(self) -> np.ndarray:
-        """Positions a millimetre outside the skin [m], from where shadows are tested."""
+        """Positions a millimetre outside the skin [m], to test from there what hides them.
+
+        For visibility alone: a wave scattered there would be half a turn early at 75 GHz.
+        """
         return self.positions + LIFT_M * self.normals
 
 
@@ -77,13 +80,13 @@ def direct_channel(
     Returns:
         Complex128, shape (tx, rx, subcarrier), zero where a link is not measured.
     """
-    lifted = points.lifted
+    positions = points.positions
     tx_centres, rx_centres = centres(layout)
     tx_owner, rx_owner = owners(layout)
     shape = (len(layout.tx_xyz), len(layout.rx_xyz), radio.num_subcarriers)
     out = np.zeros(shape, dtype=np.complex128)
     for (a, b), (i, j) in product(site_pairs(layout), ports(layout)):
-        into, out_of = lifted - tx_centres[a], rx_centres[b] - lifted
+        into, out_of = positions - tx_centres[a], rx_centres[b] - positions
         tx_axes, rx_axes = (
             rotation(devices[owner].quat_wxyz) for owner in (tx_owner[a], rx_owner[b])
         )
@@ -95,7 +98,7 @@ def direct_channel(
         for material, coefficient in gamma.items():
             weights = np.where(points.material == material, factor, 0.0)
             part = facet_sum(
-                lifted,
+                positions,
                 points.normals,
                 points.areas,
                 layout.tx_xyz[tx],

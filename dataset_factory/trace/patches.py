@@ -73,13 +73,13 @@ def direct_paths(
     Returns:
         Paths of unit cross-section, one amplitude each.
     """
-    lifted = points.lifted
+    positions = points.positions
     tx_centres, rx_centres = centres(layout)
     tx_owner, rx_owner = owners(layout)
     columns = []
     for a, b in site_pairs(layout):
         index = np.flatnonzero(seen[a, b])
-        into, out_of = lifted[index] - tx_centres[a], rx_centres[b] - lifted[index]
+        into, out_of = positions[index] - tx_centres[a], rx_centres[b] - positions[index]
         axes = (rotation(devices[owner].quat_wxyz) for owner in (tx_owner[a], rx_owner[b]))
         tx_axes, rx_axes = axes
         spread = np.linalg.norm(into, axis=1) * np.linalg.norm(out_of, axis=1)
@@ -97,7 +97,7 @@ def direct_paths(
         ends = (np.broadcast_to(end, into.shape) for end in (tx_centres[a], rx_centres[b]))
         start, end = ends
         pair = np.broadcast_to([a, b], (len(index), 2))
-        columns.append((pair, amplitude, np.stack([start, lifted[index], end], axis=1), index))
+        columns.append((pair, amplitude, np.stack([start, positions[index], end], axis=1), index))
     pairs = np.concatenate([column[0] for column in columns])
     index = np.concatenate([column[3] for column in columns])[:, None]
     return PathSet(
@@ -134,8 +134,8 @@ def gathered(
     share = power / np.bincount(row, power, count)[row]
     at = np.argmax(paths.kinds == SCATTERING, axis=1)
     point = paths.primitives[np.arange(len(paths)), at]
-    lifted = points.lifted[point]
-    centre = np.stack([np.bincount(row, share * lifted[:, i], count) for i in range(3)], axis=1)
+    positions = points.positions[point]
+    centre = np.stack([np.bincount(row, share * positions[:, i], count) for i in range(3)], axis=1)
     chosen = paths.select(strongest)
     numbered = np.where(chosen.kinds == SCATTERING, np.arange(count)[:, None], chosen.primitives)
     rows = follow(replace(chosen, primitives=numbered), centre)

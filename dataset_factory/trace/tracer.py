@@ -249,7 +249,7 @@ class Tracer(BaseTracer):
         assert trace.bounced is not None
         paths = trace.bounced
         if points is not trace.points:
-            paths = follow(paths, points.lifted)
+            paths = follow(paths, points.positions)
         gamma = self._bodies.gamma(self._nodes)
         paths = with_facets(paths, points, gamma, self._nodes, self._radio.centre_hz)
         return steer(paths, self._layout, self._radio.freq_hz, self._nodes)

@@ -93,7 +93,7 @@ def crossings(
     bvh: Bvh,
     start: np.ndarray,
     end: np.ndarray,
-    to_m: float,
+    rim_m: float,
     at_m: np.ndarray,
     triangle: np.ndarray,
 ) -> int:
@@ -101,9 +101,9 @@ def crossings(
 
     Args:
         bvh: The triangles.
-        start: Where it starts [m], shape (3,); what is there does not count.
+        start: Where it starts [m], shape (3,).
         end: Where it leads to [m], shape (3,).
-        to_m: How far from the end it stops [m]; negative to go beyond.
+        rim_m: What is nearer to either end does not count [m].
         at_m: Filled with the distance of each crossing from the start [m].
         triangle: Filled with the triangle of each, the smallest of several at one place.
 
@@ -112,10 +112,10 @@ def crossings(
     """
     way = end - start
     length = math.sqrt((way * way).sum())
-    if length < SAME_M:
+    if length <= 2.0 * rim_m:
         return 0
     way = way / length
-    reach = length - to_m
+    reach = length - rim_m
     stack = np.zeros(_STACK, dtype=np.int64)
     size, found = 1, 0
     while size:
@@ -129,12 +129,59 @@ def crossings(
             continue
         for i in range(bvh.first[node], bvh.first[node] + bvh.count[node]):
             at = _hit(bvh.corners[i], start, way)
-            if at <= SAME_M or at >= reach:
+            if at <= rim_m or at >= reach:
                 continue
             found = _insert(at, bvh.triangle[i], at_m, triangle, found)
             if found > len(at_m):
                 return found
     return found
+
+
+@numba.njit(cache=True, nogil=True)
+def triangle_at(bvh: Bvh, group: np.ndarray, wanted: int, place: np.ndarray) -> int:
+    """Smallest triangle of a group that a place in its plane lies on, rim included; −1 for none.
+
+    Args:
+        bvh: The triangles.
+        group: Group of each triangle, shape (triangle,).
+        wanted: Which group.
+        place: The place [m], shape (3,).
+    """
+    stack = np.zeros(_STACK, dtype=np.int64)
+    size, best = 1, -1
+    while size:
+        size -= 1
+        node = stack[size]
+        outside = False
+        for axis in range(3):
+            outside |= place[axis] < bvh.low[node, axis] - SAME_M
+            outside |= place[axis] > bvh.high[node, axis] + SAME_M
+        if outside:
+            continue
+        if bvh.count[node] == 0 and len(bvh.first) > 1:
+            stack[size], stack[size + 1] = bvh.first[node] + 1, bvh.first[node]
+            size += 2
+            continue
+        for i in range(bvh.first[node], bvh.first[node] + bvh.count[node]):
+            index = bvh.triangle[i]
+            if group[index] == wanted and (best < 0 or index < best):
+                if _lies_on(bvh.corners[i], place):
+                    best = index
+    return best
+
+
+@numba.njit(cache=True, nogil=True)
+def _lies_on(corners: np.ndarray, place: np.ndarray) -> bool:
+    """Whether a place in the plane of a triangle is within `SAME_M` of it."""
+    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    normal = normal / np.sqrt((normal * normal).sum())
+    for i in range(3):
+        side = corners[(i + 1) % 3] - corners[i]
+        inward = np.cross(normal, side)
+        over = ((place - corners[i]) * inward).sum() / np.sqrt((side * side).sum())
+        if over < -SAME_M:
+            return False
+    return True
 
 
 @numba.njit(cache=True, nogil=True)

@@ -19,7 +19,7 @@ from jaxtyping import Bool, Float64
 
 from rfgs_core.radio.images import REFRACTION, SPECULAR
 from rfgs_core.simulate.beams import Beams, beams, hidden_by, onward
-from rfgs_core.simulate.bvh import SAME_M, crossings
+from rfgs_core.simulate.bvh import SAME_M, crossings, triangle_at
 from rfgs_core.simulate.faces import Faces, height, holds, mirrored
 
 #: Interactions of a path at most.
@@ -270,22 +270,20 @@ def _path(
         length = np.sqrt((way * way).sum())
         if length <= SAME_M:
             return False
-        # A mirror itself must be among what the segment meets, and at its end.
-        reach = SAME_M if last else -2.0 * SAME_M
-        found = crossings(faces.bvh, here, place, reach, at_m, hit)
-        if found + used > depth:
-            return False
-        if not last and (found == 0 or at_m[found - 1] < length - 2.0 * SAME_M):
+        # What merely touches the end of a segment does not count, from whichever side it comes.
+        found = crossings(faces.bvh, here, place, 2.0 * SAME_M, at_m, hit)
+        if found + used + (0 if last else 1) > depth:
             return False
         for k in range(found):
-            mirror = not last and k == found - 1
-            if mirror and faces.of_triangle[hit[k]] != chain[i]:
-                return False
-            kinds[used] = SPECULAR if mirror else REFRACTION
-            triangles[used] = hit[k]
-            corners[used] = place if mirror else here + way * (at_m[k] / length)
+            kinds[used], triangles[used] = REFRACTION, hit[k]
+            corners[used] = here + way * (at_m[k] / length)
             used += 1
         if last:
             return True
+        mirror = triangle_at(faces.bvh, faces.of_triangle, chain[i], place)
+        if mirror < 0:
+            return False
+        kinds[used], triangles[used], corners[used] = SPECULAR, mirror, place
+        used += 1
         here = place
     return True

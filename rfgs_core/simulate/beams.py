@@ -38,11 +38,15 @@ def hidden_by(faces: Faces, place: np.ndarray, most: int) -> np.ndarray:
     count = len(faces.normal)
     out = np.full(count, most, dtype=np.int64)
     at_m, triangle = np.zeros(most), np.zeros(most, dtype=np.int64)
+    rim_m = 2.0 * SAME_M
+    samples = faces.samples
     for face in range(count):
         if abs(height(faces, face, place)) < SAME_M:
             continue
         for i in range(faces.sample_start[face], faces.sample_start[face + 1]):
-            found = crossings(faces.bvh, place, faces.samples[i], SAME_M, at_m, triangle)
+            # No need to know by how many more than so far.
+            room = out[face] - 1
+            found = crossings(faces.bvh, place, samples[i], rim_m, at_m[:room], triangle)
             out[face] = min(out[face], found)
             if out[face] == 0:
                 break

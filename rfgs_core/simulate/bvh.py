@@ -110,31 +110,52 @@ def crossings(
     Returns:
         Number of crossings; more than fit into `at_m` count as one more than that.
     """
-    way = end - start
-    length = math.sqrt((way * way).sum())
+    x, y, z = start[0], start[1], start[2]
+    wx, wy, wz = end[0] - x, end[1] - y, end[2] - z
+    length = math.sqrt(wx * wx + wy * wy + wz * wz)
     if length <= 2.0 * rim_m:
         return 0
-    way = way / length
+    wx, wy, wz = wx / length, wy / length, wz / length
+    inverse_x, inverse_y, inverse_z = _inverse(wx), _inverse(wy), _inverse(wz)
     reach = length - rim_m
+    low, high, first, count, corners = bvh.low, bvh.high, bvh.first, bvh.count, bvh.corners
     stack = np.zeros(_STACK, dtype=np.int64)
     size, found = 1, 0
     while size:
         size -= 1
         node = stack[size]
-        if not _enters(bvh.low[node], bvh.high[node], start, way, reach):
+        near, far = _within(low[node, 0], high[node, 0], x, inverse_x, 0.0, reach)
+        near, far = _within(low[node, 1], high[node, 1], y, inverse_y, near, far)
+        near, far = _within(low[node, 2], high[node, 2], z, inverse_z, near, far)
+        if near > far:
             continue
-        if bvh.count[node] == 0 and len(bvh.first) > 1:
-            stack[size], stack[size + 1] = bvh.first[node] + 1, bvh.first[node]
+        if count[node] == 0 and len(first) > 1:
+            stack[size], stack[size + 1] = first[node] + 1, first[node]
             size += 2
             continue
-        for i in range(bvh.first[node], bvh.first[node] + bvh.count[node]):
-            at = _hit(bvh.corners[i], start, way)
+        for i in range(first[node], first[node] + count[node]):
+            at = _hit(corners, i, x, y, z, wx, wy, wz)
             if at <= rim_m or at >= reach:
                 continue
             found = _insert(at, bvh.triangle[i], at_m, triangle, found)
             if found > len(at_m):
                 return found
     return found
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _inverse(part: float) -> float:
+    """1 / part, large where there is none."""
+    return 1.0 / part if abs(part) > 1e-15 else 1e15
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _within(
+    low: float, high: float, start: float, inverse: float, near: float, far: float
+) -> tuple[float, float]:
+    """The part of a segment from `near` to `far` that lies between two planes, with a margin."""
+    a, b = (low - SAME_M - start) * inverse, (high + SAME_M - start) * inverse
+    return max(near, min(a, b)), min(far, max(a, b))
 
 
 @numba.njit(cache=True, nogil=True)
@@ -201,41 +222,31 @@ def _insert(at: float, index: int, at_m: np.ndarray, triangle: np.ndarray, found
     return found + 1
 
 
-@numba.njit(cache=True, nogil=True)
-def _enters(
-    low: np.ndarray, high: np.ndarray, start: np.ndarray, way: np.ndarray, reach: float
-) -> bool:
-    """Whether a segment meets a box."""
-    near, far = 0.0, reach
-    for axis in range(3):
-        below, above = low[axis] - SAME_M - start[axis], high[axis] + SAME_M - start[axis]
-        if abs(way[axis]) < 1e-15:
-            if below > 0.0 or above < 0.0:
-                return False
-            continue
-        a, b = below / way[axis], above / way[axis]
-        near, far = max(near, min(a, b)), min(far, max(a, b))
-    return near <= far
-
-
-@numba.njit(cache=True, nogil=True)
-def _hit(corners: np.ndarray, start: np.ndarray, way: np.ndarray) -> float:
-    """Distance at which a ray meets a triangle, −1 if not (Möller and Trumbore 1997)."""
-    ax, ay, az = corners[0, 0], corners[0, 1], corners[0, 2]
-    ux, uy, uz = corners[1, 0] - ax, corners[1, 1] - ay, corners[1, 2] - az
-    vx, vy, vz = corners[2, 0] - ax, corners[2, 1] - ay, corners[2, 2] - az
-    px = way[1] * vz - way[2] * vy
-    py = way[2] * vx - way[0] * vz
-    pz = way[0] * vy - way[1] * vx
+@numba.njit(cache=True, nogil=True, inline="always")
+def _hit(
+    corners: np.ndarray,
+    i: int,
+    x: float,
+    y: float,
+    z: float,
+    wx: float,
+    wy: float,
+    wz: float,
+) -> float:
+    """Distance at which a ray meets triangle i, −1 if not (Möller and Trumbore 1997)."""
+    ax, ay, az = corners[i, 0, 0], corners[i, 0, 1], corners[i, 0, 2]
+    ux, uy, uz = corners[i, 1, 0] - ax, corners[i, 1, 1] - ay, corners[i, 1, 2] - az
+    vx, vy, vz = corners[i, 2, 0] - ax, corners[i, 2, 1] - ay, corners[i, 2, 2] - az
+    px, py, pz = wy * vz - wz * vy, wz * vx - wx * vz, wx * vy - wy * vx
     det = ux * px + uy * py + uz * pz
     if det == 0.0:
         return -1.0
-    sx, sy, sz = start[0] - ax, start[1] - ay, start[2] - az
+    sx, sy, sz = x - ax, y - ay, z - az
     u = (sx * px + sy * py + sz * pz) / det
     if u < -_SEAM or u > 1.0 + _SEAM:
         return -1.0
     qx, qy, qz = sy * uz - sz * uy, sz * ux - sx * uz, sx * uy - sy * ux
-    v = (way[0] * qx + way[1] * qy + way[2] * qz) / det
+    v = (wx * qx + wy * qy + wz * qz) / det
     if v < -_SEAM or u + v > 1.0 + _SEAM:
         return -1.0
     return (vx * qx + vy * qy + vz * qz) / det

@@ -11,7 +11,7 @@ import drjit as dr
 
 from dataset_factory.bundle import Bundle
 from dataset_factory.trace.bodies import Bodies
-from dataset_factory.trace.bounces import BUFFER
+from dataset_factory.trace.bounces import DEPTHS
 from dataset_factory.trace.environment import node_frequencies
 from dataset_factory.trace.scene import check_materials
 from dataset_factory.trace.shadow import Shadow
@@ -52,7 +52,7 @@ class BaseTracer:
             RfgsError: A material does not hold in the radio's band, or the depth is not 1, 2
                 or 3, or more than the radio can have.
         """
-        if depth != 1 and depth not in BUFFER:
+        if depth != 1 and depth not in DEPTHS:
             raise RfgsError(f"trace depth {depth}: expected 1, 2 or 3")
         if depth > radio.deepest:
             raise RfgsError(too_deep(radio, depth))

@@ -19,6 +19,7 @@ from sionna.rt.rcs import ConstantCPM, ConstantRCS, RCSSolver, ScatteringModel, 
 
 from dataset_factory.trace.direct import PosedPoints
 from dataset_factory.trace.environment import measured_pairs
+from dataset_factory.trace.fields import SceneMeshes
 from dataset_factory.trace.held import follow
 from dataset_factory.trace.legs import LegCandidates
 from dataset_factory.trace.paths import PathSet, empty, merged, path_set
@@ -27,13 +28,16 @@ from rfgs_core.radio import Layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.images import SCATTERING
 from rfgs_core.radio.layout import DevicePose
+from rfgs_core.simulate import Surroundings, mirror_legs
 
 #: Points per call, for memory's sake; every call compiles kernels for its own path count.
 CHUNK = 4096
-#: Rays per point; 3,000 change the channel by −39 dB.
+#: Rays per point with two walls; legs with one are found without rays.
 NUM_SAMPLES = 1000
-#: Legs kept per point, by depth; with fewer, paths are lost without a word.
-BUFFER = {2: 128, 3: 512}
+#: Legs with two walls kept per point.
+BUFFER = 512
+#: Interactions of people's paths by way of walls, the scattering one included.
+DEPTHS = (2, 3)
 #: Paths weaker than this share of the strongest are left out: facets damped to nothing.
 NEGLIGIBLE = 1e-4
 
@@ -53,10 +57,10 @@ class JoiningSolver(RCSSolver):
         """Takes which pairs of sites are measured, bool, shape (tx, rx), and the depth."""
         super().__init__(deterministic=True)
         self._measured = measured
-        if depth == 2:
-            self._candidate_generator = LegCandidates()
         # Of this generator alone: every other solver needs Sionna's own, or it loses paths.
         self._candidate_generator.MIN_SPEC_COUNT_SIZE = TABLE
+        if depth == 2:
+            self._candidate_generator = self.legs = LegCandidates()
 
     def _pair_legs(
         self, from_tx_paths: Any, to_rx_paths: Any, max_depth: int
@@ -85,18 +89,25 @@ class Bounces:
     """Traces person paths with at least one wall in them, frame after frame."""
 
     def __init__(
-        self, scene: rt.Scene, layout: Layout, devices: list[DevicePose], depth: int, seed: int
+        self,
+        scene: rt.Scene,
+        meshes: SceneMeshes,
+        layout: Layout,
+        devices: list[DevicePose],
+        depth: int,
+        seed: int,
     ) -> None:
         """Hangs a carrier of scattering points under the scene.
 
         Args:
             scene: Scene with the moving body in it, without devices.
+            meshes: Meshes of the scene, without the body.
             layout: Antenna elements.
             devices: Poses of the devices.
             depth: Interactions per path, the scattering one included: 2 or 3.
             seed: Seed of the rays, the same for every frame.
         """
-        self._scene, self._layout = scene, layout
+        self._scene, self._meshes, self._layout = scene, meshes, layout
         self._depth, self._seed = depth, seed
         self._solver = JoiningSolver(measured_pairs(layout), depth)
         self._rcs, self._cpm = ConstantRCS(1.0), ConstantCPM()
@@ -115,26 +126,35 @@ class Bounces:
         scene.edit(add=self._carrier)
         add_antennas(scene, layout, devices)
 
-    def paths(self, points: PosedPoints) -> PathSet:
+    def paths(self, points: PosedPoints, around: Surroundings) -> PathSet:
         """Paths by way of each point and one or more walls, one amplitude each.
 
         Rays are cast from outside the skin, lengths are those to the skin itself.
 
-        Amplitudes are those of points of unit cross-section; `primitives` of the sensing
-        interaction is the index of the point.
+        Args:
+            points: The points, the body in place.
+            around: What the sites see of the faces around, as `Environment.around`.
+
+        Returns:
+            Amplitudes are those of points of unit cross-section; `primitives` of the sensing
+            interaction is the index of the point.
         """
         starts = range(0, len(points.areas), CHUNK)
-        found = merged([self._chunk(points.lifted[i : i + CHUNK], i) for i in starts])
+        found = merged([self._chunk(points.lifted[i : i + CHUNK], i, around) for i in starts])
         return follow(found, points.positions)
 
-    def _chunk(self, places: np.ndarray, first: int) -> PathSet:
+    def _chunk(self, places: np.ndarray, first: int, around: Surroundings) -> PathSet:
         """Paths through a few points; point indices count from `first`."""
         self._hang(places)
+        room = BUFFER
+        if self._depth == 2:
+            legs, sites = mirror_legs(around, places), len(around.tx_xyz) + len(around.rx_xyz)
+            room = self._solver.legs.prepare(self._scene, self._meshes, legs, len(places), sites)
         paths = self._solver(
             self._scene,
             max_depth=self._depth,
             samples_per_sp=NUM_SAMPLES,
-            buffer_size_per_sp=BUFFER[self._depth],
+            buffer_size_per_sp=room,
             synthetic_array=True,
             seed=self._seed,
         )

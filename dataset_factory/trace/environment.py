@@ -27,7 +27,13 @@ from dataset_factory.trace.steering import steer
 from rfgs_core.radio import Layout, Radio
 from rfgs_core.radio.images import DIFFUSE
 from rfgs_core.radio.layout import DevicePose
-from rfgs_core.simulate import SpecularPaths, faces_of, specular_paths
+from rfgs_core.simulate import (
+    SpecularPaths,
+    Surroundings,
+    faces_of,
+    specular_paths,
+    surroundings,
+)
 
 #: Interactions of an environment path; a fourth would change bistatic links by −39 dB.
 MAX_DEPTH = 3
@@ -84,7 +90,9 @@ class Environment:
         self._vehicles = vehicles
         self._scatters = any(row["scattering_coefficient"] > 0.0 for row in bundle.materials)
         self._scene = environment_scene(bundle, radio, vehicles)
-        self._meshes = SceneMeshes(bundle, vehicles)
+        self.meshes = SceneMeshes(bundle, vehicles)
+        #: Faces of the scene and what the sites see of them, where it was traced last.
+        self.around: Surroundings | None = None
         self._fields, self._solver = Fields(), rt.PathSolver(deterministic=True)
 
     @property
@@ -95,7 +103,7 @@ class Environment:
     @property
     def reflects(self) -> bool:
         """Whether there is anything to bounce off."""
-        return len(self._meshes.names) > 0
+        return len(self.meshes.names) > 0
 
     def paths(self, vertices: np.ndarray | None = None) -> PathSet:
         """Traces the scene; the result does not depend on what was traced before.
@@ -113,9 +121,9 @@ class Environment:
         """
         if self._vehicles is not None and vertices is not None:
             move_vehicles(self._scene, self._vehicles, vertices)
-        ends = centres(self._layout)
-        faces = faces_of(*self._meshes.triangles(vertices))
-        found = specular_paths(faces, *ends, measured_pairs(self._layout), MAX_DEPTH)
+        faces = faces_of(*self.meshes.triangles(vertices))
+        self.around = surroundings(faces, *centres(self._layout))
+        found = specular_paths(self.around, measured_pairs(self._layout), MAX_DEPTH)
         parts = []
         for group in self._groups:
             add_antennas(self._scene, self._layout, self._devices, group)
@@ -131,7 +139,7 @@ class Environment:
         some = SpecularPaths(*(column[here] for column in found))
         tx, rx = np.searchsorted(group[0], some.tx), np.searchsorted(group[1], some.rx)
         some = some._replace(tx=tx, rx=rx)
-        return lambda freq_hz: self._fields.along(self._scene, self._meshes, some, freq_hz)
+        return lambda freq_hz: self._fields.along(self._scene, self.meshes, some, freq_hz)
 
     def _scattered(self, freq_hz: float) -> rt.Paths:
         """Paths found by rays at one frequency, those with diffuse reflections among them."""

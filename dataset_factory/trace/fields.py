@@ -47,10 +47,19 @@ class SceneMeshes:
         mesh = np.repeat(np.arange(len(parts)), np.diff(self._first))
         return np.concatenate([np.zeros((0, 3, 3), np.float32), *parts]), mesh
 
-    def places(self, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mesh of each triangle, and the triangle's index in it."""
-        mesh = np.searchsorted(self._first, triangles, side="right") - 1
-        return mesh, triangles - self._first[mesh]
+    def located(self, scene: rt.Scene, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Shape of each triangle, as Sionna stores it, and the triangle's index in it, uint32.
+
+        Args:
+            scene: A scene with these meshes.
+            triangles: Triangles, −1 for none.
+        """
+        pointers = [_pointer(scene, name) for name in self.names]
+        mesh = np.searchsorted(self._first, np.maximum(triangles, 0), side="right") - 1
+        shape = np.array(pointers or [INVALID_SHAPE], dtype=np.uint32)[mesh]
+        index = np.maximum(triangles, 0) - self._first[mesh]
+        missing = triangles < 0
+        return np.where(missing, np.uint32(INVALID_SHAPE), shape), index.astype(np.uint32)
 
 
 class Fields:
@@ -97,18 +106,14 @@ def _buffer(scene: rt.Scene, meshes: SceneMeshes, found: SpecularPaths) -> Paths
     """The paths as Sionna stores them, all of them valid."""
     count, depth = found.kinds.shape
     buffer: Any = PathsBuffer(count, depth, False)
-    met = found.kinds != 0
-    number, triangle = meshes.places(np.where(met, found.triangles, 0))
-    pointers = np.array([_pointer(scene, name) for name in meshes.names] or [0], dtype=np.uint32)
-    shape = np.where(met, pointers[number], np.uint32(INVALID_SHAPE))
-    triangle = np.where(met, triangle, 0)
+    shape, triangle = meshes.located(scene, found.triangles)
     buffer._paths_counter = mi.UInt(count)
     buffer.valid = dr.full(mi.Bool, True, count)
     buffer._src_indices = mi.UInt(found.tx.astype(np.uint32))
     buffer._tgt_indices = mi.UInt(found.rx.astype(np.uint32))
     buffer._interaction_types = mi.TensorXu(found.kinds.astype(np.uint32))
     buffer._shapes = mi.TensorXu(shape.astype(np.uint32))
-    buffer._primitives = mi.TensorXu(triangle.astype(np.uint32))
+    buffer._primitives = mi.TensorXu(triangle)
     buffer._probs = mi.TensorXf(np.ones((count, depth), dtype=np.float32))
     corners = np.moveaxis(found.corners.astype(np.float32), 2, 0)
     buffer._vertices_x, buffer._vertices_y, buffer._vertices_z = (

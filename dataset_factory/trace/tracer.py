@@ -70,9 +70,8 @@ class Tracer(BaseTracer):
         self._bounces: Bounces | None = None
         # Where there is nothing to bounce off, a second interaction has nowhere to be.
         if bodies.scatter and depth > 1 and environment.reflects:
-            self._bounces = Bounces(
-                bodies.scene, self._layout, devices, depth, sub_seed(seed, "bounces")
-            )
+            rays, meshes = sub_seed(seed, "bounces"), environment.meshes
+            self._bounces = Bounces(bodies.scene, meshes, self._layout, devices, depth, rays)
 
     def static(self) -> np.ndarray:
         """Channel without anything that moves, complex64, shape (tx, rx, subcarrier)."""
@@ -175,9 +174,10 @@ class Tracer(BaseTracer):
         with self._timed("people_direct"):
             seen = in_sight(self._bodies.scene.mi_scene, points, self._layout)
         bounced = None
-        if self._bounces is not None:
+        around = self._environment.around
+        if self._bounces is not None and around is not None:
             with self._timed("people_bounces"):
-                bounced = self._bounces.paths(points)
+                bounced = self._bounces.paths(points, around)
         return Trace(environment, paths, outlines, points, seen, bounced)
 
     def _environment_at(self, vertices: np.ndarray) -> np.ndarray:

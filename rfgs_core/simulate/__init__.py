@@ -1,7 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Geometry of propagation without a tracer: specular paths found exhaustively, in double."""
+"""Geometry of propagation without a tracer: paths found exhaustively, in double precision."""
 
 from rfgs_core.simulate.faces import Faces, faces_of
+from rfgs_core.simulate.legs import Legs, mirror_legs
 from rfgs_core.simulate.specular import SpecularPaths, specular_paths
+from rfgs_core.simulate.surroundings import Surroundings, surroundings
 
-__all__ = ["Faces", "SpecularPaths", "faces_of", "specular_paths"]
+__all__ = [
+    "Faces",
+    "Legs",
+    "SpecularPaths",
+    "Surroundings",
+    "faces_of",
+    "mirror_legs",
+    "specular_paths",
+    "surroundings",
+]

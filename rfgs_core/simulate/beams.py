@@ -300,7 +300,6 @@ def _gathered(
     return Beams(start, narrow, by, seen, low, high)
 
 
-
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def onward(
     beams: Beams, begin: int, end: int, target: np.ndarray, rim: np.ndarray, out: np.ndarray

@@ -15,12 +15,13 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from jaxtyping import Bool, Float64
+from jaxtyping import Bool
 
 from rfgs_core.radio.images import REFRACTION, SPECULAR
-from rfgs_core.simulate.beams import Beams, beams, hidden_by, onward
+from rfgs_core.simulate.beams import Beams, beams, onward
 from rfgs_core.simulate.bvh import SAME_M, crossings, triangle_at
 from rfgs_core.simulate.faces import Faces, height, holds, mirrored
+from rfgs_core.simulate.surroundings import Surroundings
 
 #: Interactions of a path at most.
 MAX_DEPTH = 3
@@ -44,18 +45,12 @@ class SpecularPaths(NamedTuple):
 
 
 def specular_paths(
-    faces: Faces,
-    tx_xyz: Float64[np.ndarray, "tx 3"],
-    rx_xyz: Float64[np.ndarray, "rx 3"],
-    wanted: Bool[np.ndarray, "tx rx"],
-    depth: int = MAX_DEPTH,
+    around: Surroundings, wanted: Bool[np.ndarray, "tx rx"], depth: int = MAX_DEPTH
 ) -> SpecularPaths:
     """Paths with up to `depth` reflections and crossings between antennas.
 
     Args:
-        faces: What there is.
-        tx_xyz: Transmitters [m].
-        rx_xyz: Receivers [m].
+        around: Faces and antennas.
         wanted: Pairs to search for.
         depth: Most reflections and crossings of a path, 0 to 3.
 
@@ -64,21 +59,18 @@ def specular_paths(
     """
     if not 0 <= depth <= MAX_DEPTH:
         raise ValueError(f"depth {depth}: expected 0 to {MAX_DEPTH}")
-    tx_xyz, rx_xyz = (np.ascontiguousarray(xyz, dtype=np.float64) for xyz in (tx_xyz, rx_xyz))
-
-    def hidden(place: np.ndarray) -> np.ndarray:
-        return hidden_by(faces, place, 2)
+    faces, tx_xyz, rx_xyz = around.faces, around.tx_xyz, around.rx_xyz
 
     def lit(place: np.ndarray, behind: np.ndarray) -> Beams:
         return beams(faces, place, np.flatnonzero(behind == 0))
 
     def of_receiver(rx: int) -> list[np.ndarray]:
         """What is found between a receiver and all its transmitters."""
-        r, r_hidden = rx_xyz[rx], hidden(rx_xyz[rx])
+        r, r_hidden = rx_xyz[rx], around.rx_hidden[rx]
         r_beams = lit(r, r_hidden)
         found = []
         for tx in np.flatnonzero(wanted[:, rx]):
-            t, t_hidden = tx_xyz[tx], tx_hidden[tx]
+            t, t_hidden = tx_xyz[tx], around.tx_hidden[tx]
             t_beams = tx_beams[tx] if tx_beams else lit(t, t_hidden)
             chains = [np.full((1, MAX_DEPTH), -1)]
             if depth > 0:
@@ -95,9 +87,8 @@ def specular_paths(
 
     receivers = [int(rx) for rx in np.flatnonzero(wanted.any(axis=0))]
     with ThreadPoolExecutor(numba.get_num_threads()) as pool:
-        tx_hidden = list(pool.map(hidden, tx_xyz))
         # Beams of many transmitters would fill the memory; each of those has few receivers.
-        tx_beams = list(pool.map(lit, tx_xyz, tx_hidden)) if len(tx_xyz) <= _KEPT else []
+        tx_beams = list(pool.map(lit, tx_xyz, around.tx_hidden)) if len(tx_xyz) <= _KEPT else []
         rows = list(pool.map(of_receiver, receivers))
     return _assembled(wanted, receivers, rows, rx_xyz, depth)
 
@@ -216,9 +207,7 @@ def _verified(
         kinds[count], triangles[count], corners[count] = 0, -1, 0.0
         if not _mirror_places(faces, tx, rx, chain, mirrors):
             continue
-        if not _path(
-            faces, tx, rx, chain, mirrors, kinds[count], triangles[count], corners[count]
-        ):
+        if not _path(faces, tx, rx, chain, mirrors, kinds[count], triangles[count], corners[count]):
             continue
         known = False
         for k in range(count):

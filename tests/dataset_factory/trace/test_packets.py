@@ -92,7 +92,7 @@ def test_moved_bounces_keep_the_law_of_reflection(
     assert trace.points is not None and trace.bounced is not None
     paths = trace.bounced.select(np.arange(0, len(trace.bounced), 50))
     shift = np.array([0.012, -0.007, 0.004])
-    moved = follow(paths, trace.points.lifted + shift)
+    moved = follow(paths, trace.points.positions + shift)
     specular = paths.mirrors()
     assert specular.sum(axis=1).max() == 2 and len(paths) > 200
     # Walls of the room are x, y or z = constant: a corner keeps that coordinate …
@@ -110,8 +110,8 @@ def test_moved_bounces_keep_the_law_of_reflection(
     whole = [paths.length_m, moved.length_m]
     ratio = legs[0] / legs[1] * (whole[0] - legs[0]) / (whole[1] - legs[1])
     assert np.allclose(moved.amplitude[:, 0, 0] / paths.amplitude[:, 0, 0], ratio, rtol=1e-9)
-    assert np.array_equal(follow(paths, trace.points.lifted).kinds, paths.kinds)
-    assert np.allclose(follow(paths, trace.points.lifted).vertices, paths.vertices, atol=1e-6)
+    assert np.array_equal(follow(paths, trace.points.positions).kinds, paths.kinds)
+    assert np.allclose(follow(paths, trace.points.positions).vertices, paths.vertices, atol=1e-6)
 
 
 def test_packets_agree_with_tracing_each_of_them(

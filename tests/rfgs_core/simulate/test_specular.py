@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 from rfgs_core.radio.images import REFRACTION, SPECULAR
-from rfgs_core.simulate import SpecularPaths, faces_of, specular_paths
+from rfgs_core.simulate import SpecularPaths, faces_of, mirror_legs, specular_paths, surroundings
 from rfgs_core.simulate.bvh import build_bvh, crossings
 
 ROOM_M = np.array([4.0, 5.0, 2.6])
@@ -39,17 +39,22 @@ def furnished() -> list[np.ndarray]:
     return [
         *room(),
         box([0.5, 1.1, 1.8], [3.4, 1.2, 0.0]),
-        table.reshape(-1, 3, 3) + [1.0, 3.3, 0.75],
+        table.reshape(-1, 3, 3) + np.array([1.0, 3.3, 0.75]),
         screen,
-        np.asarray(pyramid) + [2.2, 1.4, 0.6],
+        np.asarray(pyramid) + np.array([2.2, 1.4, 0.6]),
     ]
+
+
+def ball() -> np.ndarray:
+    round_one = trimesh.creation.icosphere(subdivisions=3, radius=0.4)
+    return np.asarray(round_one.triangles) + np.array([2.0, 2.0, 1.0])
 
 
 def search(meshes: list[np.ndarray], tx=TX, rx=RX, depth: int = 3, **options) -> SpecularPaths:
     mesh = np.repeat(np.arange(len(meshes)), [len(part) for part in meshes])
     faces = faces_of(np.concatenate(meshes), mesh, **options)
     tx, rx = np.atleast_2d(tx), np.atleast_2d(rx)
-    return specular_paths(faces, tx, rx, np.ones((len(tx), len(rx)), dtype=bool), depth)
+    return specular_paths(surroundings(faces, tx, rx), np.ones((len(tx), len(rx)), bool), depth)
 
 
 def lengths(paths: SpecularPaths, tx=TX, rx=RX) -> np.ndarray:
@@ -159,8 +164,7 @@ def test_furnished_room_has_the_paths_of_a_plain_search() -> None:
 
 
 def test_exchanging_the_ends_reverses_the_paths() -> None:
-    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.4).triangles + [2.0, 2.0, 1.0]
-    meshes = [*furnished(), np.asarray(ball)]
+    meshes = [*furnished(), ball()]
     there, back = search(meshes), search(meshes, RX, TX)
     assert len(there.tx) == len(back.tx) > 50
     ours, theirs = np.sort(lengths(there)), np.sort(lengths(back, RX, TX))
@@ -170,7 +174,7 @@ def test_exchanging_the_ends_reverses_the_paths() -> None:
 def test_a_mirror_point_on_the_rim_of_two_faces_counts_once_both_ways() -> None:
     """Antennas that mirror each other put it exactly where a wall's two parts meet."""
     wall = np.array([[[0, -3, 0], [0, 3, 0], [0, 3, 1.5]], [[0, -3, 0], [0, 3, 1.5], [0, -3, 1.5]]])
-    upper = wall + [0.0, 0.0, 1.5]
+    upper = wall + np.array([0.0, 0.0, 1.5])
     lintel = np.array([[[0, -3, 1.5], [0, 3, 1.5], [-0.2, 3, 1.5]]], dtype=float)
     ends = np.array([1.3, 0.7, 1.1]), np.array([1.3, -0.4, 1.9])
     for meshes in ([wall, upper], [upper, wall, lintel], [lintel, wall, upper]):
@@ -180,8 +184,7 @@ def test_a_mirror_point_on_the_rim_of_two_faces_counts_once_both_ways() -> None:
 
 
 def test_more_samples_on_the_faces_find_nothing_new() -> None:
-    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.4).triangles + [2.0, 2.0, 1.0]
-    meshes = [*furnished(), np.asarray(ball)]
+    meshes = [*furnished(), ball()]
     assert as_rows(search(meshes)) == as_rows(search(meshes, sample_m=0.05))
 
 
@@ -197,7 +200,8 @@ def test_no_path_has_more_interactions_than_asked_for(depth: int) -> None:
 def test_sheets_between_the_antennas_are_crossed_and_counted() -> None:
     wall = np.array([[[-5, 0, -5], [5, 0, -5], [5, 0, 5]], [[-5, 0, -5], [5, 0, 5], [-5, 0, 5]]])
     for sheets in range(5):
-        meshes = [wall + [0.0, 0.4 * i + 0.2, 0.0] for i in range(sheets)] or [wall - [0, 9.0, 0]]
+        shifts = [0.4 * i + 0.2 for i in range(sheets)] or [-9.0]
+        meshes = [wall + np.array([0.0, shift, 0.0]) for shift in shifts]
         # The way leads through the diagonal that both triangles of each sheet share.
         start, end = np.array([0.1, -1.0, 0.1]), np.array([0.1, 3.0, 0.1])
         straight = search(meshes, start, end).kinds
@@ -224,7 +228,8 @@ def test_only_wanted_pairs_are_searched() -> None:
     mesh = np.zeros(12, dtype=int)
     faces = faces_of(room()[0], mesh)
     wanted = np.array([[True, False], [True, True]])
-    paths = specular_paths(faces, np.stack([TX, RX]), np.stack([RX + 0.1, TX + 0.1]), wanted)
+    ends = np.stack([TX, RX]), np.stack([RX + 0.1, TX + 0.1])
+    paths = specular_paths(surroundings(faces, *ends), wanted)
     pairs, count = np.unique(np.stack([paths.tx, paths.rx]), axis=1, return_counts=True)
     assert pairs.T.tolist() == [[0, 0], [1, 0], [1, 1]]
     assert count.tolist() == [63, 63, 63]
@@ -232,7 +237,7 @@ def test_only_wanted_pairs_are_searched() -> None:
 
 def test_nothing_around_leaves_the_line_of_sight() -> None:
     faces = faces_of(np.zeros((0, 3, 3)), np.zeros(0, dtype=int))
-    paths = specular_paths(faces, TX[None], RX[None], ALL)
+    paths = specular_paths(surroundings(faces, TX[None], RX[None]), ALL)
     assert paths.kinds.tolist() == [[0, 0, 0]]
     assert np.array_equal(paths.corners[0], np.tile(RX, (3, 1)))
 
@@ -240,7 +245,7 @@ def test_nothing_around_leaves_the_line_of_sight() -> None:
 def test_a_senseless_depth_is_refused() -> None:
     faces = faces_of(room()[0], np.zeros(12, dtype=int))
     with pytest.raises(ValueError, match="depth 4: expected 0 to 3"):
-        specular_paths(faces, TX[None], RX[None], ALL, depth=4)
+        specular_paths(surroundings(faces, TX[None], RX[None]), ALL, depth=4)
 
 
 def test_crossings_are_those_of_a_plain_test() -> None:
@@ -259,3 +264,22 @@ def test_crossings_are_those_of_a_plain_test() -> None:
         order = np.argsort(t[inside])
         assert hit[:found].tolist() == np.flatnonzero(inside)[order].tolist()
         np.testing.assert_allclose(at_m[:found], np.sort(t[inside]) * np.linalg.norm(way))
+
+
+def test_legs_of_points_are_the_single_mirrors_of_paths() -> None:
+    """Those in sight: a leg's rest is tested by whoever uses it."""
+    meshes = furnished()
+    mesh = np.repeat(np.arange(len(meshes)), [len(part) for part in meshes])
+    faces = faces_of(np.concatenate(meshes), mesh)
+    points = np.random.default_rng(1).uniform([0.2, 0.2, 0.1], ROOM_M - 0.2, (40, 3))
+    ends = np.stack([TX, RX])
+    legs = mirror_legs(surroundings(faces, ends[:1], ends[1:]), points)
+    paths = specular_paths(surroundings(faces, points, ends), np.ones((40, 2), bool), depth=1)
+    single = paths.kinds[:, 0] == SPECULAR
+    keys = np.stack([paths.tx, paths.rx, paths.triangles[:, 0]], axis=1)[single]
+    rows = zip(legs.point, legs.site, legs.triangle, strict=True)
+    found = dict(zip(rows, legs.place, strict=True))
+    assert single.sum() > 300
+    for key, place in zip(keys, paths.corners[single, 0], strict=True):
+        np.testing.assert_allclose(found[tuple(key)], place, atol=1e-9)
+    assert len(found) < 1.5 * single.sum()

@@ -85,7 +85,8 @@ class Fields:
         targets, target_turns, rx_offsets, rx_speeds = scene.targets(True, True)
         buffer = _buffer(scene, meshes, found)
         arrays: Any = (scene.tx_array, scene.rx_array)
-        self._calculator(
+        calculator: Any = self._calculator
+        calculator(
             wavelength=scene.wavelength,
             paths=buffer,
             samples_per_src=1,

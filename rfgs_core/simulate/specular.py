@@ -104,9 +104,13 @@ def _assembled(
     pairs = sorted(parts)
     count = [len(parts[pair][0]) for pair in pairs]
     ends = np.repeat(np.array(pairs, dtype=np.int64).reshape(-1, 2), count, axis=0)
-    empty = np.zeros((0, depth), np.int64), np.zeros((0, depth), np.int64), np.zeros((0, depth, 3))
-    columns = zip(*(parts[pair] for pair in pairs), strict=True) if pairs else empty
-    kinds, triangles, corners = (np.concatenate(part) if pairs else part for part in columns)
+    nothing = (
+        np.zeros((0, depth), np.int64),
+        np.zeros((0, depth), np.int64),
+        np.zeros((0, depth, 3)),
+    )
+    rows = [nothing, *(parts[pair] for pair in pairs)]
+    kinds, triangles, corners = (np.concatenate(column) for column in zip(*rows, strict=True))
     corners = np.where((kinds == 0)[:, :, None], rx_xyz[ends[:, 1]][:, None], corners)
     return SpecularPaths(ends[:, 0], ends[:, 1], kinds, triangles, corners)
 

@@ -16,8 +16,11 @@ from scipy.sparse.csgraph import connected_components
 from dataset_factory.bundle import SHARP, SMOOTH
 
 #: Triangles that meet at a larger angle have an edge between them, unless the mesh says
-#: otherwise [deg]: more than the 45° of a limb of eight sides, less than the 60° of a hexagon.
-EDGE_DEG = 50.0
+#: otherwise [deg]: less than the 45° of a bevelled edge, more than the 36° between the sides of
+#: a limb of ten.
+EDGE_DEG = 40.0
+#: Triangles that meet at a larger angle are the two sides of a sheet, whatever the mesh says.
+_FOLDED_DEG = 170.0
 #: Triangles at one edge that are compared with each other; a sheet of two layers has four.
 _MOST_AT_AN_EDGE = 4
 
@@ -43,9 +46,8 @@ def smooth_sides(vertices: np.ndarray, faces: np.ndarray, edges: np.ndarray) -> 
         pairs.append(np.stack([first[same], second[same]], axis=1))
     pairs = np.concatenate(pairs)
     said = edges.reshape(-1)[pairs]
-    smooth = np.where(
-        (said == SMOOTH).all(axis=1), True, _nearly_flat(vertices, faces, pairs // 3)
-    )
+    largest_deg = np.where((said == SMOOTH).all(axis=1), _FOLDED_DEG, EDGE_DEG)
+    smooth = _meet_below(vertices, faces, pairs // 3, largest_deg)
     return pairs[smooth & ~(said == SHARP).any(axis=1)]
 
 
@@ -74,13 +76,15 @@ def smooth_patches(pairs: np.ndarray, count: int) -> np.ndarray:
     return _connected(pairs[:, 0] // 3, pairs[:, 1] // 3, count)
 
 
-def _nearly_flat(vertices: np.ndarray, faces: np.ndarray, pairs: np.ndarray) -> np.ndarray:
-    """Whether two triangles meet at less than `EDGE_DEG`; triangles without area always do."""
+def _meet_below(
+    vertices: np.ndarray, faces: np.ndarray, pairs: np.ndarray, largest_deg: np.ndarray
+) -> np.ndarray:
+    """Whether two triangles meet at less than an angle; triangles without area always do."""
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     across = np.cross(b - a, c - a)
     size = np.linalg.norm(across, axis=1)
     cosine = np.einsum("px,px->p", across[pairs[:, 0]], across[pairs[:, 1]])
-    return cosine >= np.cos(np.radians(EDGE_DEG)) * size[pairs[:, 0]] * size[pairs[:, 1]]
+    return cosine >= np.cos(np.radians(largest_deg)) * size[pairs[:, 0]] * size[pairs[:, 1]]
 
 
 def _connected(rows: np.ndarray, cols: np.ndarray, count: int) -> np.ndarray:

@@ -24,6 +24,8 @@ _FLAT = 1.0 - 1e-7
 #: Points on flat patches for each one elsewhere: what a face sends aslant is thousands of times
 #: weaker than its points, which random cells of the ordinary size do not cancel well enough.
 _FLAT_DENSITY = 1.5
+#: Most points of a strip for each one of a wide patch of the same area.
+_NARROWEST = 4.0
 #: Largest barycentric coordinate of a centroid in the plane of its triangle.
 _FARTHEST = 10.0
 
@@ -89,7 +91,8 @@ def _lloyd(
     vector = _vector_areas(vertices, faces)
     area = np.linalg.norm(vector, axis=1)
     flat = np.linalg.norm(vector.sum(axis=0)) >= _FLAT * area.sum()
-    count = max(int(np.ceil(area.sum() * per_m2 * (_FLAT_DENSITY if flat else 1.0))), 1)
+    per_m2 *= _flat_density(vertices[faces], area, per_m2) if flat else 1.0
+    count = max(int(np.ceil(area.sum() * per_m2)), 1)
     index, barycentric = _dense_samples(area, count * _SAMPLES_PER_POINT, rng)
     places = np.einsum("pc,pcx->px", barycentric, vertices[faces[index]])
     # Every n-th sample along a space-filling curve is an even start.
@@ -109,6 +112,26 @@ def _lloyd(
     if flat:
         barycentric = _moved(vertices[faces[index]], barycentric, centroids)
     return index, barycentric, size * (area.sum() / len(places))
+
+
+def _flat_density(corners: np.ndarray, area: np.ndarray, per_m2: float) -> float:
+    """How many times as many points a flat patch takes as other surfaces.
+
+    A strip narrower than a cell has longer cells instead of fewer, and the phase turns too far
+    along them: it takes points as if it were a cell wide.
+
+    Args:
+        corners: Its triangles [m], shape (T, 3, 3).
+        area: Their areas [m²], shape (T,).
+        per_m2: Points per square metre of other surfaces.
+    """
+    middle = corners.mean(axis=1)
+    centre = area @ middle / area.sum()
+    around = np.concatenate([corners - centre, 3.0 * (middle - centre)[:, None]], axis=1)
+    second = np.einsum("t,tcx,tcy->xy", area, around, around) / (12.0 * area.sum())
+    width_m = np.sqrt(12.0 * max(np.linalg.eigvalsh(second)[1], 0.0))
+    spacing_m = 1.0 / np.sqrt(_FLAT_DENSITY * per_m2)
+    return _FLAT_DENSITY * min(max(spacing_m / max(width_m, 1e-9), 1.0), _NARROWEST)
 
 
 def _dense_samples(

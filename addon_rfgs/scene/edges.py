@@ -44,10 +44,13 @@ def mesh_edges(mesh: bpy.types.Mesh) -> np.ndarray:
     flat = ~_read(mesh.polygons, "use_smooth", dtype=bool)
     marked = _read(mesh.edges, "use_edge_sharp", dtype=bool)
     polygon = _read(mesh.loop_triangles, "polygon_index")
-    if mesh.has_custom_normals and not _flat_all_over(mesh, loops, polygon):
-        return _custom_edges(mesh, loops)
+    unsaid = np.full(loops.shape, UNSAID, np.int8)
+    if mesh.has_custom_normals:
+        # Marks are no word of their own here: Blender adds them where custom normals part.
+        flat_all_over = _flat_all_over(mesh, loops, polygon)
+        return unsaid if flat_all_over else _custom_edges(mesh, loops)
     if not marked.any() and flat.all() == flat.any():
-        return np.full(loops.shape, UNSAID, np.int8)
+        return unsaid
     following = _following(mesh)
     edge = _read(mesh.loops, "edge_index")[loops]
     # The other sides are diagonals of polygons: those are smooth.

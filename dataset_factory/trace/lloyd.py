@@ -15,6 +15,8 @@ from scipy.spatial import KDTree
 
 _SAMPLES_PER_POINT = 40
 _LLOYD_STEPS = 20
+#: On flat patches, where centres move freely and settle sooner.
+_FLAT_STEPS = 8
 #: Patches below this share of a cell are left out, the smallest first ...
 _NEGLIGIBLE_CELLS = 0.5
 #: ... and together no more than this share of the surface.
@@ -99,7 +101,7 @@ def _lloyd(
     along = np.argsort(_morton(places), kind="stable")
     centres = places[along[_SAMPLES_PER_POINT // 2 :: _SAMPLES_PER_POINT]]
     tree, cells = KDTree(places), Cells(places, along)
-    for _ in range(_LLOYD_STEPS):
+    for _ in range(_FLAT_STEPS if flat else _LLOYD_STEPS):
         moved, _ = _centroids(places, cells.around(centres), centres)
         if not flat:
             moved = places[np.unique(tree.query(moved)[1])]

@@ -54,8 +54,7 @@ def mesh_of(boxes: list[Box], cells: int = 1, side_m: float = np.inf) -> tuple:
     vertices, faces, first = [], [], 0
     for face in (face for each in boxes for face in each.faces):
         n, m = (
-            max(cells, int(np.ceil(np.linalg.norm(s) / side_m)))
-            for s in (face.side_u, face.side_v)
+            max(cells, int(np.ceil(np.linalg.norm(s) / side_m))) for s in (face.side_u, face.side_v)
         )
         u, v = np.meshgrid(np.arange(n + 1) / n, np.arange(m + 1) / m, indexing="ij")
         places = face.corner + u.reshape(-1, 1) * face.side_u + v.reshape(-1, 1) * face.side_v
@@ -81,9 +80,7 @@ def in_sight(points: np.ndarray, place: np.ndarray, boxes: list[Box]) -> np.ndar
     return free
 
 
-def scattered(
-    boxes: list[Box], tx: np.ndarray, rx: np.ndarray, freq_hz: np.ndarray
-) -> np.ndarray:
+def scattered(boxes: list[Box], tx: np.ndarray, rx: np.ndarray, freq_hz: np.ndarray) -> np.ndarray:
     """H / Γ = (j/λ) ∬ (λ/4π) (cos θ_t + cos θ_r)/2 e^{−jk(d_t+d_r)} / (d_t d_r) dA, lit parts only.
 
     Faces that both ends see are lit; directions and distances are exact at each quadrature point.

@@ -94,10 +94,11 @@ def scattered(boxes: list[Box], tx: np.ndarray, rx: np.ndarray, freq_hz: np.ndar
         )
         u, v = np.meshgrid((np.arange(n) + 0.5) / n, (np.arange(m) + 0.5) / m, indexing="ij")
         p = face.corner + u.reshape(-1, 1) * face.side_u + v.reshape(-1, 1) * face.side_v
+        p = p[((tx - p) @ face.normal > 0) & ((rx - p) @ face.normal > 0)]
+        p = p[in_sight(p, tx, boxes) & in_sight(p, rx, boxes)]
         d_t, d_r = np.linalg.norm(tx - p, axis=1), np.linalg.norm(rx - p, axis=1)
-        cos_t, cos_r = (tx - p) @ face.normal / d_t, (rx - p) @ face.normal / d_r
-        lit = (cos_t > 0) & (cos_r > 0) & in_sight(p, tx, boxes) & in_sight(p, rx, boxes)
+        cosines = (tx - p) @ face.normal / d_t + (rx - p) @ face.normal / d_r
         area = np.linalg.norm(np.cross(face.side_u, face.side_v)) / (n * m)
-        size = lit * area * (cos_t + cos_r) / (8.0 * np.pi * d_t * d_r)
+        size = area * cosines / (8.0 * np.pi * d_t * d_r)
         total += 1j * (size @ np.exp(-1j * np.outer(d_t + d_r, wavenumber)))
     return total

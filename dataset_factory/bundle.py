@@ -16,6 +16,9 @@ from rfgs_core.files import inside, read_json
 
 SCHEMA = "rfgs-bundle/1"
 NUM_JOINTS = 17
+#: What `Topology.edges` says of a triangle's side: nothing, that the surface is smooth across
+#: it, that the surface has an edge there.
+UNSAID, SMOOTH, SHARP = -1, 0, 1
 
 _FRAME_ARRAYS = ("vertices", "joints", "segment_velocity", "person_instance", "action")
 _FIELDS: dict[str, type | tuple[type, ...]] = {
@@ -56,6 +59,9 @@ class Topology:
     """Joint of `rfgs_core.skeleton` that each triangle follows or -1, int32, shape (T,)."""
     rest_vertices: np.ndarray
     """Vertices in the rest pose [m], float32, shape (V, 3)."""
+    edges: np.ndarray
+    """Whether the side from each corner of a triangle to the next is an edge of the surface, as
+    far as the mesh says so: `SHARP`, `SMOOTH` or `UNSAID`, int8, shape (T, 3)."""
 
 
 @dataclass(frozen=True)
@@ -233,14 +239,16 @@ def read_bundle(path: Path) -> Bundle:
     )
 
 
-def read_arrays(path: Path, names: tuple[str, ...]) -> dict[str, np.ndarray]:
-    """Reads named arrays of a bundle's `.npz` file, and no others.
+def read_arrays(
+    path: Path, names: tuple[str, ...], *, others: bool = False
+) -> dict[str, np.ndarray]:
+    """Reads named arrays of a bundle's `.npz` file, and no others unless asked to.
 
     Raises:
         RfgsError: There is no such file.
         RfgsFormatError: The file is damaged or lacks an array.
     """
-    return load_arrays(path, "export the scene again", dict.fromkeys(names), others=False)
+    return load_arrays(path, "export the scene again", dict.fromkeys(names), others=others)
 
 
 def _check_info(file: Path, info: Any) -> None:
@@ -261,8 +269,13 @@ def _check_info(file: Path, info: Any) -> None:
 
 def _read_topology(path: Path, info: dict[str, Any]) -> Topology:
     names = ("faces", "material", "instance", "segment", "rest_vertices")
-    arrays = read_arrays(path, names)
+    arrays = read_arrays(path, names, others=True)
     faces, vertices = arrays["faces"], arrays["rest_vertices"]
+    # Bundles of earlier versions say nothing of edges.
+    edges = arrays.get("edges", np.full((len(faces), 3), UNSAID))
+    _expect(path, "edges", edges, (len(faces), 3))
+    if not np.isin(edges, (UNSAID, SMOOTH, SHARP)).all():
+        raise RfgsFormatError(f"{path}: edges: expected {UNSAID}, {SMOOTH} or {SHARP}")
     _expect(path, "faces", faces, (len(faces), 3))
     _expect(path, "rest_vertices", vertices, (len(vertices), 3))
     for name in ("material", "instance", "segment"):
@@ -281,6 +294,7 @@ def _read_topology(path: Path, info: dict[str, Any]) -> Topology:
         instance=arrays["instance"].astype(np.int32),
         segment=arrays["segment"].astype(np.int32),
         rest_vertices=vertices.astype(np.float32),
+        edges=edges.astype(np.int8),
     )
 
 

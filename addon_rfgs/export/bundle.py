@@ -15,6 +15,7 @@ from ..naming import Names
 from ..scene.cameras import find_devices, find_views
 from ..scene.check import report
 from ..scene.content import Content, content_ready
+from ..scene.edges import said_edges
 from ..scene.findings import refuse
 from ..scene.frames import file_label, file_sha256, unit_scale
 from ..scene.materials import MaterialTable
@@ -157,7 +158,9 @@ def _write_topology(
                 keeper.set(surface.armature.data, "pose_position", "REST")
         scene.frame_set(scene.frame_start)
         rest = _moving_vertices(scene, content.moving, scene.frame_start)
-    _save_arrays(target / "topology.npz", **arrays, rest_vertices=rest)
+        said = said_edges(scene, content.moving)
+    edges = np.concatenate([said[surface.key] for surface in content.moving])
+    _save_arrays(target / "topology.npz", **arrays, rest_vertices=rest, edges=edges)
     return arrays
 
 

@@ -80,12 +80,12 @@ def survey(
         Surfaces by key, those left out whose topology changes, and what is wrong with any.
     """
     scene.frame_set(scene.frame_start)
-    surfaces = {found[0]: _first_look(*found) for found in _instances(scene)}
+    surfaces = {found[0]: _first_look(*found) for found in shown_instances(scene)}
     changed: dict[str, Finding] = {}
     for frame in range(scene.frame_start + 1, scene.frame_end + 1):
         scene.frame_set(frame)
         seen = set()
-        for key, evaluated, matrix, root in _instances(scene):
+        for key, evaluated, matrix, root in shown_instances(scene):
             seen.add(key)
             surface = surfaces.get(key)
             if surface is None:
@@ -112,7 +112,7 @@ def survey(
 
 def surfaces_now(scene: bpy.types.Scene) -> list[Surface]:
     """All surfaces by key as they are at the current frame, none known to move."""
-    found = {item[0]: _first_look(*item) for item in _instances(scene)}
+    found = {item[0]: _first_look(*item) for item in shown_instances(scene)}
     return [found[key] for key in sorted(found)]
 
 
@@ -122,7 +122,7 @@ def surface_of(scene: bpy.types.Scene, item: bpy.types.Object) -> Surface:
     Raises:
         AddonError: It has no faces that render.
     """
-    for found in _instances(scene):
+    for found in shown_instances(scene):
         if found[3] == item:
             return _first_look(*found)
     raise AddonError(f"{item.name}: has no faces that render at frame {scene.frame_current}")
@@ -136,7 +136,7 @@ def positions(scene: bpy.types.Scene, surfaces: list[Surface], frame: int) -> di
     """
     wanted = {surface.key: surface for surface in surfaces}
     found = {}
-    for key, evaluated, matrix, _ in _instances(scene):
+    for key, evaluated, matrix, _ in shown_instances(scene):
         if key in wanted:
             local = _read(wanted[key], evaluated)
             if local is not None:
@@ -149,7 +149,7 @@ def positions(scene: bpy.types.Scene, surfaces: list[Surface], frame: int) -> di
 
 def placements(scene: bpy.types.Scene) -> dict[str, np.ndarray]:
     """World matrix of every surface at the current frame, by key, Blender units."""
-    return {key: matrix for key, _, matrix, _ in _instances(scene)}
+    return {key: matrix for key, _, matrix, _ in shown_instances(scene)}
 
 
 @contextmanager
@@ -165,7 +165,7 @@ def evaluated_mesh(evaluated: bpy.types.Object) -> Iterator[bpy.types.Mesh]:
         evaluated.to_mesh_clear()
 
 
-def _instances(
+def shown_instances(
     scene: bpy.types.Scene,
 ) -> Iterator[tuple[str, bpy.types.Object, np.ndarray, bpy.types.Object]]:
     """Yields key, evaluated object, world matrix and instancer of everything with faces."""

@@ -53,6 +53,7 @@ class Bodies:
                 people.instance,
                 SPEED_OF_LIGHT / radio.freq_max_hz,
                 seed,
+                people.edges,
             )
             body = rt.SceneObject(
                 mi_mesh=mesh(BODY, people.rest_vertices, people.faces),

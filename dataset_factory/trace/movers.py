@@ -26,6 +26,8 @@ class Movers:
     """Instance id of each triangle, int32, shape (T,)."""
     segment: np.ndarray
     """Joint that each triangle follows or -1, int32, shape (T,)."""
+    edges: np.ndarray
+    """What the mesh says of each triangle's sides, as `Topology.edges`, int8, shape (T, 3)."""
 
     def __len__(self) -> int:
         return len(self.faces)
@@ -52,4 +54,5 @@ def _select(bundle: Bundle, triangles: np.ndarray) -> Movers:
         material=topology.material[triangles],
         instance=topology.instance[triangles],
         segment=topology.segment[triangles],
+        edges=topology.edges[triangles],
     )

@@ -10,11 +10,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import KDTree
+
+from dataset_factory.bundle import UNSAID
+from dataset_factory.trace.edges import corner_normals, smooth_patches, smooth_sides
+from dataset_factory.trace.lloyd import spread, triangle_areas
 
 #: Spacing of points as a share of the shortest wavelength; 0.4 is the coarsest that works.
 SPACING_WAVELENGTHS = 0.385
@@ -27,8 +29,6 @@ COARSE_DENSITY = 4500.0
 LIFT_M = 1e-3
 #: Parts of an instance smaller than this share of its area (eyes, tongue) are left out.
 _SMALLEST_PART = 0.02
-_SAMPLES_PER_POINT = 40
-_LLOYD_STEPS = 20
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,10 @@ class SurfacePoints:
     """Index of the triangle each point lies on among those given, shape (point,)."""
     weld: np.ndarray
     """First vertex at the place of each vertex, shape (V,); seams share one normal."""
+    corners: np.ndarray
+    """Which normal each corner of `welded_faces` has, counted from 0, shape (T', 3)."""
+    point_corners: np.ndarray
+    """The same at the corners of the triangle each point lies on, shape (point, 3)."""
 
     def at(self, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Where the points are when the mesh has moved.
@@ -59,17 +63,16 @@ class SurfacePoints:
         Returns:
             Positions on the skin [m] and unit outward normals, each shape (point, 3).
         """
-        corners = vertices.astype(np.float64)[self.weld]
-        a, b, c = (corners[self.welded_faces[:, i]] for i in range(3))
+        places = vertices.astype(np.float64)[self.weld]
+        a, b, c = (places[self.welded_faces[:, i]] for i in range(3))
         across = np.cross(b - a, c - a)
-        normals = np.zeros_like(corners)
+        count = int(self.corners.max()) + 1
+        normals = np.zeros((count, 3))
         for axis in range(3):
             for corner in range(3):
-                normals[:, axis] += np.bincount(
-                    self.welded_faces[:, corner], across[:, axis], len(corners)
-                )
-        positions = np.einsum("pc,pcx->px", self.barycentric, corners[self.faces])
-        smooth = np.einsum("pc,pcx->px", self.barycentric, normals[self.weld[self.faces]])
+                normals[:, axis] += np.bincount(self.corners[:, corner], across[:, axis], count)
+        positions = np.einsum("pc,pcx->px", self.barycentric, places[self.faces])
+        smooth = np.einsum("pc,pcx->px", self.barycentric, normals[self.point_corners])
         length = np.linalg.norm(smooth, axis=1, keepdims=True)
         return positions, smooth / np.maximum(length, 1e-12)
 
@@ -91,6 +94,7 @@ def surface_points(
     instance: np.ndarray,
     wavelength_m: float,
     seed: int,
+    edges: np.ndarray | None = None,
 ) -> SurfacePoints:
     """Spreads points over the outer surface of a mesh in its rest pose.
 
@@ -101,6 +105,8 @@ def surface_points(
         instance: Instance id of each triangle, shape (T,).
         wavelength_m: Shortest wavelength [m].
         seed: Seed of the starting points.
+        edges: What the mesh says of each triangle's sides, as `Topology.edges`, shape (T, 3);
+            None if it says nothing.
 
     Returns:
         The points, about `density` times the area of them.
@@ -110,9 +116,13 @@ def surface_points(
     welded = weld[faces]
     part = _parts(welded, len(vertices))
     keep = _outer(vertices, welded, part, instance)
-    welded = _outward(vertices, welded[keep], part[keep])
+    said = np.full(faces.shape, UNSAID) if edges is None else edges
+    welded, said = _outward(vertices, welded[keep], said[keep], part[keep])
+    smooth = smooth_sides(vertices, welded, said)
+    corners = corner_normals(welded, smooth)
+    patch = _cut_parts(part[keep], smooth_patches(smooth, len(welded)))
     rng = np.random.default_rng(seed)
-    index, barycentric, areas = _lloyd(vertices, welded, density(wavelength_m), rng)
+    index, barycentric, areas = spread(vertices, welded, patch, density(wavelength_m), rng)
     return SurfacePoints(
         faces=welded[index],
         barycentric=barycentric,
@@ -121,13 +131,9 @@ def surface_points(
         triangle=np.flatnonzero(keep)[index],
         welded_faces=welded,
         weld=weld,
+        corners=corners,
+        point_corners=corners[index],
     )
-
-
-def triangle_areas(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Area of each triangle [m²], shape (T,)."""
-    a, b, c = (vertices[faces[:, i]] for i in range(3))
-    return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
 
 
 def _weld(vertices: np.ndarray) -> np.ndarray:
@@ -157,91 +163,38 @@ def _outer(
     return of_part[part] >= _SMALLEST_PART * of_instance[instance]
 
 
-def _outward(vertices: np.ndarray, faces: np.ndarray, part: np.ndarray) -> np.ndarray:
-    """Turns closed parts that are inside out; open sheets stay as they are."""
+def _outward(
+    vertices: np.ndarray, faces: np.ndarray, said: np.ndarray, part: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Turns closed parts that are inside out, and what is said of their sides with them.
+
+    Open sheets stay as they are.
+    """
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     centre = np.stack([np.bincount(part, a[:, i]) for i in range(3)], axis=1)
     centre /= np.maximum(np.bincount(part), 1)[:, None]
     a, b, c = a - centre[part], b - centre[part], c - centre[part]
     volume = np.bincount(part, np.einsum("tx,tx->t", a, np.cross(b, c)) / 6.0)
     size = np.bincount(part, triangle_areas(vertices, faces)) ** 1.5
-    inside_out = (volume < -1e-3 * size)[part]
-    return np.where(inside_out[:, None], faces[:, ::-1], faces)
+    inside_out = (volume < -1e-3 * size)[part][:, None]
+    # Read backwards, the first two sides change places and the third keeps its own.
+    return (
+        np.where(inside_out, faces[:, ::-1], faces),
+        np.where(inside_out, said[:, [1, 0, 2]], said),
+    )
 
 
-def _lloyd(
-    vertices: np.ndarray, faces: np.ndarray, per_m2: float, rng: np.random.Generator
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Lloyd's iteration on dense samples; centres stay on samples, hence on the surface.
+def _cut_parts(part: np.ndarray, patch: np.ndarray) -> np.ndarray:
+    """Patches of triangles, all parts without an edge being one: nothing keeps their cells apart.
+
+    Args:
+        part: Connected part of each triangle, shape (T,).
+        patch: Smooth patch of each triangle, shape (T,).
 
     Returns:
-        Triangle of each point, its barycentric coordinates and the area of its cell [m²].
+        Patch of each triangle, counted from 0 without gaps, shape (T,).
     """
-    area = triangle_areas(vertices, faces)
-    count = max(int(np.ceil(area.sum() * per_m2)), 1)
-    samples = count * _SAMPLES_PER_POINT
-    # Equal shares of area along the list of triangles, and within them the additive sequence of
-    # the plastic number: no clumps, so that cells of equal size hold equally many samples.
-    turn = np.arange(samples)
-    level = (turn + rng.random()) / samples * area.sum()
-    index = np.minimum(np.searchsorted(np.cumsum(area), level), len(area) - 1)
-    u = (rng.random() + turn * 0.7548776662466927) % 1.0
-    v = (rng.random() + turn * 0.5698402909980532) % 1.0
-    u, v = np.where(u + v > 1.0, 1.0 - u, u), np.where(u + v > 1.0, 1.0 - v, v)
-    barycentric = np.stack([1.0 - u - v, u, v], axis=1)
-    places = np.einsum("pc,pcx->px", barycentric, vertices[faces[index]])
-    # Every n-th sample along a space-filling curve is an even start.
-    along = np.argsort(_morton(places), kind="stable")
-    chosen = along[_SAMPLES_PER_POINT // 2 :: _SAMPLES_PER_POINT]
-    tree, cells = KDTree(places), Cells(places, along)
-    for _ in range(_LLOYD_STEPS):
-        cell = cells.around(places[chosen])
-        size = np.bincount(cell, minlength=count)
-        mean = np.stack([np.bincount(cell, places[:, i], count) for i in range(3)], axis=1)
-        filled = size > 0
-        _, nearest = tree.query(mean[filled] / size[filled, None])
-        chosen = chosen.copy()
-        chosen[filled] = nearest
-        chosen = np.unique(chosen)
-        count = len(chosen)
-    cell = cells.around(places[chosen])
-    cell_area = np.bincount(cell, minlength=count) * (area.sum() / samples)
-    return index[chosen], barycentric[chosen], cell_area
-
-
-class Cells:
-    """Which centre is the nearest to each of many places, asked again and again.
-
-    Neighbours are asked one after the other, which finds the tree in the cache, and no further
-    than the farthest of the last time, which cuts the search short. The answers are the same.
-    """
-
-    def __init__(self, places: np.ndarray, along: np.ndarray) -> None:
-        """Args are the places, shape (N, 3), and their order along a space-filling curve."""
-        self._ordered, self._along = places[along], along
-        self._reach_m = np.inf
-
-    def around(self, centres: np.ndarray) -> np.ndarray:
-        """Index of the nearest centre of each place, shape (N,)."""
-        # As many threads as the kernels have: one in a tracing process.
-        tree, threads = KDTree(centres), numba.get_num_threads()
-        found = tree.query(self._ordered, distance_upper_bound=self._reach_m, workers=threads)
-        distance_m, nearest = (np.asarray(values) for values in found)
-        (beyond,) = np.nonzero(nearest == tree.n)
-        if len(beyond):
-            distance_m[beyond], nearest[beyond] = tree.query(self._ordered[beyond])
-        self._reach_m = distance_m.max()
-        cell = np.zeros_like(nearest)
-        cell[self._along] = nearest
-        return cell
-
-
-def _morton(places: np.ndarray) -> np.ndarray:
-    """Position along a Z-shaped space-filling curve of 2 mm cells, uint64, shape (N,)."""
-    cells = ((places - places.min(axis=0)) / 2e-3).astype(np.uint64)
-    code = np.zeros(len(places), dtype=np.uint64)
-    for bit in range(20):
-        for axis in range(3):
-            picked = (cells[:, axis] >> np.uint64(bit)) & np.uint64(1)
-            code |= picked << np.uint64(3 * bit + axis)
-    return code
+    owner = np.zeros(int(patch.max()) + 1, dtype=np.int64)
+    owner[patch] = part
+    whole = np.bincount(owner)[part] == 1
+    return np.unique(np.where(whole, -1, patch), return_inverse=True)[1]

@@ -248,7 +248,7 @@ def driver() -> None:
 
 
 def vehicles() -> None:
-    """A cart of two meshes with a nominal surface, and a trolley without one."""
+    """A cart with a nominal surface and marked edges, and a trolley without; two meshes each."""
     room()
     for name, y, surface_m2 in (("cart", 1.0, 7.5), ("trolley", 1.6, 0.0)):
         root = bpy.data.objects.new(name, None)
@@ -261,6 +261,11 @@ def vehicles() -> None:
         for frame in (1, 5):
             root.location = (-1.5 + 0.2 * frame, y, 0)
             root.keyframe_insert("location", frame=frame)
+    cart = bpy.data.objects["cart_body"].data
+    for edge in cart.edges:
+        low, high = (cart.vertices[vertex].co.z for vertex in edge.vertices)
+        edge.use_edge_sharp = low != high
+    cart.shade_smooth()
 
 
 def own_radio() -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dataset_factory.bundle import Bundle, read_bundle
+from dataset_factory.bundle import SHARP, SMOOTH, UNSAID, Bundle, read_bundle
 from rfgs_core.skeleton import JOINTS
 
 
@@ -64,6 +64,8 @@ def test_golden_bundle(room: Bundle) -> None:
     assert room.instances == [{**person, "nominal_surface_m2": None}]
     assert room.topology.rest_vertices.shape == (19 * 8, 3)
     assert room.topology.faces.shape == (19 * 12, 3)
+    # The boxes are shaded flat all over, which says nothing of their edges.
+    assert np.array_equal(room.topology.edges, np.full((19 * 12, 3), UNSAID))
     device = room.devices[0]
     assert (device["name"], device["radio"], device["role"]) == ("ap", "wifi", "ACCESS_POINT")
     half = np.sqrt(0.5)
@@ -121,6 +123,23 @@ def test_every_face_knows_its_joint(room: Bundle) -> None:
     assert counts.sum() == 19 * 12
     centre = topology.rest_vertices[topology.faces[topology.segment == 6]].mean(axis=(0, 1))
     assert centre[0] > 0, "the left ankle is on +x"
+
+
+def test_marked_edges_reach_the_bundle(scenes: Path) -> None:
+    bundle = read_bundle(scenes / "vehicles")
+    topology = bundle.topology
+    (cart,) = [row["id"] for row in bundle.instances if row["name"] == "cart"]
+    of_cart = topology.instance == cart
+    # Of the cart's two boxes one has its four upright edges marked, each between two triangles.
+    sides = topology.edges[of_cart]
+    assert np.bincount(sides.ravel() - UNSAID, minlength=3).tolist() == [36, 28, 8]
+    start, end = (
+        topology.rest_vertices[corners[of_cart][sides == SHARP]]
+        for corners in (topology.faces, np.roll(topology.faces, -1, axis=1))
+    )
+    assert np.abs(end - start)[:, :2].max() < 1e-6
+    assert np.abs(end - start)[:, 2] == pytest.approx(0.4, abs=1e-6)
+    assert (topology.edges[~of_cart] == UNSAID).all() and (sides == SMOOTH).any()
 
 
 def test_materials_are_labelled_or_guessed(scenes: Path) -> None:

@@ -52,7 +52,7 @@ def test_bundle_equals_pip_bpy_s(python: Run, bundle: Path, blend: Path, tmp_pat
     ours, theirs = read_bundle(bundle), read_bundle(tmp_path / "pip")
     for key in ("frames", "fps", "instances", "objects", "materials", "blend_sha256"):
         assert ours.info[key] == theirs.info[key], key
-    for name in ("faces", "material", "instance", "segment"):
+    for name in ("faces", "material", "instance", "segment", "edges"):
         assert np.array_equal(getattr(ours.topology, name), getattr(theirs.topology, name)), name
     for frame in ours.frames:
         first, second = ours.frame(frame), theirs.frame(frame)

@@ -10,13 +10,17 @@ PYTHON_FOUND := $(shell command -v $(PYTHON) || command -v python3)
 # As `rfgs_core` sets it for programs; pytest's plugins load numpy before that.
 export OPENBLAS_NUM_THREADS ?= 1
 
+# Tests side by side: each worker takes one half of them, and then from what is left to the other, so
+# that neighbours, which share what is costly to set up, stay together.
+WORKERS ?= 2
+
 .PHONY: demo test test-slow test-blender test-bpy lint format sync system clean
 
 demo: $(READY) system
 	$(VENV)/rfgs demo --out demo
 
 test: $(READY) system
-	$(VENV)/pytest -m "not slow and not blender" tests
+	$(VENV)/pytest -m "not slow and not blender" -n $(WORKERS) --dist worksteal tests
 
 test-slow: $(READY) system
 	$(VENV)/pytest -m "slow and not blender" tests

@@ -17,8 +17,10 @@ from dataset_factory.job import Job
 from dataset_factory.plan import make_plan
 from dataset_factory.scenes import Scene
 from rfgs_core.errors import RfgsError
+from rfgs_core.frames import parse_frames
 
 RADIO = "wifi"
+MIN_FRAMES = 8
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,7 @@ class FactoryBench:
     scene: Scene
     """Whose frames are made."""
     frames: str
-    """Frames; at least eight, so that starts do not count."""
+    """Frames; at least `MIN_FRAMES`, so that starts do not count."""
     cameras: int = 2
     """Cameras of the pictures."""
     resolution: int = 256
@@ -53,6 +55,8 @@ def bench(config: FactoryBench, folder: Path, say: Callable[[str], None]) -> dic
     Raises:
         RfgsError: The scene cannot be used, or there are too few frames.
     """
+    if len(parse_frames(config.frames)) < MIN_FRAMES:
+        raise RfgsError(f"--frames {config.frames}: expected at least {MIN_FRAMES} frames")
     say("two workers, with pictures")
     two = _made(config, folder / "two", workers=2)
     say("one worker")
@@ -60,8 +64,7 @@ def bench(config: FactoryBench, folder: Path, say: Callable[[str], None]) -> dic
     say("moving meshes and loading scenes")
     load_s, move_s, frames = _update(config, folder / "update")
     pace_1, pace_2 = (job.paces.get(f"trace {RADIO}") for job in (one, two))
-    if pace_1 is None or pace_2 is None:
-        raise RfgsError(f"--frames {config.frames}: expected at least eight frames")
+    assert pace_1 is not None and pace_2 is not None
     stage = _stages(one)
     bounced = _stages(two)["people_bounces"] / 2.0
     return {

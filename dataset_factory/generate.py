@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from dataset_factory.bundle import Bundle, read_bundle
+from dataset_factory.cluster import threads
 from dataset_factory.devices import check_scene, choose_devices
 from dataset_factory.disk import refuse_small_disk, space
 from dataset_factory.folder import locked, open_folder, sweep
@@ -57,6 +58,9 @@ def generate(job: Job) -> bool:
     """
     if not open_folder(job):
         return False
+    if job.scheduler:
+        # A cluster that is not there is known before the scene is exported for it.
+        threads(job.scheduler)
     asked = job.plan
     begun = (job.out / "dataset.json").exists()
     logger.info("%s: %s", job.out, "continuing" if begun else "a new dataset")

@@ -100,9 +100,7 @@ def make_plan(scene: Scene, radios: tuple[str, ...], frames: str, **options: Any
             f"--paths: radio {moving[0]!r} has antennas that move, paths are told between antennas "
             "that stand still; leave one of them out"
         )
-    packets = options.get("packets_per_frame", 1)
-    if not 1 <= packets <= MAX_PACKETS:
-        raise RfgsError(f"--packets-per-frame {packets}: expected 1 to {MAX_PACKETS}")
+    refuse_packets(options.get("packets_per_frame", 1))
     return Plan(
         scene=scene.name,
         blend_sha256=blend_digest(scene),
@@ -113,6 +111,16 @@ def make_plan(scene: Scene, radios: tuple[str, ...], frames: str, **options: Any
         frames=whole_frames(frames),
         **options,
     )
+
+
+def refuse_packets(packets: int) -> None:
+    """Refuses numbers of packets per frame that no radio sends.
+
+    Raises:
+        RfgsError: There are none, or too many.
+    """
+    if not 1 <= packets <= MAX_PACKETS:
+        raise RfgsError(f"--packets-per-frame {packets}: expected 1 to {MAX_PACKETS}")
 
 
 def whole_frames(frames: str) -> str:

@@ -32,6 +32,15 @@ if not torch.cuda.is_available():
     os.environ["TRITON_INTERPRET"] = "1"
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Gives a worker that runs tests beside others one thread: two of them fill two cores."""
+    if hasattr(config, "workerinput"):
+        import numba
+
+        torch.set_num_threads(1)
+        numba.set_num_threads(1)
+
+
 @pytest.fixture(scope="session")
 def python() -> Callable[..., subprocess.CompletedProcess[str]]:
     """Runs Python in the repository's folder; `must_work` shows what a failed run said."""

@@ -58,12 +58,13 @@ def run(args: CheckArgs) -> int:
     """Prints the table, or the report as JSON."""
     from dataset_factory.blender import Blender
     from dataset_factory.overrides import label, read_options
-    from dataset_factory.plan import whole_frames
+    from dataset_factory.plan import refuse_packets, whole_frames
     from dataset_factory.radios import chosen_radios
     from dataset_factory.scene_check import check_file, has_errors, table
     from dataset_factory.scenes import find_scene
     from rfgs_core.files import write_json
 
+    refuse_packets(args.packets_per_frame)
     scene = find_scene(args.scene)
     said = read_options(args.options)
     frames = whole_frames(args.frames or str(said.pop("frames", "")))

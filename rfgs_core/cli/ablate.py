@@ -36,13 +36,20 @@ def run(args: AblateArgs) -> int:
     from tqdm import tqdm
 
     from rfgs_core.cli.calls import call
+    from rfgs_core.dataset import open_dataset
     from rfgs_core.errors import RfgsError
     from rfgs_core.files import read_json, write_text
+    from rfgs_core.frames import chosen_frames
     from rfgs_core.run import open_run
     from rfgs_core.study.ablation import VARIANTS, ablation_row, ablation_table
 
     if args.out.exists() and not args.out.is_dir():
         raise RfgsError(f"{args.out} is a file; expected a folder, choose another")
+    if args.iterations < 0:
+        raise RfgsError(f"--iterations {args.iterations}: expected at least 0")
+    sequence = open_dataset(args.dataset).sequence()
+    sequence.radio_spec(args.radio)
+    chosen_frames(args.frames, sequence.frames)
     rows = []
     with tqdm(VARIANTS, desc="ablation", unit="variant") as bar:
         for variant in bar:

@@ -82,8 +82,12 @@ def _training(args: BenchArgs) -> dict[str, Any]:
 
 def run(args: BenchArgs) -> int:
     """Prints one number per line."""
+    from rfgs_core.errors import RfgsError
     from rfgs_core.files import write_json
 
+    for name, value in (("gaussians", args.gaussians), ("steps", args.steps)):
+        if value is not None and value < 1:
+            raise RfgsError(f"--{name} {value}: expected at least 1")
     if args.part != "training":
         sys.stderr.write(f"timing {args.part}; the plain twin takes most of it, about a minute\n")
     result = _bench(args)()

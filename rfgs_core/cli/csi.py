@@ -40,16 +40,23 @@ def run(args: CsiArgs) -> int:
     if args.out is not None and args.out.suffix.lower() != ".png":
         raise RfgsError(f"--out {args.out}: expected a file name that ends in .png")
     trained = open_run(args.run)
+    trained.need_frames()
     rx_device = args.rx_device
     if rx_device is None:
         pairs = trained.sequence.layout(trained.config["radio"]).device_pairs
-        rx_device = next((rx for tx, rx in pairs if tx == args.tx_device), -1)
+        rx_device = next((rx for tx, rx in pairs if tx == args.tx_device), None)
+        if rx_device is None:
+            senders = ", ".join(str(tx) for tx in sorted({tx for tx, _ in pairs}))
+            raise RfgsError(
+                f"--tx-device {args.tx_device}: nothing of it is measured; expected one of "
+                f"{senders}"
+            )
     link = link_channels(trained, args.tx_device, rx_device)
     name = f"link_{args.tx_device}_{rx_device}.png"
     out = args.out or args.run / "predictions" / name
     write_link_chart(out, link)
     sys.stdout.write(
-        f"{out}: device {args.tx_device} to {rx_device}, {len(link.frames)} frames; the prediction "
-        f"leaves {link.error_db:.1f} dB of the change's energy (0 dB: explains nothing)\n"
+        f"{out}: device {args.tx_device} to {rx_device}, {len(link.frames)} frames; "
+        f"{link.explained}\n"
     )
     return 0

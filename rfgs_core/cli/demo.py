@@ -9,10 +9,12 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from rfgs_core.cli.calls import call
 
 RADIOS = ("wifi", "mmwave")
+_SETTINGS = "settings.json"
 
 
 @dataclass(frozen=True)
@@ -64,16 +66,26 @@ class Stages:
 
 
 def keep_settings(args: DemoArgs) -> None:
-    """Remembers what a demo was asked for: its finished stages are only good for the same.
+    """Remembers what a demo was asked for, once its dataset shows that it can be had."""
+    from rfgs_core.files import write_json
+
+    write_json(args.out / _SETTINGS, _asked(args))
+
+
+def _asked(args: DemoArgs) -> dict[str, Any]:
+    return {name: value for name, value in asdict(args).items() if name != "out"}
+
+
+def refuse_other_settings(args: DemoArgs) -> None:
+    """Refuses a folder with a demo of other settings: stages are only good for their own.
 
     Raises:
-        RfgsError: The folder holds a demo with other settings.
+        RfgsError: The folder holds such a demo.
     """
     from rfgs_core.errors import RfgsError
-    from rfgs_core.files import read_json, write_json
+    from rfgs_core.files import read_json
 
-    path = args.out / "settings.json"
-    asked = {name: value for name, value in asdict(args).items() if name != "out"}
+    path, asked = args.out / _SETTINGS, _asked(args)
     found = read_json(path) if path.exists() else asked
     differing = [name for name, value in asked.items() if found.get(name) != value]
     if differing:
@@ -81,7 +93,6 @@ def keep_settings(args: DemoArgs) -> None:
             f"{args.out} holds a demo with another {', '.join(differing)}; choose another --out or "
             "delete that folder"
         )
-    write_json(path, asked)
 
 
 def _scene_file(scene: str) -> Path:
@@ -98,6 +109,7 @@ def _generate(args: DemoArgs, dataset: Path) -> None:
         *("--cameras", str(args.cameras), "--resolution", str(args.resolution)),
         *("--depth", str(args.depth), "--workers", str(max(os.cpu_count() or 1, 1))),
     )  # fmt: skip
+    keep_settings(args)
 
 
 def _inspect(args: DemoArgs, run: Path) -> None:
@@ -113,7 +125,7 @@ def run(args: DemoArgs) -> int:
     from rfgs_core.report import write_demo_report
     from rfgs_core.run import open_run
 
-    keep_settings(args)
+    refuse_other_settings(args)
     stages = Stages(args.out)
     dataset = args.out / "dataset"
     runs = {radio: args.out / f"run-{radio}" for radio in RADIOS}
@@ -127,7 +139,7 @@ def run(args: DemoArgs) -> int:
     for radio, folder in runs.items():
         train = ("rfgs_core.cli", "train", dataset, "--radio", radio, "--out", folder)
         seed = ("--seed", str(args.seed))
-        stages.run(f"train {radio}", folder / "shader.npz", lambda c=(*train, *seed): call(*c))
+        stages.run(f"train {radio}", folder / "point_cloud.ply", lambda c=(*train, *seed): call(*c))
         evaluate = ("rfgs_core.cli", "eval", folder)
         stages.run(f"evaluate {radio}", folder / "metrics.json", lambda c=evaluate: call(*c))
         stages.run(

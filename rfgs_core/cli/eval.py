@@ -26,7 +26,9 @@ def run(args: EvalArgs) -> int:
     from rfgs_core.report.tables import text_table
     from rfgs_core.run import open_run
 
-    metrics = evaluate_run(open_run(args.run), oracle=args.oracle)
+    trained = open_run(args.run)
+    trained.need_frames()
+    metrics = evaluate_run(trained, oracle=args.oracle)
     sys.stdout.write(text_table(metrics))
     for sentence in metrics["verdicts"]:
         sys.stdout.write(f"{sentence}\n")

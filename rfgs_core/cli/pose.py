@@ -35,6 +35,7 @@ def run(args: PoseArgs) -> int:
     from rfgs_core.run import open_run
 
     trained = open_run(args.run)
+    trained.need_frames()
     with tqdm(total=len(trained.frames) * trained.config["bodies"], desc="pose") as bar:
         estimate = estimate_poses(trained, bar.update)
     scores = score_poses(estimate, trained.sequence)

@@ -55,11 +55,14 @@ class PredictArgs:
 
 def run(args: PredictArgs) -> int:
     """Writes arrays and picture, prints the table; exit code 0."""
+    from rfgs_core.errors import RfgsError
     from rfgs_core.predict.antennas import positions
     from rfgs_core.predict.arrays import note_of
     from rfgs_core.run import open_run
 
     tx_xyz, rx_xyz = positions(args.tx, args.rx)
+    if args.facing is not None and not args.array:
+        raise RfgsError(f"--facing {args.facing}: turns arrays; add --array, or leave it out")
     out = _target(args)
     trained = open_run(args.run)
     frame = trained.frames[0] if args.frame is None else args.frame
@@ -88,9 +91,14 @@ def _predict(
     from rfgs_core.predict.antennas import check_positions, read_position, receiving_array
     from rfgs_core.predict.arrays import prediction_arrays
     from rfgs_core.predict.echoes import echoes_at, reflectors
+    from rfgs_core.predict.places import check_in_scene
     from rfgs_core.predict.prediction import predict_channel
 
-    radio = trained.sequence.radio_spec(trained.config["radio"])
+    name = trained.config["radio"]
+    radio = trained.sequence.radio_spec(name)
+    devices = np.array([device.position_m for device in trained.sequence.devices(name)])
+    named = [("--tx", tx_xyz), *(("--rx", place) for place in rx_xyz)]
+    check_in_scene(trained.sequence, named, devices)
     gaussians = trained.head.radio_gaussians(trained.moving(frame))
     means = gaussians.means.numpy().astype(np.float64)
     check_positions(tx_xyz, rx_xyz, means, 0.5 * radio.wavelength_m)

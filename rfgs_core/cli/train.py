@@ -6,7 +6,7 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
@@ -24,6 +24,9 @@ from rfgs_core.train.config import (
     Recipe,
     TrainConfig,
 )
+
+if TYPE_CHECKING:
+    from rfgs_core.dataset import Dataset, Sequence
 
 
 @dataclass(frozen=True)
@@ -103,7 +106,8 @@ class TrainArgs:
     log: bool = False
     """Write curves of loss and number of Gaussians into OUT/log, for `tensorboard --logdir`."""
     shader: Annotated[bool, tyro.conf.arg(name="shader")] = True
-    """Colour the frozen Gaussians from training pictures afterwards, for display only."""
+    """Colour the frozen Gaussians from training pictures afterwards, for display only. Without any
+    such picture they stay grey."""
 
 
 def run(args: TrainArgs) -> int:
@@ -171,13 +175,13 @@ def run(args: TrainArgs) -> int:
         )
     config = replace(config, packets=packets_to_read(args.packets, sequence, args.radio, config))
     frames = chosen_frames(args.frames, sequence.frames)
+    shader = args.shader and _can_color(dataset, sequence, frames)
     trained = train_sequence(
         dataset, sequence, args.radio, frames, config, args.out, encoder_file, log=args.log
     )
     if args.calibrate != "none":
         sys.stdout.write(f"offsets: {calibration_text(args.out, frames)}\n")
-    pictures = {"images", "mask"} <= set(dataset.has)
-    if args.shader and pictures and not (args.out / "shader.npz").exists():
+    if shader and not (args.out / "shader.npz").exists():
         seed = sub_seed(args.seed, "shader")
         fit_run_shader(trained, ShaderConfig.for_recipe(args.recipe, seed))
     sys.stdout.write(
@@ -185,3 +189,18 @@ def run(args: TrainArgs) -> int:
         f"{trained.config['train_s']:.0f} s; next: rfgs eval {args.out}\n"
     )
     return 0
+
+
+def _can_color(dataset: Dataset, sequence: Sequence, frames: list[int]) -> bool:
+    """Whether there are pictures that the shader may be fitted to; says so where there are none."""
+    from rfgs_core.render.view import split_pictures
+
+    missing = [name for name in ("images", "mask") if name not in dataset.has]
+    if missing:
+        why = f"the dataset holds no {' and no '.join(missing)}"
+    elif split_pictures(sequence, frames, "train"):
+        return True
+    else:
+        why = "all pictures of these frames are held out for testing"
+    sys.stderr.write(f"training without the shader, so that Gaussians stay grey: {why}\n")
+    return False

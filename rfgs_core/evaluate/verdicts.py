@@ -82,9 +82,11 @@ def _error_share(metrics: dict[str, Any]) -> list[str]:
         return []
     share = (own - other) / (1.0 - other)
     text = f"{100 * share:.0f} % of the matched filter's error 1 − F10 is removed"
+    if share < 0.0:
+        text = f"the error 1 − F10 is {-100 * share:.0f} % larger than the matched filter's"
     if share >= ERROR_SHARE:
-        return [f"{WON}{text}; the mark is a third."]
-    return [f"{LOST}{text}; the mark is a third. {_why(metrics, 'f10', other)}"]
+        return [f"{WON}{text}; the mark is a third removed."]
+    return [f"{LOST}{text}; the mark is a third removed. {_why(metrics, 'f10', other)}"]
 
 
 def _other_geometry(metrics: dict[str, Any]) -> list[str]:

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float, Float64
 
 from rfgs_core.errors import RfgsError
+from rfgs_core.predict.places import spelt
 from rfgs_core.radio import DevicePose, Radio, layout
 from rfgs_core.radio.layout import NEAREST_ANTENNAS_M
 
@@ -50,18 +51,18 @@ def check_positions(
         RfgsError: Two antennas share a place, or one stands within the Gaussians.
     """
     named = [("--tx", tx_xyz), *(("--rx", place) for place in rx_xyz)]
-    for index, (name, place) in enumerate(named):
-        spelt = ",".join(f"{value:g}" for value in place)
+    for index, (option, place) in enumerate(named):
+        name = f"{option} {spelt(place)}"
         for other, there in named[:index]:
             if np.linalg.norm(place - there) < NEAREST_ANTENNAS_M:
                 raise RfgsError(
-                    f"{name} {spelt}: on top of a {other} antenna; expected antennas at least "
+                    f"{name}: on top of a {other} antenna; expected antennas at least "
                     f"{NEAREST_ANTENNAS_M * 1e3:g} mm apart, move one of them"
                 )
         nearest_m = np.linalg.norm(scatterers - place, axis=1).min(initial=np.inf)
         if nearest_m < clearance_m:
             raise RfgsError(
-                f"{name} {spelt}: {nearest_m * 100:.1f} cm from a Gaussian; expected at least "
+                f"{name}: {nearest_m * 100:.1f} cm from a Gaussian; expected at least "
                 f"{clearance_m * 100:.1f} cm (λ/2), move the antenna out of the person"
             )
 

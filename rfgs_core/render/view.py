@@ -86,10 +86,15 @@ def pictures_of(run: TrainedRun, split: Split) -> list[tuple[str, int]]:
     `train` is what the shader may see: training cameras at training frames. `test` is every other
     picture of the run's frames.
     """
-    held = run.sequence.splits["images"]
+    return split_pictures(run.sequence, run.frames, split)
+
+
+def split_pictures(sequence: Sequence, frames: list[int], split: Split) -> list[tuple[str, int]]:
+    """What `pictures_of` says of a run on these frames, also before there is one."""
+    held = sequence.splits["images"]
     pictures = []
-    for row in run.sequence.cameras:
-        for frame in run.frames:
+    for row in sequence.cameras:
+        for frame in frames:
             unseen = row["name"] in held["test_cameras"] or frame in held["test_frames"]
             if unseen == (split == "test"):
                 pictures.append((str(row["name"]), frame))

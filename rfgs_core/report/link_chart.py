@@ -39,6 +39,19 @@ class LinkChannels:
         whole = np.sum(np.abs(self.measured).astype(np.float64) ** 2)
         return float(10 * np.log10(max(left, 1e-300) / max(whole, 1e-300)))
 
+    @property
+    def explained(self) -> str:
+        """How much of the measured channel the prediction explains, in words."""
+        if self.error_db > 0.0:
+            return (
+                f"the prediction's error has {self.error_db:.1f} dB more energy than the change, "
+                "more than if nothing were predicted"
+            )
+        return (
+            f"the prediction leaves {self.error_db:.1f} dB of the change's energy (0 dB: explains "
+            "nothing)"
+        )
+
 
 def link_channels(run: Run, tx_device: int, rx_device: int) -> LinkChannels:
     """Reads a link of a run's dataset and predicts it.

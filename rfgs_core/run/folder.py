@@ -103,6 +103,23 @@ class Run:
         """Moving Gaussians of a frame."""
         return self.path / "gaussians" / f"{frame:06d}.ply"
 
+    def need_frames(self) -> None:
+        """Refuses a run that is not fitted to the end, before work that takes all of its frames.
+
+        Raises:
+            RfgsError: A frame is not trained yet.
+        """
+        missing = [frame for frame in self.frames if not self._features(frame).exists()]
+        if missing:
+            raise RfgsError(
+                f"{self.path}: {len(missing)} of {len(self.frames)} frames are not trained yet, "
+                f"the first is {missing[0]}; run the same `rfgs train` again"
+            )
+
+    def _features(self, frame: int) -> Path:
+        """What the PLY of a frame's moving Gaussians does not hold; there once it is fitted."""
+        return self.ply_path(frame).with_suffix(".features.npz")
+
     def attributes(self, frame: int) -> dict[str, np.ndarray]:
         """Per-Gaussian arrays of the moving Gaussians, rows as in the PLY.
 
@@ -110,7 +127,7 @@ class Run:
             RfgsError: The run has no such frame.
             RfgsFormatError: The file is damaged.
         """
-        path = self.path / "gaussians" / f"{frame:06d}.features.npz"
+        path = self._features(frame)
         if not path.exists():
             known = frame in self.frames
             raise RfgsError(

@@ -53,11 +53,15 @@ from rfgs_core.train.calibrate import calibrate
 from rfgs_core.train.config import TrainConfig
 from rfgs_core.train.frame import FrameState, solve_reflectivity, start_frame
 from rfgs_core.train.head import HEAD_SHAPES, RadioHead
-from rfgs_core.train.learned_background import learned_background, without_movers
+from rfgs_core.train.learned_background import (
+    learned_background,
+    need_enough_frames,
+    without_movers,
+)
 from rfgs_core.train.observations import need_still_antennas
 from rfgs_core.train.offsets import Offsets
 from rfgs_core.train.parameters import GAUSSIAN_SHAPES
-from rfgs_core.train.refine import refine
+from rfgs_core.train.refine import need_sample_points, refine
 from rfgs_core.train.static_set import fit_static_set
 from rfgs_core.train.tracks import Tracks
 
@@ -101,13 +105,18 @@ def train_sequence(
         log: Write curves for TensorBoard into `out`/log.
 
     Raises:
-        RfgsError: `out` holds a run with other settings, the radio's antennas move or it cannot be
-            calibrated, or the encoder is for another radio.
+        RfgsError: `out` holds a run with other settings, or they do not go together or ask of the
+            radio and the sequence what these do not have.
     """
     need_still_antennas(sequence, radio)
     need_shared_links(sequence, radio, config)
     need_phases(config)
+    need_sample_points(config)
     need_device(config.device)
+    if config.background == "learned":
+        need_enough_frames(sequence)
+    if config.channel == "impaired":
+        sequence.impairments(radio)
     if config.encoder == "paths":
         dataset.need("paths")
     if encoder_file is not None:

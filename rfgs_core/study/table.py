@@ -34,8 +34,9 @@ _HEAD = (
 
 _NOTES = """\
 F5, F10: F-score at 5 and 10 cm, mean over frames and seeds. Best rival: the best of matched filter,
-CLEAN and OMP. Error cut: share of the rival's 1 − F10 that is removed; gap closed: share of the way
-from the rival to `oracle_init`, the same fit started on the true surface. Prior: what the start of
+CLEAN and OMP. Error cut: share of the rival's 1 − F10 that is removed, or by how much the error is
+larger; gap closed: share of the way from the rival to `oracle_init`, the same fit started on the
+true surface, or by how much the gap is wider. Prior: what the start of
 the fit assumes of bodies, at the places and in the postures found. Centroid: of each person against
 the body found; found: share of people with it within half a metre; identity: share of bodies that
 stay with the person they were with at first. Elements: complex SNR on
@@ -65,7 +66,7 @@ def _cells(row: Row) -> list[str]:
         *(row.scene, row.radio, row.condition, str(row.seeds)),
         *(number(v["f05"]), number(v["f10"]), f"{row.spread_f10:.3f}"),
         f"{number(v['rival_f10'])} ({row.best_rival})",
-        *(_percent(v["cut"]), _percent(v["gap"])),
+        *(_percent(v["cut"], "larger"), _percent(v["gap"], "wider")),
         f"{number(v['template_f05'])} / {number(v['template_f10'])}",
         *(number(v["prior_f10"]), number(v["oracle_f10"]), number(v["centroid_m"])),
         *(number(v["found"], ".2f"), number(v["identity_kept"], ".2f")),
@@ -88,5 +89,8 @@ def number(value: float | None, form: str = ".3f") -> str:
     return "–" if value is None else format(value, form)
 
 
-def _percent(value: float | None) -> str:
-    return "–" if value is None else f"{100 * value:.0f} %"
+def _percent(value: float | None, grown: str) -> str:
+    """A share that went; where it grew instead, by how much and the word for it."""
+    if value is None:
+        return "–"
+    return f"{100 * value:.0f} %" if value >= 0.0 else f"{-100 * value:.0f} % {grown}"

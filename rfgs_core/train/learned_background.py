@@ -47,6 +47,19 @@ TURNS = 2
 MOST_FRAMES, TURN_GAUSSIANS = 24, 1500
 
 
+def need_enough_frames(sequence: Sequence) -> None:
+    """Refuses sequences from which no background can be learned.
+
+    Raises:
+        RfgsError: There are fewer than `LEAST_FRAMES` frames.
+    """
+    if len(sequence.frames) < LEAST_FRAMES:
+        raise RfgsError(
+            f"{sequence.path}: holds {len(sequence.frames)} frames; expected at least "
+            f"{LEAST_FRAMES} to learn the background from; use --background empty_room"
+        )
+
+
 def learned_background(
     sequence: Sequence,
     radio: str,
@@ -70,11 +83,7 @@ def learned_background(
     Raises:
         RfgsError: There are fewer than `LEAST_FRAMES` frames, or a channel is not finite.
     """
-    if len(sequence.frames) < LEAST_FRAMES:
-        raise RfgsError(
-            f"{sequence.path}: holds {len(sequence.frames)} frames; expected at least "
-            f"{LEAST_FRAMES} to learn the background from; use --background empty_room"
-        )
+    need_enough_frames(sequence)
     measured = sequence.coordinates(radio)["measured"].values
     ever, rows, shape = np.zeros_like(measured), [], ()
     for frame in sequence.frames:

@@ -208,6 +208,19 @@ def _continuity(state: FrameState, config: TrainConfig) -> Continuity | None:
     return Continuity(means, goes_on, config.temporal)
 
 
+def need_sample_points(config: TrainConfig) -> None:
+    """Refuses the paper's density rule where nothing gives it sample points.
+
+    Raises:
+        RfgsError: It is asked for without the paper's losses.
+    """
+    if config.density == "paper" and config.objective == "csi":
+        raise RfgsError(
+            "--density paper reads the sample points of the paper's losses; expected "
+            "--objective paper or both, or another --density"
+        )
+
+
 def density_control(
     observations: Observations, state: FrameState, config: TrainConfig, seed: int, task: Task
 ) -> DensityControl:
@@ -216,13 +229,9 @@ def density_control(
     Raises:
         RfgsError: The paper's rule is asked for without the paper's losses.
     """
+    need_sample_points(config)
     kind = config.density or ("none" if task.points is None else "paper")
     if kind == "paper":
-        if task.points is None:
-            raise RfgsError(
-                "--density paper reads the sample points of the paper's losses; expected "
-                "--objective paper or both, or another --density"
-            )
         return PaperDensity(DensityRule.without(config.without))
     if kind == "3dgs":
         layout = observations.layout

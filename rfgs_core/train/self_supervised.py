@@ -172,16 +172,18 @@ def train_encoder(
         on_step: Called with the error of each step.
 
     Raises:
-        RfgsError: Nothing changes in any frame, the loss is not a number, or the features
-            collapsed.
+        RfgsError: The network cannot read the radio, nothing changes in any frame, the loss is
+            not a number, or the features collapsed.
     """
+    with one_torch_thread():
+        # Also refuses radios that the network cannot read, before any point is found.
+        encoder = LearnedEncoder.untrained(kind, frames[0], sub_seed(seed, "weights"))
     examples = [Example.of(seen, sub_seed(seed, "points", k)) for k, seen in enumerate(frames)]
     if not any(bool((example.blocks.csi != 0).any()) for example in examples):
         raise RfgsError(
             "nothing moves in these frames: csi and csi_static are equal; choose others"
         )
     with one_torch_thread():
-        encoder = LearnedEncoder.untrained(kind, frames[0], sub_seed(seed, "weights"))
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(sub_seed(seed, "prior"))
             prior = Prior()

@@ -109,3 +109,4 @@ def test_an_address_without_a_scheduler_is_named(
     job = make_job(tmp_path / "out", images=False, scheduler="tcp://127.0.0.1:9")
     with pytest.raises(RfgsError, match=r"--scheduler tcp://127.0.0.1:9: no Dask scheduler"):
         generate(job)
+    assert not (tmp_path / "out").exists(), "nothing is exported for nobody"

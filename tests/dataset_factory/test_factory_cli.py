@@ -79,6 +79,19 @@ def test_wrong_requests(
     assert all(word in line for word in words), line
 
 
+def test_packets_that_no_radio_sends_are_refused_by_check_too(factory_here: Factory) -> None:
+    answer = factory_here("check", "living_room_walk", "--packets-per-frame", "0")
+    assert "--packets-per-frame 0: expected 1 to 10000" in one_line(answer)
+
+
+def test_a_benchmark_of_too_few_frames_is_refused_before_they_are_made(
+    factory_here: Factory,
+) -> None:
+    answer = factory_here("bench", "living_room_walk", "--frames", "10:40:5")
+    assert "--frames 10:40:5: expected at least 8 frames" in one_line(answer)
+    assert answer.stderr.count("\n") == 1
+
+
 @pytest.mark.parametrize(
     ("scene", "words"),
     [

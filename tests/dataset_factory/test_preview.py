@@ -44,7 +44,8 @@ def test_the_page_holds_everything_and_needs_nothing(
     assert answer.returncode == 0, answer.stderr
     file = Path(answer.stdout.strip())
     text = file.read_text()
-    assert "http" not in text and "src=" in text
+    # Any four letters may stand in a picture by chance.
+    assert "http" not in re.sub(r"base64,[\w+/=]*", "", text) and "src=" in text
     drawn = {file.name for file in file.parent.glob("*.png")}
     assert drawn == {
         "pictures.png",

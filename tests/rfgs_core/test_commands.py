@@ -4,17 +4,25 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from rfgs_core.cli import COMMANDS, main
-from rfgs_core.cli.demo import DemoArgs, Stages, keep_settings
+from rfgs_core.cli.demo import DemoArgs, Stages, keep_settings, refuse_other_settings
 from rfgs_core.cli.info import find_blender
+from rfgs_core.dataset import open_dataset
+from rfgs_core.dataset.schema import read_dataset_info
+from rfgs_core.dataset.writer import write_dataset_info
 from rfgs_core.errors import RfgsError
+from rfgs_core.gaussians.ply import read_ply
+from rfgs_core.run import Run
 
+PICTURES = ("images", "depth", "normal", "mask")
 TINY = ["--gaussians", "40", "--iterations", "1", "--no-shader"]
 
 
@@ -89,6 +97,9 @@ def test_train_without_a_dataset(tmp_path: Path, capsys) -> None:
         (["--radio", "wifi", "--sequence", "no"], "no sequence 'no'; expected one of tiny"),
         (["--radio", "wifi", "--gaussians", "0"], "--gaussians 0: expected at least 1"),
         (["--radio", "wifi", "--iterations", "-1"], "--iterations -1: expected at least 0"),
+        (["--radio", "wifi", "--channel", "impaired"], "holds no impaired channels"),
+        (["--radio", "wifi", "--background", "learned"], "expected at least 3 to learn"),
+        (["--radio", "wifi", "--density", "paper"], "reads the sample points of the paper's"),
     ],
 )
 def test_train_refuses_what_the_dataset_does_not_hold(
@@ -98,6 +109,78 @@ def test_train_refuses_what_the_dataset_does_not_hold(
     line = error_line(["train", str(tiny_dataset), "--out", str(out), *extra], capsys)
     assert message in line
     assert not out.exists()
+
+
+def test_train_says_at_the_start_that_no_picture_is_for_the_shader(
+    tiny_dataset: Path, tmp_path: Path, capsys
+) -> None:
+    """All pictures of one frame are held out for testing: the other frame's are not."""
+    (tested,) = open_dataset(tiny_dataset).sequence().splits["images"]["test_frames"]
+    arguments = ["train", str(tiny_dataset), "--radio", "wifi", *TINY[:-1], "--frames", str(tested)]
+    said = "training without the shader, so that Gaussians stay grey: all pictures of these"
+    # Refused after that line and before any training, as the folder is somebody else's.
+    (tmp_path / "thesis.txt").write_text("precious")
+    assert main([*arguments, "--out", str(tmp_path)]) == 2
+    assert capsys.readouterr().err.splitlines()[0].startswith(said)
+    out = tmp_path / "run"
+    assert main([*arguments, "--out", str(out)]) == 0
+    assert said in capsys.readouterr().err
+    assert not (out / "shader.npz").exists()
+    assert (read_ply(out / f"gaussians/{tested:06d}.ply").f_dc == 0).all(), "mid-grey"
+
+
+def test_train_says_at_the_start_that_a_dataset_has_no_pictures(
+    tiny_dataset: Path, tmp_path: Path, capsys
+) -> None:
+    data = Path(shutil.copytree(tiny_dataset, tmp_path / "dataset"))
+    info = read_dataset_info(data / "dataset.json")
+    write_dataset_info(data, replace(info, has=[x for x in info.has if x not in PICTURES]))
+    (tmp_path / "run").write_text("a file")
+    arguments = ["train", str(data), "--radio", "wifi", "--out", str(tmp_path / "run")]
+    assert main(arguments) == 2
+    said = "training without the shader, so that Gaussians stay grey: the dataset holds no images"
+    assert capsys.readouterr().err.splitlines()[0].startswith(said)
+    assert main([*arguments, "--no-shader"]) == 2
+    assert "shader" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["eval", "pose", "csi"])
+def test_a_run_that_lacks_frames_is_refused_before_work_on_all_of_them(
+    small_run: Run, tmp_path: Path, capsys, command: str
+) -> None:
+    run = Path(shutil.copytree(small_run.path, tmp_path / "run"))
+    (run / "gaussians/000002.features.npz").unlink()
+    before = sorted(run.rglob("*"))
+    line = error_line([command, str(run)], capsys)
+    assert "1 of 2 frames are not trained yet, the first is 2; run the same `rfgs train`" in line
+    assert sorted(run.rglob("*")) == before
+
+
+@pytest.mark.parametrize(
+    ("extra", "message"),
+    [
+        (["--radio", "radar"], "no radio 'radar'; it holds wifi"),
+        (["--radio", "wifi", "--frames", "9"], "--frames '9': none of these is there"),
+        (["--radio", "wifi", "--frames", "2:1"], "expected FIRST <= LAST"),
+        (["--radio", "wifi", "--iterations", "-3"], "--iterations -3: expected at least 0"),
+    ],
+)
+def test_ablate_refuses_what_no_variant_could_be_trained_on(
+    tiny_dataset: Path, tmp_path: Path, capsys, extra: list[str], message: str
+) -> None:
+    out = tmp_path / "out"
+    line = error_line(["ablate", str(tiny_dataset), "--out", str(out), *extra], capsys)
+    assert message in line
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("part", "option"),
+    [("propagation", "gaussians"), ("training", "gaussians"), ("training", "steps")],
+)
+def test_bench_refuses_to_time_nothing(part: str, option: str, capsys) -> None:
+    line = error_line(["bench", part, f"--{option}", "0"], capsys)
+    assert line == f"error: --{option} 0: expected at least 1"
 
 
 def test_train_refuses_a_folder_with_other_files(
@@ -160,10 +243,19 @@ def test_stages_run_once_and_again_when_their_result_is_gone(tmp_path: Path) -> 
 
 
 def test_a_demo_with_other_settings_is_not_mixed_in(tmp_path: Path) -> None:
+    refuse_other_settings(DemoArgs(out=tmp_path))
     keep_settings(DemoArgs(out=tmp_path))
-    keep_settings(DemoArgs(out=tmp_path))
+    refuse_other_settings(DemoArgs(out=tmp_path))
     with pytest.raises(RfgsError, match="holds a demo with another frames, seed; choose another"):
-        keep_settings(DemoArgs(out=tmp_path, frames="1:3", seed=1))
+        refuse_other_settings(DemoArgs(out=tmp_path, frames="1:3", seed=1))
+
+
+def test_a_demo_of_frames_that_cannot_be_leaves_nothing(tmp_path: Path, capfd) -> None:
+    """Otherwise the settings that were refused would stand in the way of better ones."""
+    out = tmp_path / "demo"
+    assert main(["demo", "--out", str(out), "--frames", "30:10"]) == 2
+    assert "--frames '30:10': expected FIRST <= LAST" in capfd.readouterr().err
+    assert not out.exists()
 
 
 def test_blender_is_taken_from_the_environment(

@@ -118,6 +118,16 @@ def test_the_table_names_what_is_missed() -> None:
     assert line.count("|") == text.splitlines()[0].count("|")
 
 
+def test_shares_that_grew_are_no_negative_percentages() -> None:
+    """CLEAN has 0.6: an F10 of 0.388 has an error of 0.612 instead of 0.4, 53 % more."""
+    case = Case("living_room_walk", "clean", "wifi", 0)
+    text = study_table(summarise([(case, metrics(0.388))]))
+    (line,) = [line for line in text.splitlines() if line.startswith("| living_room_walk")]
+    assert "| 0.600 (clean) | 53 % larger | 71 % wider |" in line
+    better = study_table(summarise([(case, metrics(0.8))]))
+    assert "| 0.600 (clean) | 50 % | 67 % |" in better
+
+
 def test_a_case_that_fails_is_named_and_the_others_go_on(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -192,6 +192,7 @@ def test_same_seed_gives_the_same_bytes_for_any_threads_and_order(
     before = dr.thread_count(), numba.get_num_threads()
     try:
         dr.set_thread_count(2)
+        numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
         tracer = Tracer(person_bundle, small_radio, two_devices, depth=2, seed=0)
         first = [tracer.static(), *(tracer.frame(frame) for frame in frames)]
         dr.set_thread_count(1)

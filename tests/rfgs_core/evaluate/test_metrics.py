@@ -101,23 +101,36 @@ def test_a_displaced_fit_is_reported_as_losing(surface_run) -> None:
     assert "half a metre" in line
 
 
-def judged(own: float, control: float, oracle: float | None) -> str:
+def judged(own: float, control: float, oracle: float | None) -> list[str]:
     def group(f10: float | None) -> dict[str, Any]:
         return {"geometry": {"f05": f10, "f10": f10}, "rf": {}, "image": {}}
 
     controls = {name: group(None) for name in CONTROLS} | {
         "matched_filter": group(control),
+        "matched_filter_different_sum": group(control),
         "oracle_init": group(oracle),
     }
     limits = {"range_resolution_m": 0.9, "cross_range_m": 0.6}
-    return verdicts({**group(own), "controls": controls, "limits": limits})[0]
+    return verdicts({**group(own), "controls": controls, "limits": limits})
 
 
 def test_a_lost_comparison_says_whether_the_optimisation_is_at_fault() -> None:
-    assert judged(0.5, 0.4, None) == "Won: F10 0.500 against 0.400 of matched_filter (+0.100)."
-    assert "optimisation is at fault" in judged(0.4, 0.5, 0.8)
-    assert "data and the model set the limit" in judged(0.4, 0.5, 0.45)
-    assert "not known" in judged(0.4, 0.5, None)
+    assert judged(0.5, 0.4, None)[0] == "Won: F10 0.500 against 0.400 of matched_filter (+0.100)."
+    assert "optimisation is at fault" in judged(0.4, 0.5, 0.8)[0]
+    assert "data and the model set the limit" in judged(0.4, 0.5, 0.45)[0]
+    assert "not known" in judged(0.4, 0.5, None)[0]
+
+
+@pytest.mark.parametrize(
+    ("own", "sentence"),
+    [
+        (0.8, "Won: 60 % of the matched filter's error 1 − F10 is removed; the mark is a third"),
+        (0.6, "Lost: 20 % of the matched filter's error 1 − F10 is removed; the mark is a third"),
+        (0.235, "Lost: the error 1 − F10 is 53 % larger than the matched filter's; the mark is"),
+    ],
+)
+def test_an_error_that_grew_is_not_removed(own: float, sentence: str) -> None:
+    assert judged(own, 0.5, 0.8)[1].startswith(sentence)
 
 
 def test_evaluation_is_repeatable(metrics, surface_run) -> None:

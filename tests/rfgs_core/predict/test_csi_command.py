@@ -45,9 +45,21 @@ def test_it_writes_one_picture(small_run: Run, tmp_path: Path, capsys) -> None:
     assert [path.name for path in out.parent.iterdir()] == ["link.png"]
 
 
+def test_an_error_louder_than_the_change_is_not_left_of_it(small_run: Run) -> None:
+    """The prediction is the change times a number: a tenth, and twice of it, are wrong."""
+    link = link_channels(small_run, 0, 0)
+    good, bad = (replace(link, predicted=link.measured * np.complex64(x)) for x in (0.9, 3.0))
+    assert good.explained.startswith("the prediction leaves -20.0 dB of the change's energy")
+    assert bad.explained.startswith("the prediction's error has 6.0 dB more energy than the change")
+
+
 @pytest.mark.parametrize(
     ("more", "words"),
-    [(["--tx-device", "9"], "no link 9"), (["--out", "link.jpg"], "ends in .png")],
+    [
+        (["--tx-device", "9"], "--tx-device 9: nothing of it is measured; expected one of 0, 1"),
+        (["--rx-device", "-1"], "no link 0→-1"),
+        (["--out", "link.jpg"], "ends in .png"),
+    ],
 )
 def test_mistakes_get_one_line(small_run: Run, capsys, more: list[str], words: str) -> None:
     assert main(["csi", str(small_run.path), *more]) != 0

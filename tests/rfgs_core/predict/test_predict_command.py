@@ -70,6 +70,15 @@ def test_without_a_name_it_writes_into_the_run(
         (["--tx", "nan,1,1", "--rx", RX], "--tx 'nan,1,1': expected three finite coordinates"),
         (["--tx", "1,inf,1", "--rx", RX], "--tx '1,inf,1': expected three finite coordinates"),
         (["--tx", "a,b,c", "--rx", RX], "--tx 'a,b,c': expected three finite coordinates"),
+        (
+            ["--tx", "50,0,1", "--rx", RX],
+            "--tx 50,0,1: 47.0 m outside the scene, which reaches from 0,0,0 to 3,3,2.5 m",
+        ),
+        (["--tx", TX, "--rx", RX, "--rx", "1,1,-1.1"], "--rx 1,1,-1.1: 1.1 m outside the scene"),
+        (
+            ["--tx", TX, "--rx", RX, "--facing", "1,1,1"],
+            "--facing 1,1,1: turns arrays; add --array",
+        ),
         (["--tx", TX], "--rx: expected at least one position"),
         (["--tx", TX, "--rx", TX], "--rx 0.5,0.5,1: on top of a --tx antenna"),
         (["--tx", TX, "--rx", RX, "--rx", RX], "--rx 2.6,0.4,1.5: on top of a --rx antenna"),

@@ -125,8 +125,9 @@ def _same_bytes(first: list[torch.Tensor], second: list[torch.Tensor]) -> bool:
 
 def test_same_bytes_for_any_number_of_threads(channel_and_gradients) -> None:
     threads = numba.get_num_threads()
-    first = channel_and_gradients()
     try:
+        numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
+        first = channel_and_gradients()
         numba.set_num_threads(1)
         second = channel_and_gradients()
     finally:

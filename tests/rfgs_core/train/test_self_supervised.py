@@ -185,3 +185,10 @@ def test_correlation_is_that_of_numpy() -> None:
     expected = (matrix**2).sum() - 32
     got = float(correlation(torch.from_numpy(values)))
     assert got == pytest.approx(expected / (32 * 31), rel=1e-6)
+
+
+def test_a_network_that_cannot_read_the_radio_is_told_before_the_frames_are_read(frames) -> None:
+    """Nothing moves in these frames, which is found only by looking at their points."""
+    still = [frame.with_delta(np.zeros_like(frame.delta)) for frame in frames]
+    with pytest.raises(RfgsError, match="the doppler network expects"):
+        train_encoder(still, "doppler", 1, 0)

@@ -130,13 +130,10 @@ class Bundle:
         _expect(path, "vertices", vertices, self.topology.rest_vertices.shape)
         people = len(arrays["person_instance"])
         labels = {name: arrays[name] for name in ("joints", "segment_velocity")}
-        if people:
-            for name, values in labels.items():
-                known = np.where(unknown_joints(values)[:, None, None], 0.0, values)
-                _expect(path, name, known, (people, NUM_JOINTS, 3))
-        joints, velocity = (
-            values.astype(np.float32).reshape(people, NUM_JOINTS, 3) for values in labels.values()
-        )
+        for name, values in labels.items():
+            known = np.where(unknown_joints(values)[:, None, None], 0.0, values)
+            _expect(path, name, known, (people, NUM_JOINTS, 3))
+        joints, velocity = (values.astype(np.float32) for values in labels.values())
         _expect(path, "action", arrays["action"], (people,))
         return BundleFrame(
             frame=frame,
@@ -186,8 +183,8 @@ class Bundle:
 
 
 def unknown_joints(joints: np.ndarray) -> np.ndarray:
-    """Which people have no joints: all NaN, as bundles write it; bool, shape (P,)."""
-    return np.isnan(joints).reshape(len(joints), -1).all(axis=1)
+    """Which people have no joints: all NaN, as bundles write it; bool, shape (P,), P may be 0."""
+    return np.isnan(joints).all(axis=tuple(range(1, joints.ndim)))
 
 
 def sanitised(name: str) -> str:

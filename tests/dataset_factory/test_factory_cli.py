@@ -103,6 +103,26 @@ def test_missing_and_old_llvm(factory: Factory, box_room: Path, tmp_path: Path) 
     assert "no LLVM" in line and "libllvm19" in line
 
 
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("generate", "living_room_walk", "--radio", "wifi"),
+        ("plan", "living_room_walk", "--radio", "wifi"),
+        ("convert", "data", "--to", "mat"),
+        ("preview", "data"),
+    ],
+)
+def test_a_place_that_cannot_be_made_is_refused_first(
+    factory_here: Factory, tmp_path: Path, command: tuple[str, ...]
+) -> None:
+    (tmp_path / "file").write_text("")
+    # Not even the administrator makes a folder in the second.
+    for place in (tmp_path / "file" / "below", Path("/proc/rfgs")):
+        line = one_line(factory_here(*command, "--out", str(place)))
+        assert line.startswith(f"error: {place}: nothing can be made there (")
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
 def test_truncated_chunk_is_named(factory: Factory, box_copy: Path) -> None:
     file = chunk_file(box_copy / "box_room/radio/wifi/csi.zarr", 1)
     file.write_bytes(file.read_bytes()[:100])

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from dataset_factory.bundle import Bundle
-from dataset_factory.radios import SCENE_RADIO
+from dataset_factory.outline import device_radios, silence
 from rfgs_core.dataset.schema import device_pose
 from rfgs_core.errors import RfgsError
 from rfgs_core.radio import DevicePose, Radio, frame_samples, layout, place_devices
@@ -28,26 +28,18 @@ _MOST_PROBLEMS = 5
 def choose_devices(bundle: Bundle, radio: Radio) -> tuple[list[DevicePose], dict[str, Any] | None]:
     """The scene's own access points for a radio, else the preset's placement.
 
-    An Empty for any radio is a place for a box in a corner, not for an array along a wall: such
-    radios take only Empties with their own name.
-
     Returns:
         The devices, and the guess that was made, None if the scene brought them.
     """
-    at_points = radio.placement == "corners" or radio.name == SCENE_RADIO
-    names = {"any", radio.name} if at_points else {radio.name}
+    names = device_radios(radio)
     own = [
         device_pose(row)
         for row in bundle.devices
         if row["role"] != "NONE" and row["radio"] in names
     ]
     if own:
-        for other, word in (("RECEIVER", "transmits"), ("TRANSMITTER", "receives")):
-            if all(device.role == other for device in own):
-                raise RfgsError(
-                    f"{bundle.info['blend_name']}: no device of radio {radio.name!r} {word}; give "
-                    "an Empty another role"
-                )
+        if problem := silence(bundle.devices, radio):
+            raise RfgsError(f"{bundle.info['blend_name']}: {problem}")
         return _in_order(bundle, radio, own), None
     placed = _clear_of_furniture(radio, place_devices(radio, bundle.bounds_m), bundle)
     guess = {

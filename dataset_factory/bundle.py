@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from dataset_factory.room import Room, read_room
 from rfgs_core.arrays import load_arrays
 from rfgs_core.dataset.mesh_ply import read_mesh
 from rfgs_core.errors import RfgsFormatError
@@ -117,6 +118,8 @@ class Bundle:
     """Frames that were exported."""
     fps: float
     """Frames per second."""
+    room: Room | None = None
+    """The room around the people; None where nothing stands still."""
 
     def frame(self, frame: int) -> BundleFrame:
         """Reads what moves at one frame.
@@ -227,6 +230,7 @@ def read_bundle(path: Path) -> Bundle:
         bounds_m=bounds,
         frames=[int(frame) for frame in info["frames"]],
         fps=float(info["fps"]),
+        room=read_room(file, info.get("room")),
     )
 
 

@@ -89,7 +89,7 @@ def set_to_guess(scene: bpy.types.Scene, name: str) -> str:
 def move_device(scene: bpy.types.Scene, name: str) -> str:
     """Moves a device to the nearest free place within the scene."""
     item = empties.named_device(scene, name)
-    bounds, meshes = authoring.scene_space(scene)
+    bounds, meshes, _ = authoring.scene_space(scene)
     unit = unit_scale(scene)
     pose = empties.pose_of(item, unit)
     before = pose[:3, 3].copy()

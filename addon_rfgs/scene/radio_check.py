@@ -41,7 +41,7 @@ def material_findings(
 
 
 def device_findings(content: Content, devices: list[dict[str, Any]]) -> list[Finding]:
-    """Names devices inside closed objects and outside the scene, and those that differ.
+    """Names devices in closed objects, outside the scene or the room, and those that differ.
 
     Args:
         content: The scene.
@@ -50,6 +50,7 @@ def device_findings(content: Content, devices: list[dict[str, Any]]) -> list[Fin
     findings = _different(devices)
     if content.space is None:
         return findings
+    room = content.surroundings() if devices else None
     for row in devices:
         place = np.array(row["position_m"])
         if (place < content.bounds[0]).any() or (place > content.bounds[1]).any():
@@ -63,6 +64,12 @@ def device_findings(content: Content, devices: list[dict[str, Any]]) -> list[Fin
                 remedy = "move it out of the object"
                 findings.append(Finding("warning", row["name"], message, remedy, "device_inside"))
                 break
+        else:
+            if room is not None and room.outside(place):
+                message = "is a device outside the room around the people: only what goes through "
+                message += "its walls is heard there"
+                remedy = "fine if that is meant; else move it inside"
+                findings.append(Finding("info", row["name"], message, remedy, "device_elsewhere"))
     return findings
 
 

@@ -121,6 +121,11 @@ class Bundle:
     room: Room | None = None
     """The room around the people; None where nothing stands still."""
 
+    @property
+    def room_m(self) -> np.ndarray:
+        """Box of the room around the people, else the scene's bounds [m], shape (2, 3)."""
+        return self.bounds_m if self.room is None else self.room.box_m
+
     def frame(self, frame: int) -> BundleFrame:
         """Reads what moves at one frame.
 

@@ -101,8 +101,9 @@ def scene_problems(
         except RfgsError as error:
             problems.append(str(error))
         problems += check(radio, bundle.bounds_m, bundle.materials)
-        problems += check_devices(radio, bundle.bounds_m, devices[radio.name], meshes)
-        problems += _out_of_room(bundle, radio, devices[radio.name])
+        chosen = devices[radio.name]
+        problems += check_devices(radio, bundle.bounds_m, chosen, meshes, bundle.room_m)
+        problems += _out_of_room(bundle, radio, chosen)
     return list(dict.fromkeys(problems))
 
 

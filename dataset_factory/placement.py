@@ -110,5 +110,5 @@ class Placement:
     def _in_objects(self, points: np.ndarray) -> np.ndarray:
         inside = np.zeros(len(points), dtype=bool)
         for mesh in self.meshes:
-            inside |= enclosed(points, self.bundle.bounds_m, mesh.vertices, mesh.faces)
+            inside |= enclosed(points, self.bundle.room_m, mesh.vertices, mesh.faces)
         return inside

@@ -54,11 +54,11 @@ def spots(
             place in the room for some device.
     """
     standing = list(meshes)
-    placed, faulty = _within(radio, bounds, bounds, standing, room)
+    placed, faulty = _within(radio, bounds, standing, room)
     if room is not None and faulty:
         box = np.clip(room.box, bounds[0], bounds[1])
         try:
-            closer, still_faulty = _within(radio, box, bounds, standing, room, nearer=True)
+            closer, still_faulty = _within(radio, box, standing, room, nearer=True)
         except AddonError:
             closer, still_faulty = placed, faulty
         # What is as good in the bounds stays there.
@@ -75,7 +75,6 @@ def spots(
 def _within(
     radio: str,
     box: np.ndarray,
-    bounds: np.ndarray,
     meshes: list[Mesh],
     room: Surroundings | None,
     *,
@@ -86,12 +85,13 @@ def _within(
     row = RADIO_PLACEMENTS[radio]
     heights = [float(box[0, 2]) + _height(radio, box, wanted) for wanted in row["heights_m"]]
     stand = room.stand if room is not None and nearer and row["placement"] == "corners" else None
+    around = box if room is None else room.box
     chosen, faulty = [], 0
     for index, (x, y, yaw) in enumerate(rule[row["placement"]](radio, box)):
         own = Spot((float(x), float(y), heights[index % len(heights)]), float(yaw))
         best, least = own, (2, 0)
         for spot in _choices(own, heights, stand):
-            fault = _fault(radio, spot, own, bounds, meshes, room)
+            fault = _fault(radio, spot, own, around, meshes, room)
             if fault < least:
                 best, least = spot, fault
             if least == (0, 0):
@@ -124,7 +124,7 @@ def _fault(
     radio: str,
     spot: Spot,
     own: Spot,
-    bounds: np.ndarray,
+    around: np.ndarray,
     meshes: list[Mesh],
     room: Surroundings | None,
 ) -> tuple[int, int]:
@@ -135,21 +135,21 @@ def _fault(
     fields, pose = RADIO_FIELDS[radio], spot.pose()
     antennas = [world_elements(fields, array, pose) for array in ("tx", "rx")]
     place = np.array(spot.position_m)
-    inside = _in_objects(np.concatenate([[place], *antennas]), bounds, meshes)
+    inside = _in_objects(np.concatenate([[place], *antennas]), around, meshes)
     faulty = bool(inside[0]) or (room is not None and room.outside(place))
     back = np.array([*np.subtract(own.position_m, place)[:2], 0.0])
     length = float(np.linalg.norm(back))
     if length > 0.0 and not faulty:
         behind = place + min(NOT_AT_WALL_M, length) * back / length
         faulty = room is not None and room.outside(behind)
-        faulty |= bool(_in_objects(behind[None], bounds, meshes)[0])
+        faulty |= bool(_in_objects(behind[None], around, meshes)[0])
     return int(faulty), int(inside.sum())
 
 
-def _in_objects(points: np.ndarray, bounds: np.ndarray, meshes: list[Mesh]) -> np.ndarray:
+def _in_objects(points: np.ndarray, around: np.ndarray, meshes: list[Mesh]) -> np.ndarray:
     inside = np.zeros(len(points), dtype=bool)
     for vertices, faces in meshes:
-        inside |= enclosed(points, bounds, vertices, faces)
+        inside |= enclosed(points, around, vertices, faces)
     return inside
 
 

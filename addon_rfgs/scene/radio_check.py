@@ -51,6 +51,7 @@ def device_findings(content: Content, devices: list[dict[str, Any]]) -> list[Fin
     if content.space is None:
         return findings
     room = content.surroundings() if devices else None
+    around = content.bounds if room is None else room.box
     for row in devices:
         place = np.array(row["position_m"])
         if (place < content.bounds[0]).any() or (place > content.bounds[1]).any():
@@ -59,7 +60,7 @@ def device_findings(content: Content, devices: list[dict[str, Any]]) -> list[Fin
             findings.append(Finding("warning", row["name"], message, remedy, "device_outside"))
             continue
         for surface in content.surfaces:
-            if not surface.moving and device_inside(place, content.bounds, surface):
+            if not surface.moving and device_inside(place, around, surface):
                 message = f"is a device inside {surface.key!r}"
                 remedy = "move it out of the object"
                 findings.append(Finding("warning", row["name"], message, remedy, "device_inside"))
@@ -73,9 +74,9 @@ def device_findings(content: Content, devices: list[dict[str, Any]]) -> list[Fin
     return findings
 
 
-def device_inside(place: np.ndarray, bounds: np.ndarray, surface: Any) -> bool:
+def device_inside(place: np.ndarray, room: np.ndarray, surface: Any) -> bool:
     """Whether a place [3] in metres is within a closed static surface."""
-    return bool(enclosed(place[None], bounds, surface.vertices, surface.faces)[0])
+    return bool(enclosed(place[None], room, surface.vertices, surface.faces)[0])
 
 
 def _different(devices: list[dict[str, Any]]) -> list[Finding]:

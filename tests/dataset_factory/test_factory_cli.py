@@ -85,6 +85,7 @@ def test_wrong_requests(
         ({"moving": False}, ["no moving mesh"]),
         ({"wall": "floorboard"}, ["'floorboard'", "50 to 100 GHz", "5.72 to 5.88 GHz", "choose"]),
         ({"scale": 0.1}, ["0.17 m", "unit scale"]),
+        ({"scale": 0.26}, ["a person of 0.442 m, expected 0.5 to 5 m", "unit scale"]),
     ],
 )
 def test_unsuitable_scenes(
@@ -94,7 +95,7 @@ def test_unsuitable_scenes(
     blend = str(build_scene(**scene))
     line = one_line(factory_here("generate", blend, "--radio", "wifi", "--out", str(out)))
     assert all(word in line for word in words), line
-    assert not (out / "dataset.json").exists()
+    assert not out.exists(), "nothing is left"
 
 
 def test_missing_and_old_llvm(factory: Factory, box_room: Path, tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from typing import NoReturn, TextIO
 import bpy
 
 from .channels.commands import add_csi
-from .check.commands import add_check, add_fix
+from .check.commands import add_check, add_fix, add_outline
 from .devices.commands import add_devices
 from .errors import AddonError, disk_message
 from .export.commands import add_export
@@ -35,6 +35,7 @@ from .removal.commands import add_remove_data
 
 _COMMANDS = (
     add_check,
+    add_outline,
     add_fix,
     add_devices,
     add_materials,

@@ -23,6 +23,12 @@ SPEED_OF_LIGHT: float = _TABLES["speed_of_light"]
 #: A closed mesh that fills more of the scene than this is the room itself, not furniture.
 ROOM_FRACTION: float = _TABLES["room_fraction"]
 
+#: A device in a corner that is outside the room comes nearer to the people by such a share.
+NEARER: tuple[float, ...] = tuple(_TABLES["nearer"])
+
+#: It keeps this far from what it came around [m].
+NOT_AT_WALL_M: float = _TABLES["not_at_wall_m"]
+
 #: An array with more elements is refused by the factory.
 MOST_ELEMENTS: int = _TABLES["most_elements"]
 

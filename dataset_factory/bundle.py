@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from dataset_factory.room import Room, read_room
 from rfgs_core.arrays import load_arrays
 from rfgs_core.dataset.mesh_ply import read_mesh
 from rfgs_core.errors import RfgsFormatError
@@ -123,6 +124,13 @@ class Bundle:
     """Frames that were exported."""
     fps: float
     """Frames per second."""
+    room: Room | None = None
+    """The room around the people; None where nothing stands still."""
+
+    @property
+    def room_m(self) -> np.ndarray:
+        """Box of the room around the people, else the scene's bounds [m], shape (2, 3)."""
+        return self.bounds_m if self.room is None else self.room.box_m
 
     def frame(self, frame: int) -> BundleFrame:
         """Reads what moves at one frame.
@@ -136,13 +144,10 @@ class Bundle:
         _expect(path, "vertices", vertices, self.topology.rest_vertices.shape)
         people = len(arrays["person_instance"])
         labels = {name: arrays[name] for name in ("joints", "segment_velocity")}
-        if people:
-            for name, values in labels.items():
-                known = np.where(unknown_joints(values)[:, None, None], 0.0, values)
-                _expect(path, name, known, (people, NUM_JOINTS, 3))
-        joints, velocity = (
-            values.astype(np.float32).reshape(people, NUM_JOINTS, 3) for values in labels.values()
-        )
+        for name, values in labels.items():
+            known = np.where(unknown_joints(values)[:, None, None], 0.0, values)
+            _expect(path, name, known, (people, NUM_JOINTS, 3))
+        joints, velocity = (values.astype(np.float32) for values in labels.values())
         _expect(path, "action", arrays["action"], (people,))
         return BundleFrame(
             frame=frame,
@@ -192,8 +197,8 @@ class Bundle:
 
 
 def unknown_joints(joints: np.ndarray) -> np.ndarray:
-    """Which people have no joints: all NaN, as bundles write it; bool, shape (P,)."""
-    return np.isnan(joints).reshape(len(joints), -1).all(axis=1)
+    """Which people have no joints: all NaN, as bundles write it; bool, shape (P,), P may be 0."""
+    return np.isnan(joints).all(axis=tuple(range(1, joints.ndim)))
 
 
 def sanitised(name: str) -> str:
@@ -236,6 +241,7 @@ def read_bundle(path: Path) -> Bundle:
         bounds_m=bounds,
         frames=[int(frame) for frame in info["frames"]],
         fps=float(info["fps"]),
+        room=read_room(file, info.get("room")),
     )
 
 

@@ -3,17 +3,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from dataset_factory.bundle import Bundle
-from dataset_factory.radios import SCENE_RADIO
+from dataset_factory.outline import device_radios, silence
+from dataset_factory.placement import Placement
 from rfgs_core.dataset.schema import device_pose
 from rfgs_core.errors import RfgsError
-from rfgs_core.radio import DevicePose, Radio, frame_samples, layout, place_devices
-from rfgs_core.radio.check import check, check_devices, enclosed
+from rfgs_core.radio import DevicePose, Radio, frame_samples
+from rfgs_core.radio.check import check, check_devices
 
 #: Placement rules in words.
 _WHERE = {
@@ -28,61 +28,34 @@ _MOST_PROBLEMS = 5
 def choose_devices(bundle: Bundle, radio: Radio) -> tuple[list[DevicePose], dict[str, Any] | None]:
     """The scene's own access points for a radio, else the preset's placement.
 
-    An Empty for any radio is a place for a box in a corner, not for an array along a wall: such
-    radios take only Empties with their own name.
-
     Returns:
         The devices, and the guess that was made, None if the scene brought them.
     """
-    at_points = radio.placement == "corners" or radio.name == SCENE_RADIO
-    names = {"any", radio.name} if at_points else {radio.name}
-    own = [
-        device_pose(row)
-        for row in bundle.devices
-        if row["role"] != "NONE" and row["radio"] in names
-    ]
+    own = _own(bundle, radio)
     if own:
-        for other, word in (("RECEIVER", "transmits"), ("TRANSMITTER", "receives")):
-            if all(device.role == other for device in own):
-                raise RfgsError(
-                    f"{bundle.info['blend_name']}: no device of radio {radio.name!r} {word}; give "
-                    "an Empty another role"
-                )
+        if problem := silence(bundle.devices, radio):
+            raise RfgsError(f"{bundle.info['blend_name']}: {problem}")
         return _in_order(bundle, radio, own), None
-    placed = _clear_of_furniture(radio, place_devices(radio, bundle.bounds_m), bundle)
+    placed = Placement(radio, bundle).devices()
     guess = {
         "what": "devices",
         "object": radio.name,
         "value": f"{len(placed)} {'places of one device ' if radio.antennas_move else ''}"
         f"{_WHERE[radio.placement]}",
         "why": "no Empty has a role with radio "
-        + " or ".join(repr(name) for name in sorted(names)),
+        + " or ".join(repr(name) for name in sorted(device_radios(radio))),
     }
     return placed, guess
 
 
-def _clear_of_furniture(
-    radio: Radio, devices: list[DevicePose], bundle: Bundle
-) -> list[DevicePose]:
-    """Moves placed devices to another of the radio's heights where furniture stands at theirs."""
-    meshes = bundle.static_meshes()
-
-    def hidden(device: DevicePose) -> tuple[int, int]:
-        """Whether the device, and how many of its antennas, are inside objects."""
-        antennas = layout(radio, [device])
-        points = np.concatenate([[device.position_m], antennas.tx_xyz, antennas.rx_xyz])
-        inside = np.zeros(len(points), dtype=bool)
-        for mesh in meshes:
-            inside |= enclosed(points, bundle.bounds_m, mesh.vertices, mesh.faces)
-        return int(inside[0]), int(inside.sum())
-
-    clear = []
-    for device in devices:
-        x, y, own_m = device.position_m
-        heights_m = [float(bundle.bounds_m[0, 2]) + height for height in radio.heights_m]
-        choices = [replace(device, position_m=(x, y, z)) for z in (own_m, *heights_m)]
-        clear.append(min(choices, key=hidden))
-    return clear
+def _own(bundle: Bundle, radio: Radio) -> list[DevicePose]:
+    """The scene's devices that take part in a radio."""
+    names = device_radios(radio)
+    return [
+        device_pose(row)
+        for row in bundle.devices
+        if row["role"] != "NONE" and row["radio"] in names
+    ]
 
 
 def _in_order(bundle: Bundle, radio: Radio, own: list[DevicePose]) -> list[DevicePose]:
@@ -128,5 +101,28 @@ def scene_problems(
         except RfgsError as error:
             problems.append(str(error))
         problems += check(radio, bundle.bounds_m, bundle.materials)
-        problems += check_devices(radio, bundle.bounds_m, devices[radio.name], meshes)
+        chosen = devices[radio.name]
+        problems += check_devices(radio, bundle.bounds_m, chosen, meshes, bundle.room_m)
+        problems += _out_of_room(bundle, radio, chosen)
     return list(dict.fromkeys(problems))
+
+
+def _out_of_room(bundle: Bundle, radio: Radio, devices: list[DevicePose]) -> list[str]:
+    """Why devices that nobody placed would hear nothing of the people, in one sentence.
+
+    Where somebody put their own is theirs to say: radio through walls is a use.
+    """
+    if _own(bundle, radio):
+        return []
+    placement = Placement(radio, bundle)
+    places = {device.name: np.array(device.position_m) for device in devices}
+    outside = [name for name, place_m in places.items() if placement.outside(place_m)]
+    if not outside or bundle.room is None:
+        return []
+    low, high = (", ".join(f"{value:.2f}" for value in row) for row in bundle.room.box_m)
+    names = ", ".join(outside[:4]) + (", …" if len(outside) > 4 else "")
+    return [
+        f"radio {radio.name!r}: no place in the room around the people, ({low}) to ({high}) m, for "
+        f"{len(outside)} of {len(devices)} devices ({names}); place devices in the scene (Empties "
+        "with the role access point), drop what stands in the way, or give --bounds"
+    ]

@@ -6,7 +6,7 @@ from __future__ import annotations
 import fcntl
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from dataset_factory.job import Job
@@ -44,16 +44,34 @@ def open_folder(job: Job) -> bool:
 def locked(job: Job) -> Iterator[None]:
     """Keeps other runs out of the folder.
 
+    Where the block refuses the scene before it claims the folder, nothing is left of it.
+
     Raises:
         RfgsError: One is at work there.
     """
+    made = [place for place in (job.out, *job.out.absolute().parents) if not place.exists()]
     job.work.mkdir(parents=True, exist_ok=True)
     with (job.work / "lock").open("w") as stream:
         try:
             fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
             raise RfgsError(f"{job.out}: another rfgs-factory is working on it") from error
-        yield
+        try:
+            yield
+        except RfgsError:
+            if not (job.out / "dataset.json").exists():
+                _take_back(job, made)
+            raise
+
+
+def _take_back(job: Job, made: list[Path]) -> None:
+    """Removes what a run wrote, and the folders that it made, the innermost first."""
+    shutil.rmtree(job.work, ignore_errors=True)
+    (job.out / "log" / "generate.json").unlink(missing_ok=True)
+    for place in (job.out / "log", *made):
+        # Where somebody else keeps something it stays.
+        with suppress(OSError):
+            place.rmdir()
 
 
 def sweep(out: Path) -> None:

@@ -12,13 +12,17 @@ from typing import Any
 from dataset_factory.blender import Blender
 from dataset_factory.bundle import read_bundle
 from dataset_factory.devices import choose_devices, scene_problems
+from dataset_factory.outline import left_out, usual_radios
 from dataset_factory.overrides import overrides_file
-from dataset_factory.radios import SCENE_RADIO, scene_radio
+from dataset_factory.radios import SCENE_RADIO, chosen_radios, scene_radio
+from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json
 from rfgs_core.radio import Radio
 
 #: Findings about the radios of the scene's devices, not about those that were asked for.
 _OF_DEVICES = {"material_band", "device_inside", "device_outside", "devices_differ"}
+#: The same about the radios that the panel in Blender would trace.
+_OF_PANEL = {"device_left_out", "devices_silent"}
 #: Static objects shown; the rest is counted.
 _MOST_STATIC = 40
 
@@ -33,7 +37,8 @@ def check_file(
         frames: `A:B[:STEP]`, empty for the scene's own range.
         said: Overrides, in the words of the YAML file.
         label: Where they come from, for messages.
-        radios: Radios that shall be traced; none leaves materials and devices unchecked.
+        radios: Radios that shall be traced; none takes that of the scene's own devices, and
+            where there is no such device leaves materials and devices unchecked.
 
     Returns:
         The add-on's report; with radios also the devices they would use.
@@ -46,6 +51,10 @@ def check_file(
         folder = Path(name)
         blender.run("check", "--out", str(folder / "check.json"), *asked, *more)
         report = read_json(folder / "check.json")
+        radios = radios or list(chosen_radios(usual_radios(report["devices"])).values())
+        report["findings"] = [row for row in report["findings"] if row["kind"] not in _OF_PANEL]
+        if radios:
+            report["findings"] += _left_out(report["devices"], radios)
         if radios and not has_errors(report):
             first = str(report["scene"]["frames"][0])
             one = ["--frames", f"{first}:{first}"]
@@ -64,22 +73,34 @@ def table(report: dict[str, Any]) -> str:
     return "\n".join([*_summary(report), "", *_objects(report), "", *_rest(report)])
 
 
+def _left_out(devices: list[dict[str, Any]], radios: list[Radio]) -> list[dict[str, Any]]:
+    """Findings about devices that the radios do without."""
+    rows = []
+    for sentence in left_out(devices, radios):
+        message, _, remedy = sentence.partition("; ")
+        row = {"severity": "warning", "object": "the scene", "message": message, "remedy": remedy}
+        rows.append({**row, "kind": "device_left_out"})
+    return rows
+
+
 def _add_radios(report: dict[str, Any], folder: Path, radios: list[Radio]) -> None:
-    bundle, devices = read_bundle(folder), {}
-    radios = [
-        replace(scene_radio(bundle), samples_per_frame=radio.samples_per_frame)
-        if radio.name == SCENE_RADIO
-        else radio
-        for radio in radios
-    ]
+    bundle, devices, usable, problems = read_bundle(folder), {}, [], []
     for radio in radios:
-        devices[radio.name], guess = choose_devices(bundle, radio)
+        try:
+            if radio.name == SCENE_RADIO:
+                packets = radio.samples_per_frame
+                radio = replace(scene_radio(bundle), samples_per_frame=packets)
+            devices[radio.name], guess = choose_devices(bundle, radio)
+        except RfgsError as error:
+            problems.append(str(error).removeprefix(f"{bundle.info['blend_name']}: "))
+            continue
+        usable.append(radio)
         report["guesses"] += [guess] if guess else []
     report["radios"] = {
         name: [{"name": row.name, "position_m": list(row.position_m)} for row in rows]
         for name, rows in devices.items()
     }
-    problems = scene_problems(bundle, devices, radios)
+    problems += scene_problems(bundle, devices, usable)
     report["findings"] = [
         {"severity": "error", "object": "the scene", "message": problem, "remedy": ""}
         for problem in problems

@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
 import shutil
+import tempfile
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -45,6 +47,32 @@ def replacing_folder(path: Path) -> Iterator[Path]:
         os.replace(temporary, path)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
+
+
+def refuse_place(path: Path) -> None:
+    """Refuses a place where nothing can be made, before any work is done for it.
+
+    Permissions do not tell: they mean little to some users and file systems, so a folder is made
+    there and removed again.
+
+    Args:
+        path: File or folder that shall be written.
+
+    Raises:
+        RfgsError: Nothing can be made there.
+    """
+    try:
+        near = next(place for place in (path, *path.absolute().parents) if place.exists())
+        # A file that is there already is replaced, by one that is written beside it.
+        beside = path.parent if near == path and not path.is_dir() else near
+        with tempfile.TemporaryDirectory(prefix=".tmp-", dir=beside):
+            return
+    except OSError as error:
+        if error.errno == errno.ENOSPC:
+            raise
+        raise RfgsError(
+            f"{path}: nothing can be made there ({error.strerror}); choose another place"
+        ) from error
 
 
 def write_bytes(path: Path, data: bytes) -> None:

@@ -7,9 +7,14 @@ import importlib
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from rfgs_core.errors import run_cli
+from rfgs_core.files import refuse_place
+
+#: Arguments of commands that name what they write.
+_OUTPUTS = ("out", "json")
 
 
 @dataclass(frozen=True)
@@ -17,7 +22,8 @@ class Program:
     """A program and its commands.
 
     A command's module holds its arguments, a frozen dataclass that says in its docstring what
-    the command does, and `run`, which takes them and returns the exit code.
+    the command does, and `run`, which takes them and returns the exit code. Paths of arguments
+    called `out` or `json` are known to be writable then.
     """
 
     name: str
@@ -64,7 +70,12 @@ class Program:
 
         module, kind = self._command(name)
         run: Callable[[Any], int | None] = module.run
-        return run(tyro.cli(kind, args=list(arguments), prog=f"{self.name} {name}"))
+        parsed = tyro.cli(kind, args=list(arguments), prog=f"{self.name} {name}")
+        for output in _OUTPUTS:
+            place = getattr(parsed, output, None)
+            if isinstance(place, Path) and str(place) != "-":
+                refuse_place(place)
+        return run(parsed)
 
     def _command(self, name: str) -> tuple[Any, type]:
         file, kind = self.commands[name]

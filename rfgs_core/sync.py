@@ -18,6 +18,7 @@ from rfgs_core.radio.check import ROOM_FRACTION
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.files import MOST_ELEMENTS
 from rfgs_core.radio.materials import MATERIALS
+from rfgs_core.radio.placement import NEARER, NOT_AT_WALL_M
 from rfgs_core.radio.presets import PRESETS, OwnLinks, Radio, preset
 from rfgs_core.skeleton import JOINTS, PARENTS
 
@@ -52,6 +53,8 @@ def tables() -> dict[str, Any]:
         "schema": "rfgs-tables/1",
         "speed_of_light": SPEED_OF_LIGHT,
         "room_fraction": ROOM_FRACTION,
+        "nearer": list(NEARER),
+        "not_at_wall_m": NOT_AT_WALL_M,
         "most_elements": MOST_ELEMENTS,
         "radios": [
             {

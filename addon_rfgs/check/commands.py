@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The commands `check` and `fix`."""
+"""The commands `check`, `outline` and `fix`."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from ..files import write_json
 from ..saving import save_copy
 from ..scene.check import check_scene
 from ..scene.findings import Finding
+from ..scene.outline import outline
 from ..scene.override_file import read_overrides
 from .repairs import REPAIRABLE, findings, repair, repairable, select_meant
 
@@ -55,6 +56,24 @@ def _save_selected(rows: list[Finding], number: int, path: Path) -> str:
     item = select_meant(bpy.context, rows[number - 1])
     save_copy(path)
     return f"selected {item.name}; wrote {path}"
+
+
+def add_outline(commands: Any) -> None:
+    """Adds `outline` to the commands."""
+    command = commands.add_parser(
+        "outline", help="write which frames and devices the file has, without a look at meshes"
+    )
+    command.add_argument("--out", type=Path, required=True, help="JSON file")
+    command.add_argument("--between", action="store_true", help="poses between frames are wanted")
+    add_scene_options(command)
+    command.set_defaults(run=_outline)
+
+
+def _outline(options: argparse.Namespace, _out: TextIO) -> str:
+    overrides = read_overrides(options.overrides)
+    found = outline(bpy.context.scene, options.frames, overrides, between=options.between)
+    write_json(options.out, found)
+    return f"wrote {options.out}: {len(found['frames'])} frames, {len(found['devices'])} devices"
 
 
 def add_fix(commands: Any) -> None:

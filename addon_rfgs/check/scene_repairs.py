@@ -87,9 +87,10 @@ def set_to_guess(scene: bpy.types.Scene, name: str) -> str:
 
 
 def move_device(scene: bpy.types.Scene, name: str) -> str:
-    """Moves a device to the nearest free place within the scene."""
+    """Moves a device to the nearest free place within the room around the people."""
     item = empties.named_device(scene, name)
-    bounds, meshes = authoring.scene_space(scene)
+    bounds, meshes, room = authoring.scene_space(scene)
+    bounds = bounds if room is None else room.box
     unit = unit_scale(scene)
     pose = empties.pose_of(item, unit)
     before = pose[:3, 3].copy()

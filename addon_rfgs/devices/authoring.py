@@ -15,13 +15,16 @@ from ..scene.bounds import HEADROOM_M
 from ..scene.content import content_ready
 from ..scene.frames import file_label, unit_scale
 from ..scene.overrides import Overrides
+from ..scene.surroundings import Surroundings
 from ..tables import RADIO_FIELDS, RADIO_PLACEMENTS
 from . import empties
 from .placement import Mesh, spots
 
 
-def scene_space(scene: bpy.types.Scene) -> tuple[np.ndarray, list[Mesh]]:
-    """Bounds [2, 3] of what radio sees [m], and what stands there.
+def scene_space(
+    scene: bpy.types.Scene,
+) -> tuple[np.ndarray, list[Mesh], Surroundings | None]:
+    """Bounds [2, 3] of what radio sees [m], what stands there, and the room around the people.
 
     Raises:
         AddonError: Nothing has a surface, or the scene has no frame range.
@@ -31,10 +34,10 @@ def scene_space(scene: bpy.types.Scene) -> tuple[np.ndarray, list[Mesh]]:
             raise AddonError(f"{file_label()}: no mesh that renders, so the scene has no bounds")
         meshes = [(row.vertices, row.faces) for row in content.surfaces if not row.moving]
         if content.space is not None:
-            return content.bounds.copy(), meshes
+            return content.bounds.copy(), meshes, content.surroundings()
         low = np.min([surface.low for surface in content.surfaces], axis=0)
         high = np.max([surface.high for surface in content.surfaces], axis=0)
-        return _upright(np.stack([low, high])), meshes
+        return _upright(np.stack([low, high])), meshes, None
 
 
 def around(
@@ -60,21 +63,24 @@ def around(
 
 
 def place_radio(
-    scene: bpy.types.Scene, radio: str, bounds: np.ndarray, meshes: list[Mesh], *, keep: bool
+    scene: bpy.types.Scene,
+    radio: str,
+    space: tuple[np.ndarray, list[Mesh], Surroundings | None],
+    *,
+    keep: bool,
 ) -> list[bpy.types.Object]:
     """Adds all devices of a preset by its own rule.
 
     Args:
         scene: The scene.
         radio: Name of the preset.
-        bounds: Lower and upper corner [2, 3] they stand within [m].
-        meshes: What they must not stand in.
+        space: What they stand within and must not stand in, as `scene_space` has it.
         keep: Whether devices of this radio that are there already stay.
 
     Raises:
         AddonError: They do not fit.
     """
-    places = spots(radio, bounds, meshes)
+    places = spots(radio, *space)
     if not keep:
         empties.remove([item for item in empties.devices(scene) if item.rfgs.radio == radio])
     # Names sort in the order of the places, which a device that moves goes through.
@@ -100,7 +106,7 @@ def mirror_devices(
     scene: bpy.types.Scene, items: Iterable[bpy.types.Object], axis: int, *, copy: bool
 ) -> list[bpy.types.Object]:
     """Mirrors devices, or copies of them, at the middle of the scene across x (0) or y (1)."""
-    bounds, _ = scene_space(scene)
+    bounds, _, _ = scene_space(scene)
     twins = [empties.duplicate(scene, item) if copy else item for item in items]
     for twin in twins:
         # A fresh copy has no world matrix before the scene is evaluated.

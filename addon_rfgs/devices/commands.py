@@ -177,11 +177,11 @@ def _said(options: argparse.Namespace) -> dict[str, Any]:
 
 def _preset(options: argparse.Namespace) -> str:
     scene = bpy.context.scene
-    bounds, meshes = authoring.scene_space(scene)
+    bounds, meshes, room = authoring.scene_space(scene)
     if options.around:
         items = [_object(scene, name) for name in options.around]
         bounds = authoring.around(scene, items, options.margin_m)
-    placed = authoring.place_radio(scene, options.radio, bounds, meshes, keep=options.keep)
+    placed = authoring.place_radio(scene, options.radio, (bounds, meshes, room), keep=options.keep)
     more = authoring.others_of(scene, options.radio)
     return f"placed {len(placed)} devices of {options.radio}{more}"
 

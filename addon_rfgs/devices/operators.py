@@ -181,10 +181,10 @@ class RFGS_OT_place_radio(Reporting, bpy.types.Operator):
         """Places the devices."""
         scene = context.scene
         selected = list(context.selected_objects)
-        bounds, meshes = authoring.scene_space(scene)
+        bounds, meshes, room = authoring.scene_space(scene)
         if self.around == "SELECTION":
             bounds = authoring.around(scene, selected, self.margin_m)
-        placed = authoring.place_radio(scene, self.radio, bounds, meshes, keep=self.keep)
+        placed = authoring.place_radio(scene, self.radio, (bounds, meshes, room), keep=self.keep)
         _show(context, placed)
         more = authoring.others_of(scene, self.radio)
         return f"Placed {len(placed)} devices of {self.radio}{more}"

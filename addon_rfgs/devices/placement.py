@@ -3,14 +3,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import AddonError
 from ..scene.enclosure import enclosed
-from ..tables import RADIO_FIELDS, RADIO_PLACEMENTS
+from ..scene.surroundings import Surroundings
+from ..tables import NEARER, NOT_AT_WALL_M, RADIO_FIELDS, RADIO_PLACEMENTS
 from .layout import width_m, world_elements
 
 #: Vertices [V, 3] in metres and triangles [T, 3] of something that stands in the way.
@@ -34,38 +35,122 @@ class Spot:
         return matrix
 
 
-def spots(radio: str, bounds: np.ndarray, meshes: Iterable[Mesh] = ()) -> list[Spot]:
-    """Places the devices of a preset, heights alternating and clear of furniture.
+def spots(
+    radio: str, bounds: np.ndarray, meshes: Iterable[Mesh] = (), room: Surroundings | None = None
+) -> list[Spot]:
+    """Places the devices of a preset in the room around the people, clear of furniture.
+
+    The preset's rule is tried in the bounds first; where that puts a device outside the room, it
+    is tried in the room itself, and what stands in corners may come nearer to the people.
 
     Args:
         radio: Name of a preset.
-        bounds: Lower and upper corner [2, 3] of the scene [m].
+        bounds: Lower and upper corner [2, 3] they stand within [m].
         meshes: Static objects; a device inside one takes another of the radio's heights.
+        room: The room around the people, if it is known.
 
     Raises:
-        AddonError: The arrays are longer than the walls, or there is no room for a circle.
+        AddonError: The arrays are longer than the walls, there is no room for a circle, or no
+            place in the room for some device.
     """
-    rule = {"corners": _corners, "walls": _walls, "circle": _circle}
-    row = RADIO_PLACEMENTS[radio]
-    heights = [float(bounds[0, 2]) + height for height in row["heights_m"]]
-    placed = []
     standing = list(meshes)
-    for index, (x, y, yaw) in enumerate(rule[row["placement"]](radio, bounds)):
-        own = heights[index % len(heights)]
-        choices = [Spot((float(x), float(y), z), float(yaw)) for z in (own, *heights)]
-        placed.append(min(choices, key=lambda spot: _hidden(radio, spot, bounds, standing)))
+    placed, faulty = _within(radio, bounds, standing, room)
+    if room is not None and faulty:
+        box = np.clip(room.box, bounds[0], bounds[1])
+        try:
+            closer, still_faulty = _within(radio, box, standing, room, nearer=True)
+        except AddonError:
+            closer, still_faulty = placed, faulty
+        # What is as good in the bounds stays there.
+        placed = closer if still_faulty < faulty else placed
+        outside = sum(room.outside(np.array(spot.position_m)) for spot in placed)
+        if outside:
+            raise AddonError(
+                f"radio {radio!r}: no place in the room around the people for {outside} of "
+                f"{len(placed)} devices; place them one by one, or drop what stands in the way"
+            )
     return placed
 
 
-def _hidden(radio: str, spot: Spot, bounds: np.ndarray, meshes: list[Mesh]) -> tuple[bool, int]:
-    """Whether a device, and how many of its antennas, are inside objects."""
+def _within(
+    radio: str,
+    box: np.ndarray,
+    meshes: list[Mesh],
+    room: Surroundings | None,
+    *,
+    nearer: bool = False,
+) -> tuple[list[Spot], int]:
+    """The preset's rule in a box, each device at its best place; and how many stand badly."""
+    rule = {"corners": _corners, "walls": _walls, "circle": _circle}
+    row = RADIO_PLACEMENTS[radio]
+    heights = [float(box[0, 2]) + _height(radio, box, wanted) for wanted in row["heights_m"]]
+    stand = room.stand if room is not None and nearer and row["placement"] == "corners" else None
+    around = box if room is None else room.box
+    chosen, faulty = [], 0
+    for index, (x, y, yaw) in enumerate(rule[row["placement"]](radio, box)):
+        own = Spot((float(x), float(y), heights[index % len(heights)]), float(yaw))
+        best, least = own, (2, 0)
+        for spot in _choices(own, heights, stand):
+            fault = _fault(radio, spot, own, around, meshes, room)
+            if fault < least:
+                best, least = spot, fault
+            if least == (0, 0):
+                break
+        chosen.append(best)
+        faulty += least[0]
+    return chosen, faulty
+
+
+def _height(radio: str, box: np.ndarray, wanted: float) -> float:
+    """Height above the floor [m]: as wanted, but below a low ceiling."""
+    high = float(box[1, 2] - box[0, 2])
+    return min(wanted, max(high - RADIO_PLACEMENTS[radio]["inset_m"], 0.5 * high))
+
+
+def _choices(own: Spot, heights: list[float], stand: np.ndarray | None) -> Iterator[Spot]:
+    """A device's own place, then the radio's other heights, then places nearer to people."""
+    x, y, z = own.position_m
+    levels = (z, *heights)
+    yield from (Spot((x, y, level), own.yaw) for level in levels)
+    if stand is None:
+        return
+    for share in NEARER:
+        along_x, along_y = share * float(stand[0] - x), share * float(stand[1] - y)
+        yaw = float(np.arctan2(along_y, along_x))
+        yield from (Spot((x + along_x, y + along_y, level), yaw) for level in levels)
+
+
+def _fault(
+    radio: str,
+    spot: Spot,
+    own: Spot,
+    around: np.ndarray,
+    meshes: list[Mesh],
+    room: Surroundings | None,
+) -> tuple[int, int]:
+    """Whether a device is outside the room or in an object, and how many antennas are in one.
+
+    One that came nearer to people than the rule has it keeps off what it came around.
+    """
     fields, pose = RADIO_FIELDS[radio], spot.pose()
     antennas = [world_elements(fields, array, pose) for array in ("tx", "rx")]
-    points = np.concatenate([[spot.position_m], *antennas])
+    place = np.array(spot.position_m)
+    inside = _in_objects(np.concatenate([[place], *antennas]), around, meshes)
+    faulty = bool(inside[0]) or (room is not None and room.outside(place))
+    back = np.array([*np.subtract(own.position_m, place)[:2], 0.0])
+    length = float(np.linalg.norm(back))
+    if length > 0.0 and not faulty:
+        behind = place + min(NOT_AT_WALL_M, length) * back / length
+        faulty = room is not None and room.outside(behind)
+        faulty |= bool(_in_objects(behind[None], around, meshes)[0])
+    return int(faulty), int(inside.sum())
+
+
+def _in_objects(points: np.ndarray, around: np.ndarray, meshes: list[Mesh]) -> np.ndarray:
     inside = np.zeros(len(points), dtype=bool)
     for vertices, faces in meshes:
-        inside |= enclosed(points, bounds, vertices, faces)
-    return bool(inside[0]), int(inside.sum())
+        inside |= enclosed(points, around, vertices, faces)
+    return inside
 
 
 def _corners(radio: str, bounds: np.ndarray) -> list[tuple[float, float, float]]:

@@ -91,6 +91,7 @@ def export_bundle(
 
 
 def _describe(scene: bpy.types.Scene, content: Content, sha256: str) -> dict[str, Any]:
+    room = content.surroundings()
     return {
         "schema": SCHEMA,
         "blend_name": Path(bpy.data.filepath).stem,
@@ -102,6 +103,7 @@ def _describe(scene: bpy.types.Scene, content: Content, sha256: str) -> dict[str
         "frame_end": scene.frame_end,
         "frames": content.frames,
         "bounds_m": content.bounds.tolist(),
+        "room": None if room is None else room.row(),
         "instances": [instance.row() for instance in content.instances],
     }
 

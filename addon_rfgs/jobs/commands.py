@@ -23,7 +23,7 @@ from .preferences import blender_program, environment_path
 from .process import Process
 from .queue import GRACE_S
 from .record import read_record
-from .starting import carry_out, evaluate_plan, generate_plan, train_plan
+from .starting import carry_out, doing_without, evaluate_plan, generate_plan, train_plan
 
 _KINDS = ("generate", "train", "evaluate")
 
@@ -125,10 +125,17 @@ def _environment(options: argparse.Namespace, out: TextIO) -> str:
 
 
 def _generate(options: argparse.Namespace, out: TextIO) -> str:
-    if options.blender is None:
-        return _run(options, out, generate_plan)
-    program = str(Path(os.path.abspath(options.blender)))
-    return _run(options, out, lambda scene: replace(generate_plan(scene), blender=program))
+    def plan(scene: bpy.types.Scene) -> Plan:
+        missing = doing_without(scene)
+        if missing:
+            out.write(missing + "\n")
+            out.flush()
+        made = generate_plan(scene)
+        if options.blender is None:
+            return made
+        return replace(made, blender=str(Path(os.path.abspath(options.blender))))
+
+    return _run(options, out, plan)
 
 
 def _run(options: argparse.Namespace, out: TextIO, plan: Any) -> str:

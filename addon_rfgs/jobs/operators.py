@@ -14,7 +14,7 @@ from .environment import interpreter
 from .plans import TrainPlan
 from .preferences import blender_program, environment_path
 from .queue import ACTIVE, DONE, RUNNING, WAITING, Job
-from .starting import evaluate_plan, generate_plan, start, train_plan
+from .starting import doing_without, evaluate_plan, generate_plan, start, train_plan
 
 
 class RFGS_OT_test_environment(Reporting, bpy.types.Operator):
@@ -46,7 +46,8 @@ class RFGS_OT_generate_dataset(Reporting, bpy.types.Operator):
                 bpy.ops.wm.save_mainfile()
             except RuntimeError as error:
                 raise AddonError(f"{plan.blend}: cannot be saved; save it elsewhere") from error
-        return start(plan)
+        missing = doing_without(context.scene)
+        return start(plan) + (f"; {missing}" if missing else "")
 
 
 class RFGS_OT_train_gaussians(Reporting, bpy.types.Operator):

@@ -17,8 +17,8 @@ class RFGS_PG_jobs(bpy.types.PropertyGroup):
     radios: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Radios",
         description="Presets to trace, with commas between; 'scene' is the one that the Empties "
-        "describe",
-        default="wifi",
+        "describe. Empty: 'scene' where some device is of that radio, else wifi",
+        default="",
         search=_search_radios,
         search_options={"SUGGESTION"},
     )

@@ -12,8 +12,10 @@ from pathlib import Path
 
 import bpy
 
+from ..devices.empties import devices
 from ..errors import AddonError
 from ..reporting import chosen_path
+from ..scene.taking_part import left_out, radio_of, wanted_radios
 from .environment import interpreter
 from .following import QUEUE, follow
 from .plans import EvaluatePlan, GeneratePlan, Plan, TrainPlan
@@ -37,7 +39,7 @@ def generate_plan(scene: bpy.types.Scene) -> GeneratePlan:
         out=_absolute(said.dataset_folder),
         blend=bpy.data.filepath,
         blender=blender_program(),
-        radios=said.radios,
+        radios=",".join(wanted_radios(scene)),
         frames=said.frames,
         cameras=said.cameras,
         resolution=said.resolution,
@@ -50,13 +52,20 @@ def generate_plan(scene: bpy.types.Scene) -> GeneratePlan:
     )
 
 
+def doing_without(scene: bpy.types.Scene) -> str:
+    """Which devices of the scene a dataset does without, in words; empty if it has them all."""
+    found = left_out([(item.name, radio_of(item)) for item in devices(scene)], wanted_radios(scene))
+    groups = [f"{', '.join(names)} (radio {radio!r})" for radio, names in found.items()]
+    return f"left out: {', '.join(groups)}" if groups else ""
+
+
 def train_plan(scene: bpy.types.Scene) -> TrainPlan:
     """A training on the panel's dataset."""
     said = scene.rfgs.jobs
     return TrainPlan(
         out=_absolute(said.run_folder),
         dataset=_absolute(said.dataset_folder),
-        radio=said.train_radio or said.radios.split(",")[0].strip(),
+        radio=said.train_radio or wanted_radios(scene)[0],
         frames=said.train_frames,
         iterations=said.iterations,
         gaussians=said.gaussians,

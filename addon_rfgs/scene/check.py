@@ -19,6 +19,7 @@ from .materials import SAID, MaterialTable
 from .overrides import Overrides
 from .radio_check import device_findings, material_findings
 from .survey import Surface
+from .taking_part import left_out_findings, silence_findings
 from .weight import weight_findings
 
 SCHEMA = "rfgs-check/1"
@@ -56,6 +57,7 @@ def check_scene(
         content.findings += weight_findings(content.surfaces)
         content.findings += material_findings(scene, content, table)
         content.findings += device_findings(content, devices)
+        content.findings += left_out_findings(scene, devices) + silence_findings(devices)
         return report(scene, content, views, devices)
 
 

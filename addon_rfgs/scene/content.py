@@ -23,6 +23,7 @@ from .room import room_ready
 from .scripts import disable_scripts, disabled_drivers, startup_texts
 from .sheets import double_sheets
 from .state import Keeper, kept, show_what_renders
+from .surroundings import Surroundings, surroundings
 from .survey import Surface, survey
 
 
@@ -60,6 +61,12 @@ class Content:
         """Lower and upper corner [2, 3] of what radio sees [m]."""
         assert self.space is not None, "only a scene in which something moves has bounds"
         return self.space.bounds
+
+    def surroundings(self) -> Surroundings | None:
+        """The room around the people; None where nothing moves or nothing stands still."""
+        if self.space is None:
+            return None
+        return surroundings(self.surfaces, self.instances, self.bounds)
 
 
 @contextmanager

@@ -9,20 +9,20 @@ from ..tables import ROOM_FRACTION
 
 
 def enclosed(
-    points: np.ndarray, bounds: np.ndarray, vertices: np.ndarray, faces: np.ndarray
+    points: np.ndarray, room: np.ndarray, vertices: np.ndarray, faces: np.ndarray
 ) -> np.ndarray:
     """Which points [N, 3] a closed mesh encloses, [N]; the room itself encloses none.
 
     Args:
         points: Places [m].
-        bounds: Lower and upper corner [2, 3] of the scene [m].
+        room: Lower and upper corner [2, 3] of the room around the people, or of the scene [m].
         vertices: Vertices [V, 3] of the mesh [m].
         faces: Its triangles [T, 3].
     """
     inside = np.zeros(len(points), dtype=bool)
     if not len(faces):
         return inside
-    volume = float(np.prod(np.maximum(bounds[1] - bounds[0], 1e-6)))
+    volume = float(np.prod(np.maximum(room[1] - room[0], 1e-6)))
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     if np.prod(high - low) > ROOM_FRACTION * volume:
         return inside

@@ -19,6 +19,8 @@ from .survey import Surface, evaluated_mesh, placements
 
 #: Heights between which a moving instance is believable [m].
 _SIZE_M = (0.3, 5.0)
+#: A person who is never this long in any direction is drawn in another unit [m].
+_SMALLEST_PERSON_M = 0.5
 
 
 @dataclass
@@ -210,11 +212,13 @@ def _size_m(instance: Instance) -> float:
 
 def _size_findings(instance: Instance) -> list[Finding]:
     low, high = _first_box(instance)
-    size_m, height_m = float((high - low).max()), float(high[2] - low[2])
-    smallest, largest = _SIZE_M
+    # Who sits or lies at first may stand up later.
+    later = np.concatenate([np.ptp(surface.boxes, axis=1) for surface in instance.surfaces])
+    size_m = max(float((high - low).max()), float(later.max()))
+    height_m, largest = float(high[2] - low[2]), _SIZE_M[1]
     name, remedy = instance.name, "check the unit scale"
-    if instance.kind == "person" and not smallest <= size_m <= largest:
-        message = f"is a person of {size_m:.3g} m, expected {smallest:g} to {largest:g} m"
+    if instance.kind == "person" and not _SMALLEST_PERSON_M <= size_m <= largest:
+        message = f"is a person of {size_m:.3g} m, expected {_SMALLEST_PERSON_M:g} to {largest:g} m"
         return [Finding("error", name, message, remedy, "unit_scale")]
     if height_m > largest:
         message = f"moves and is {height_m:.3g} m tall, expected at most {largest:g} m"

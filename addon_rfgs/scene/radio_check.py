@@ -41,7 +41,7 @@ def material_findings(
 
 
 def device_findings(content: Content, devices: list[dict[str, Any]]) -> list[Finding]:
-    """Names devices inside closed objects and outside the scene, and those that differ.
+    """Names devices in closed objects, outside the scene or the room, and those that differ.
 
     Args:
         content: The scene.
@@ -50,6 +50,8 @@ def device_findings(content: Content, devices: list[dict[str, Any]]) -> list[Fin
     findings = _different(devices)
     if content.space is None:
         return findings
+    room = content.surroundings() if devices else None
+    around = content.bounds if room is None else room.box
     for row in devices:
         place = np.array(row["position_m"])
         if (place < content.bounds[0]).any() or (place > content.bounds[1]).any():
@@ -58,17 +60,23 @@ def device_findings(content: Content, devices: list[dict[str, Any]]) -> list[Fin
             findings.append(Finding("warning", row["name"], message, remedy, "device_outside"))
             continue
         for surface in content.surfaces:
-            if not surface.moving and device_inside(place, content.bounds, surface):
+            if not surface.moving and device_inside(place, around, surface):
                 message = f"is a device inside {surface.key!r}"
                 remedy = "move it out of the object"
                 findings.append(Finding("warning", row["name"], message, remedy, "device_inside"))
                 break
+        else:
+            if room is not None and room.outside(place):
+                message = "is a device outside the room around the people: only what goes through "
+                message += "its walls is heard there"
+                remedy = "fine if that is meant; else move it inside"
+                findings.append(Finding("info", row["name"], message, remedy, "device_elsewhere"))
     return findings
 
 
-def device_inside(place: np.ndarray, bounds: np.ndarray, surface: Any) -> bool:
+def device_inside(place: np.ndarray, room: np.ndarray, surface: Any) -> bool:
     """Whether a place [3] in metres is within a closed static surface."""
-    return bool(enclosed(place[None], bounds, surface.vertices, surface.faces)[0])
+    return bool(enclosed(place[None], room, surface.vertices, surface.faces)[0])
 
 
 def _different(devices: list[dict[str, Any]]) -> list[Finding]:

@@ -53,6 +53,8 @@ class Surface:
     """Lower corner [3] of where it is within the range [m]."""
     high: np.ndarray = field(default_factory=lambda: np.full(3, -np.inf))
     """Upper corner [3]."""
+    boxes: list[np.ndarray] = field(default_factory=list, repr=False)
+    """Both corners [2, 3] in the first frame, and in each in which it stands elsewhere [m]."""
 
     def material(self, slot: int) -> bpy.types.Material | None:
         """Material of a slot; faces beyond the last slot use the last, as Blender shows them."""
@@ -212,21 +214,13 @@ def _first_look(
     if np.linalg.det(matrix[:3, :3]) < 0:
         faces = faces[:, ::-1].copy()
     vertices = _world(local, matrix, unit_scale(bpy.context.scene))
-    armature = armature_of(source)
+    box = np.stack([vertices.min(axis=0), vertices.max(axis=0)])
     return Surface(
-        key,
-        source,
-        root,
-        faces,
-        slots,
-        materials,
-        corners,
-        local,
-        matrix,
-        vertices,
-        armature,
-        low=vertices.min(axis=0),
-        high=vertices.max(axis=0),
+        *(key, source, root, faces, slots, materials, corners, local, matrix, vertices),
+        armature_of(source),
+        low=box[0],
+        high=box[1],
+        boxes=[box],
     )
 
 
@@ -241,8 +235,9 @@ def _follow(surface: Surface, local: np.ndarray, matrix: np.ndarray, unit: float
     if np.array_equal(matrix, surface.matrix) and np.array_equal(local, surface.local):
         return
     vertices = _world(local, matrix, unit)
-    surface.low = np.minimum(surface.low, vertices.min(axis=0))
-    surface.high = np.maximum(surface.high, vertices.max(axis=0))
+    box = np.stack([vertices.min(axis=0), vertices.max(axis=0)])
+    surface.boxes.append(box)
+    surface.low, surface.high = np.minimum(surface.low, box[0]), np.maximum(surface.high, box[1])
     shift = vertices - surface.vertices
     surface.moving |= bool((np.linalg.norm(shift, axis=1) > MOVING_M).any())
 

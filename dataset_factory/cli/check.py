@@ -40,7 +40,8 @@ class CheckArgs:
     scene: tyro.conf.Positional[str]
     """Name from `rfgs-factory scenes`, or path of a .blend file."""
     radio: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
-    """Radio to check materials and devices for; repeat the option for several."""
+    """Radio to check materials and devices for; repeat the option for several. Default: `scene`
+    where the file has Empties of that radio, else none."""
     packets_per_frame: int = 1
     """Channels per frame, as for `generate`: whether so many fit between two frames. The last
     frame, which `generate` leaves out then, is listed all the same."""

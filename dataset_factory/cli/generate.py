@@ -3,10 +3,11 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 
@@ -15,7 +16,11 @@ from rfgs_core.errors import RfgsError
 
 if TYPE_CHECKING:
     from dataset_factory.job import Job
+    from dataset_factory.outline import Outline
+    from dataset_factory.plan import Plan
     from dataset_factory.scenes import Scene
+
+logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -28,11 +33,12 @@ class GenerateArgs:
 
     scene: tyro.conf.Positional[str]
     """Name from `rfgs-factory scenes`, or path of a .blend file."""
-    radio: tyro.conf.UseAppendAction[tuple[str, ...]]
-    """Radio to trace: a preset (see `rfgs-factory radios`), a file like my_radio.yaml, or `scene`
-    for the one that the scene's Empties describe; repeat the option for several."""
     out: Path
     """Folder of the dataset."""
+    radio: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
+    """Radio to trace: a preset (see `rfgs-factory radios`), a file like my_radio.yaml, or `scene`
+    for the one that the scene's Empties describe, which is the default where there are Empties
+    of the radio `scene`; repeat the option for several."""
     frames: str = ""
     """Blender frames A:B[:STEP] (inclusive), or one number; default: all."""
     cameras: int = 0
@@ -87,29 +93,62 @@ def run(args: GenerateArgs) -> int:
 
 
 def job_of(args: GenerateArgs) -> tuple[Job, Scene]:
-    """The job that arguments ask for, and its scene.
+    """The job that arguments ask for, and its scene; says which devices it does without.
 
     Raises:
         RfgsError: An argument is out of range, or names nothing.
     """
     from dataset_factory.blender import Blender
     from dataset_factory.job import Job
+    from dataset_factory.outline import left_out, read_outline, silence, usual_radios
     from dataset_factory.overrides import label, read_options
-    from dataset_factory.plan import make_plan
+    from dataset_factory.plan import whole_frames
     from dataset_factory.scenes import find_scene
     from rfgs_core.llvm import use_llvm
-    from rfgs_core.radio.impairments import read_impairments
+    from rfgs_core.radio import pose_span_s
 
     if not 1 <= args.workers <= 256:
         raise RfgsError(f"--workers {args.workers}: expected 1 to 256")
     if not 0.0 <= args.worker_memory <= 1e4:
         raise RfgsError(f"--worker-memory {args.worker_memory}: expected GB, or 0")
     scene, said = find_scene(args.scene), read_options(args.options)
-    frames = args.frames or str(said.pop("frames", ""))
-    _refuse_depth(scene, args)
-    plan = make_plan(
+    frames = whole_frames(args.frames or str(said.pop("frames", "")))
+    blender, source = Blender(scene.blend, args.blender), label(args.options)
+
+    def look(between: bool) -> Outline:
+        return read_outline(blender, frames, said, source, between=between)
+
+    seen = None if args.radio else look(args.packets_per_frame > 1)
+    named = args.radio or usual_radios(seen.devices if seen else ())
+    plan = _plan(args, scene, named, frames, said)
+    use_llvm()
+    radios = [plan.radio(name) for name in plan.radios]
+    # Also refuses frames that the scene does not have, before anything is made for them.
+    seen = seen or look(any(pose_span_s(radio) is not None for radio in radios))
+    for radio in radios:
+        if problem := silence(seen.devices, radio):
+            raise RfgsError(f"{scene.blend}: {problem}")
+    for sentence in left_out(seen.devices, radios):
+        logger.warning("%s", sentence)
+    memory_gb = args.worker_memory
+    return Job(args.out, plan, blender, args.workers, memory_gb, args.scheduler, source), scene
+
+
+def _plan(
+    args: GenerateArgs, scene: Scene, radios: tuple[str, ...], frames: str, said: dict[str, Any]
+) -> Plan:
+    """What the dataset shall hold.
+
+    Raises:
+        RfgsError: An argument is out of range, or names nothing.
+    """
+    from dataset_factory.plan import make_plan
+    from rfgs_core.radio.impairments import read_impairments
+
+    _refuse_depth(scene, radios, args.depth)
+    return make_plan(
         scene,
-        args.radio,
+        radios,
         frames,
         cameras=args.cameras,
         resolution=args.resolution,
@@ -123,20 +162,9 @@ def job_of(args: GenerateArgs) -> tuple[Job, Scene]:
         paths=args.paths,
         overrides=said,
     )
-    use_llvm()
-    job = Job(
-        args.out,
-        plan,
-        Blender(scene.blend, args.blender),
-        args.workers,
-        args.worker_memory,
-        args.scheduler,
-        label(args.options),
-    )
-    return job, scene
 
 
-def _refuse_depth(scene: Scene, args: GenerateArgs) -> None:
+def _refuse_depth(scene: Scene, radios: tuple[str, ...], depth: int | None) -> None:
     """Refuses radios that cannot be traced as deep as was asked, or as what moves needs.
 
     Raises:
@@ -146,12 +174,12 @@ def _refuse_depth(scene: Scene, args: GenerateArgs) -> None:
     from dataset_factory.scenes import DEFAULT_DEPTH
     from rfgs_core.radio.check import too_deep
 
-    for name, radio in chosen_radios(args.radio).items():
+    for name, radio in chosen_radios(radios).items():
         if name == SCENE_RADIO:
             continue
-        if radio.deepest == 1 and args.depth is not None and args.depth > 1:
-            raise RfgsError(too_deep(radio, args.depth))
-        if args.depth is None and scene.depth > max(radio.deepest, DEFAULT_DEPTH):
+        if radio.deepest == 1 and depth is not None and depth > 1:
+            raise RfgsError(too_deep(radio, depth))
+        if depth is None and scene.depth > max(radio.deepest, DEFAULT_DEPTH):
             raise RfgsError(
                 f"scene {scene.name!r}: who moves there is seen at trace depth {scene.depth}, but "
                 f"radio {name!r} is traced at {radio.deepest} at most; use another radio or scene, "

@@ -107,18 +107,20 @@ def _buffer(scene: rt.Scene, meshes: SceneMeshes, found: SpecularPaths) -> Paths
     """The paths as Sionna stores them, all of them valid."""
     count, depth = found.kinds.shape
     buffer: Any = PathsBuffer(count, depth, False)
+    whole: Any = mi.TensorXu
+    real: Any = mi.TensorXf
     shape, triangle = meshes.located(scene, found.triangles)
     buffer._paths_counter = mi.UInt(count)
     buffer.valid = dr.full(mi.Bool, True, count)
     buffer._src_indices = mi.UInt(found.tx.astype(np.uint32))
     buffer._tgt_indices = mi.UInt(found.rx.astype(np.uint32))
-    buffer._interaction_types = mi.TensorXu(found.kinds.astype(np.uint32))
-    buffer._shapes = mi.TensorXu(shape.astype(np.uint32))
-    buffer._primitives = mi.TensorXu(triangle)
-    buffer._probs = mi.TensorXf(np.ones((count, depth), dtype=np.float32))
+    buffer._interaction_types = whole(found.kinds.astype(np.uint32))
+    buffer._shapes = whole(shape.astype(np.uint32))
+    buffer._primitives = whole(triangle)
+    buffer._probs = real(np.ones((count, depth), dtype=np.float32))
     corners = np.moveaxis(found.corners.astype(np.float32), 2, 0)
     buffer._vertices_x, buffer._vertices_y, buffer._vertices_z = (
-        mi.TensorXf(np.ascontiguousarray(axis)) for axis in corners
+        real(np.ascontiguousarray(axis)) for axis in corners
     )
     return buffer
 

@@ -21,7 +21,8 @@ DELAY_MARGIN_M = 5.0
 #: A closed mesh that fills more of the scene than this is the room itself, not furniture.
 ROOM_FRACTION = 0.5
 
-_Mesh = tuple[str, Float[np.ndarray, "vertex 3"], Int[np.ndarray, "face 3"]]
+#: Lists hold meshes of different sizes, so these axes (with an underscore) are bound to none.
+_Mesh = tuple[str, Float[np.ndarray, "_vertex 3"], Int[np.ndarray, "_face 3"]]
 
 
 def check(
@@ -89,6 +90,7 @@ def check_devices(
     bounds_m: Float64[np.ndarray, "2 3"],
     devices: list[DevicePose],
     meshes: Iterable[_Mesh],
+    room_m: Float64[np.ndarray, "2 3"] | None = None,
 ) -> list[str]:
     """Lists devices that are outside the scene, inside a closed object or inside each other.
 
@@ -97,6 +99,7 @@ def check_devices(
         bounds_m: Minimum and maximum of the scene [m].
         devices: Their poses.
         meshes: Name, vertices [m] and triangles of each static object.
+        room_m: Box of the room around the people [m], where it is known.
 
     Returns:
         One sentence per problem.
@@ -120,18 +123,19 @@ def check_devices(
                         "turn the device, or use a radio with a shorter array"
                     )
     problems += _coincident(radio, devices)
+    room_m = bounds_m if room_m is None else room_m
     for name, vertices, faces in meshes:
         problems.extend(
             f"device {devices[index].name!r} of radio {radio.name!r} is inside {name!r}; move it "
             "out of the object"
-            for index in np.flatnonzero(enclosed(points, bounds_m, vertices, faces))
+            for index in np.flatnonzero(enclosed(points, room_m, vertices, faces))
         )
     return problems
 
 
 def enclosed(
     points: Float64[np.ndarray, "point 3"],
-    bounds_m: Float64[np.ndarray, "2 3"],
+    room_m: Float64[np.ndarray, "2 3"],
     vertices: Float[np.ndarray, "vertex 3"],
     faces: Int[np.ndarray, "face 3"],
 ) -> Bool[np.ndarray, "point"]:
@@ -139,14 +143,14 @@ def enclosed(
 
     Args:
         points: Places [m].
-        bounds_m: Minimum and maximum of the scene [m].
+        room_m: Minimum and maximum of the room around the people, or of the scene [m].
         vertices: Vertices of the mesh [m].
         faces: Its triangles.
     """
     inside = np.zeros(len(points), dtype=bool)
     if not len(faces):
         return inside
-    volume = float(np.prod(np.maximum(bounds_m[1] - bounds_m[0], 1e-6)))
+    volume = float(np.prod(np.maximum(room_m[1] - room_m[0], 1e-6)))
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     if np.prod(high - low) > ROOM_FRACTION * volume:
         return inside

@@ -10,9 +10,20 @@ from rfgs_core.errors import RfgsError
 from rfgs_core.radio.layout import DevicePose, layout
 from rfgs_core.radio.presets import Radio
 
+#: A device in a corner that is outside the room comes nearer to the people by such a share.
+NEARER = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8)
+#: It keeps this far from what it came around [m].
+NOT_AT_WALL_M = 0.15
+
+
+def height_m(radio: Radio, bounds_m: Float64[np.ndarray, "2 3"], wanted_m: float) -> float:
+    """A device's height above the floor [m]: as wanted, but below a low ceiling."""
+    room_m = float(bounds_m[1, 2] - bounds_m[0, 2])
+    return min(wanted_m, max(room_m - radio.inset_m, 0.5 * room_m))
+
 
 def place_devices(radio: Radio, bounds_m: Float64[np.ndarray, "2 3"]) -> list[DevicePose]:
-    """Places devices by the radio's rule, heights alternating.
+    """Places devices by the radio's rule, heights alternating, below the ceiling.
 
     `corners`: in the corners of the scene, facing its centre, counter-clockwise from the corner
     of smallest x and y. `walls`: along the walls, facing inwards, as evenly as they fit.
@@ -20,7 +31,7 @@ def place_devices(radio: Radio, bounds_m: Float64[np.ndarray, "2 3"]) -> list[De
 
     Args:
         radio: Which radio; gives rule, count, heights and inset.
-        bounds_m: Scene bounds [m], rows minimum and maximum.
+        bounds_m: Bounds of the scene or of a room [m], rows minimum and maximum.
 
     Returns:
         One pose per device; of a device that moves, one per sample of a frame.
@@ -32,7 +43,9 @@ def place_devices(radio: Radio, bounds_m: Float64[np.ndarray, "2 3"]) -> list[De
     spots = rule(radio, bounds_m)
     devices = []
     for index, (x, y, yaw) in enumerate(spots):
-        z = bounds_m[0, 2] + radio.heights_m[index % len(radio.heights_m)]
+        z = bounds_m[0, 2] + height_m(
+            radio, bounds_m, radio.heights_m[index % len(radio.heights_m)]
+        )
         quat = (float(np.cos(yaw / 2)), 0.0, 0.0, float(np.sin(yaw / 2)))
         devices.append(DevicePose(f"{radio.name}_{index}", (float(x), float(y), float(z)), quat))
     return devices

@@ -169,11 +169,12 @@ def test_around_a_selection() -> None:
 
 def test_scenes_in_other_units_are_placed_in_metres() -> None:
     scene = bpy.context.scene
-    bounds, meshes = authoring.scene_space(scene)
-    expected = authoring.place_radio(scene, "wifi", bounds, meshes, keep=False)
+    bounds, meshes, _ = authoring.scene_space(scene)
+    space = bounds, meshes, None
+    expected = authoring.place_radio(scene, "wifi", space, keep=False)
     places = {item.name: empties.pose_of(item, 1.0) for item in expected}
     scene.unit_settings.scale_length = 0.01
-    authoring.place_radio(scene, "wifi", bounds, meshes, keep=False)
+    authoring.place_radio(scene, "wifi", space, keep=False)
     bpy.context.view_layer.update()
     for item in empties.devices(scene):
         if item.name in places:

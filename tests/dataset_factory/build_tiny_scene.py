@@ -39,12 +39,12 @@ def room(wall: bpy.types.Material) -> None:
         mesh(f"Wall {index}", [corners[i] for i in quad], [(3, 2, 1, 0)], wall)
 
 
-def person(skin: bpy.types.Material, moving: bool, scale: float) -> None:
+def person(skin: bpy.types.Material, moving: bool, scale: float, kind: str) -> None:
     hx, hy, hz = 0.2 * scale, 0.15 * scale, 0.85 * scale
     corners = [(i * hx, j * hy, k * hz) for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     item = mesh("Box person", corners, quads, skin)
-    item.rfgs.object_class = "PERSON"
+    item.rfgs.object_class = kind
     item.location = (1.2, 1.5, 0.9 * scale)
     if moving:
         item.keyframe_insert("location", frame=1)
@@ -52,13 +52,13 @@ def person(skin: bpy.types.Material, moving: bool, scale: float) -> None:
         item.keyframe_insert("location", frame=4)
 
 
-def main(out: str, moving: str, wall: str, scale: str) -> None:
+def main(out: str, moving: str, wall: str, scale: str, kind: str = "PERSON") -> None:
     bpy.ops.wm.read_factory_settings(use_empty=True)
     addon_rfgs.register()
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end, scene.render.fps = 1, 4, 10
     room(material("Wall paint", wall, (0.7, 0.7, 0.68)))
-    person(material("Skin", "skin", (0.8, 0.4, 0.3)), moving == "moving", float(scale))
+    person(material("Skin", "skin", (0.8, 0.4, 0.3)), moving == "moving", float(scale), kind)
     lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "POINT"))
     lamp.data.energy, lamp.location = 100.0, (1.5, 1.5, 2.3)
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))

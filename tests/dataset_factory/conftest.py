@@ -33,10 +33,10 @@ MakeJob = Callable[..., Job]
 Factory = Callable[..., subprocess.CompletedProcess[str]]
 
 
-def build(out: Path, moving: str, wall: str, scale: str) -> Path:
+def build(out: Path, moving: str, wall: str, scale: str, kind: str = "PERSON") -> Path:
     builder = Path(__file__).with_name("build_tiny_scene.py")
     subprocess.run(
-        [sys.executable, str(builder), str(out), moving, wall, scale],
+        [sys.executable, str(builder), str(out), moving, wall, scale, kind],
         check=True,
         capture_output=True,
         timeout=120,
@@ -47,12 +47,14 @@ def build(out: Path, moving: str, wall: str, scale: str) -> Path:
 
 @pytest.fixture(scope="session")
 def build_scene(tmp_path_factory: pytest.TempPathFactory) -> BuildScene:
-    """Builds a scene: `build_scene(moving=True, wall="concrete", scale=1.0)`, each kind once."""
+    """Builds a scene, each once; `kind` is the class of the box that moves."""
 
     @cache
-    def make(moving: bool = True, wall: str = "concrete", scale: float = 1.0) -> Path:
+    def make(
+        moving: bool = True, wall: str = "concrete", scale: float = 1.0, kind: str = "PERSON"
+    ) -> Path:
         out = tmp_path_factory.mktemp("scene") / "box_room.blend"
-        return build(out, "moving" if moving else "still", wall, str(scale))
+        return build(out, "moving" if moving else "still", wall, str(scale), kind)
 
     return make
 
@@ -74,10 +76,11 @@ def make_job(box_room: Path) -> MakeJob:
         seed: int = 0,
         images: bool = True,
         paths: bool = False,
+        blend: Path = box_room,
         **options: Any,
     ) -> Job:
         plan = make_plan(
-            find_scene(str(box_room)),
+            find_scene(str(blend)),
             ("wifi",),
             frames,
             cameras=1,
@@ -89,7 +92,7 @@ def make_job(box_room: Path) -> MakeJob:
             images=images,
             paths=paths,
         )
-        return Job(out, plan, Blender(box_room), **{"workers": 1, **options})
+        return Job(out, plan, Blender(blend), **{"workers": 1, **options})
 
     return make
 

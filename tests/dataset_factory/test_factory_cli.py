@@ -98,6 +98,7 @@ def test_a_benchmark_of_too_few_frames_is_refused_before_they_are_made(
         ({"moving": False}, ["no moving mesh"]),
         ({"wall": "floorboard"}, ["'floorboard'", "50 to 100 GHz", "5.72 to 5.88 GHz", "choose"]),
         ({"scale": 0.1}, ["0.17 m", "unit scale"]),
+        ({"scale": 0.26}, ["a person of 0.442 m, expected 0.5 to 5 m", "unit scale"]),
     ],
 )
 def test_unsuitable_scenes(
@@ -107,13 +108,33 @@ def test_unsuitable_scenes(
     blend = str(build_scene(**scene))
     line = one_line(factory_here("generate", blend, "--radio", "wifi", "--out", str(out)))
     assert all(word in line for word in words), line
-    assert not (out / "dataset.json").exists()
+    assert not out.exists(), "nothing is left"
 
 
 def test_missing_and_old_llvm(factory: Factory, box_room: Path, tmp_path: Path) -> None:
     arguments = ["generate", str(box_room), "--radio", "wifi", "--out", str(tmp_path / "out")]
     line = one_line(factory(*arguments, DRJIT_LIBLLVM_PATH=str(tmp_path / "libLLVM.so")))
     assert "no LLVM" in line and "libllvm19" in line
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("generate", "living_room_walk", "--radio", "wifi"),
+        ("plan", "living_room_walk", "--radio", "wifi"),
+        ("convert", "data", "--to", "mat"),
+        ("preview", "data"),
+    ],
+)
+def test_a_place_that_cannot_be_made_is_refused_first(
+    factory_here: Factory, tmp_path: Path, command: tuple[str, ...]
+) -> None:
+    (tmp_path / "file").write_text("")
+    # Not even the administrator makes a folder in the second.
+    for place in (tmp_path / "file" / "below", Path("/proc/rfgs")):
+        line = one_line(factory_here(*command, "--out", str(place)))
+        assert line.startswith(f"error: {place}: nothing can be made there (")
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
 def test_truncated_chunk_is_named(factory: Factory, box_copy: Path) -> None:

@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dataset_factory.generate import generate
+from dataset_factory.job import Job
 from dataset_factory.physics import blocked, channel_faults
 from dataset_factory.validate import validate
 from rfgs_core.dataset import open_dataset
@@ -21,6 +23,15 @@ Faults = Callable[[Path], list[str]]
 
 def test_a_fresh_dataset_is_sound(box_dataset: Path) -> None:
     assert validate(box_dataset) == []
+
+
+def test_a_dataset_in_which_nobody_but_a_thing_moves_is_sound(
+    build_scene: Callable[..., Path], make_job: Callable[..., Job], tmp_path: Path
+) -> None:
+    out = tmp_path / "dataset"
+    assert generate(make_job(out, frames="2:2", images=False, blend=build_scene(kind="AUTO")))
+    assert validate(out) == []
+    assert open_dataset(out).sequence("box_room").joints(2).shape == (0, 17, 3)
 
 
 def test_missing_and_foreign_files_are_named(box_copy: Path) -> None:

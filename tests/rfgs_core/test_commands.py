@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import shutil
 import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import pytest
@@ -267,3 +268,41 @@ def test_blender_is_taken_from_the_environment(
     assert find_blender() == program
     program.unlink()
     assert find_blender() != program
+
+
+#: Every command that writes what OUT names, with what it must be told before that.
+WRITING: dict[str, tuple[str, ...]] = {
+    "ablate": ("data", "--radio", "wifi"),
+    "compare": ("run", "run"),
+    "csi": ("run",),
+    "demo": (),
+    "encode": ("data", "--radio", "wifi"),
+    "export": ("run",),
+    "predict": ("run", "--tx", "0,0,1"),
+    "render": ("run",),
+    "study": (),
+    "train": ("data", "--radio", "wifi"),
+}
+
+
+def test_no_command_that_writes_is_forgotten() -> None:
+    kinds = {
+        name: getattr(importlib.import_module(f"rfgs_core.cli.{file}"), kind)
+        for name, (file, kind) in COMMANDS.items()
+    }
+    assert {
+        name for name, kind in kinds.items() if any(row.name == "out" for row in fields(kind))
+    } == set(WRITING)
+
+
+@pytest.mark.parametrize("name", WRITING)
+def test_a_place_that_cannot_be_made_is_refused_first(name: str, tmp_path: Path, capsys) -> None:
+    (tmp_path / "file").write_text("")
+    places = [tmp_path / "file" / "below" / "out.npz"]
+    # Not even the administrator makes a folder there, and the system calls it missing.
+    places += [Path("/proc/rfgs/out.npz")] if Path("/proc/self").exists() else []
+    for place in places:
+        option = [] if name == "study" else ["--out"]
+        line = error_line([name, *WRITING[name], *option, str(place)], capsys)
+        assert line.startswith(f"error: {place}: nothing can be made there (")
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]

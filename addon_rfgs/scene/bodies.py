@@ -13,6 +13,8 @@ from .survey import Surface
 
 #: Vertices this close are one that an importer split [m].
 SPLIT_M = 1e-4
+#: The tracer itself takes vertices this close for one: seams of textures are no openings [m].
+_WELDED_M = 1e-5
 #: From this share of edges on, an open body is more than a slip.
 _OPEN_SHARE = 0.01
 
@@ -37,9 +39,9 @@ def seams(faces: np.ndarray) -> tuple[int, int, int]:
     return int((count == 1).sum()), int((count > 2).sum()), len(count)
 
 
-def welded(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+def welded(vertices: np.ndarray, faces: np.ndarray, nearest_m: float = SPLIT_M) -> np.ndarray:
     """Triangles [T', 3] with split vertices as one, and without those that vanish then."""
-    _, one = np.unique(np.round(vertices / SPLIT_M).astype(np.int64), axis=0, return_inverse=True)
+    _, one = np.unique(np.round(vertices / nearest_m).astype(np.int64), axis=0, return_inverse=True)
     joined = one.reshape(-1)[faces]
     a, b, c = joined.T
     return joined[(a != b) & (b != c) & (c != a)]
@@ -54,7 +56,7 @@ def inside_out(vertices: np.ndarray, faces: np.ndarray) -> bool:
 
 
 def _seams_finding(surface: Surface) -> list[Finding]:
-    free, crowded, total = seams(surface.faces)
+    free, crowded, total = seams(welded(surface.vertices, surface.faces, _WELDED_M))
     if not free + crowded:
         return []
     left = sum(seams(welded(surface.vertices, surface.faces))[:2])

@@ -156,18 +156,27 @@ def _classify(
     elif instance.rig is not None:
         instance.kind, why = "person", f"armature {instance.armature.name!r} has human joints"
     else:
-        instance.kind, why = "other", "moves, and is not skinned to a human armature"
+        instance.kind, why = "other", _no_person(armatures)
     if why:
         note = {"what": "object_class", "object": instance.name, "value": instance.kind}
         guesses.append({**note, "why": why})
     if instance.kind != "person":
         instance.rig = None
         return
-    why = "" if instance.rig else "no armature with known names of human bones"
+    why = "" if instance.rig else "no armature with the bones of a human"
     if instance.rig and not _stands_at(instance, instance.armature):
         instance.rig, why = None, f"armature {instance.armature.name!r} stands somewhere else"
     if why:
         guesses.append({"what": "joints", "object": instance.name, "value": "unknown", "why": why})
+
+
+def _no_person(armatures: list[bpy.types.Object]) -> str:
+    """Why something that moves is not taken for a person."""
+    if not armatures:
+        return "moves, and no armature moves it"
+    names = ", ".join(repr(name) for name in sorted({item.name for item in armatures}))
+    why = f"skinned to armature {names}, whose bones are not a human's"
+    return f"{why}; if it is a person, say so (class Person, or --people NAME)"
 
 
 def _size_up(instance: Instance, guesses: list[dict[str, Any]]) -> None:
@@ -212,10 +221,11 @@ def _size_m(instance: Instance) -> float:
 
 def _size_findings(instance: Instance) -> list[Finding]:
     low, high = _first_box(instance)
-    # Who sits or lies at first may stand up later.
-    later = np.concatenate([np.ptp(surface.boxes, axis=1) for surface in instance.surfaces])
-    size_m = max(float((high - low).max()), float(later.max()))
-    height_m, largest = float(high[2] - low[2]), _SIZE_M[1]
+    size_m, height_m, largest = float((high - low).max()), float(high[2] - low[2]), _SIZE_M[1]
+    if size_m < _SMALLEST_PERSON_M:
+        # Who is curled up at first may stand up later.
+        later = np.concatenate([np.ptp(surface.boxes, axis=1) for surface in instance.surfaces])
+        size_m = max(size_m, float(later.max()))
     name, remedy = instance.name, "check the unit scale"
     if instance.kind == "person" and not _SMALLEST_PERSON_M <= size_m <= largest:
         message = f"is a person of {size_m:.3g} m, expected {_SMALLEST_PERSON_M:g} to {largest:g} m"

@@ -2,19 +2,24 @@
 """From the bones of common human rigs to the 17 joints of RF-GS.
 
 Known by name: MakeHuman and anny (`upperleg01.L`), Mixamo (`mixamorig:LeftUpLeg`), game rigs
-(`thigh_l`), Rigify (`DEF-thigh.L`) and CMU (`LeftUpLeg`). Spines are taken from the chain of
-parents between neck and pelvis, because their numbering runs up in some rigs, down in others.
+(`thigh_l`), Rigify (`DEF-thigh.L`) and CMU (`LeftUpLeg`); others by their shape (`anatomy`). Spines
+are taken from the chain of parents between neck and pelvis, because their numbering runs up in
+some rigs, down in others.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
 
 from ..tables import JOINTS
+from .anatomy import Landmarks, find_body
+from .frames import unit_scale
+from .limbs import Bone
 
 #: Bone names without side, prefixes and separators, best first, for each limb joint.
 _LIMBS = {
@@ -82,7 +87,13 @@ def split_name(bone: str) -> tuple[str, str]:
 
 
 def read_rig(armature: bpy.types.Object) -> Rig | None:
-    """Finds the 17 joints; None where the bones are not those of a known human rig."""
+    """Finds the 17 joints; None where the bones are not those of a human."""
+    found = _by_name(armature) or find_body(*_rest(armature))
+    return None if found is None else _rig(armature, found)
+
+
+def _by_name(armature: bpy.types.Object) -> Landmarks | None:
+    """The bones of a known human rig."""
     names = {}
     for bone in armature.data.bones:
         names.setdefault(split_name(bone.name), bone.name)
@@ -95,26 +106,51 @@ def read_rig(armature: bpy.types.Object) -> Rig | None:
         for side in ("left", "right")
         for joint, choices in _LIMBS.items()
     }
-    head, neck = find(_HEAD), find(_NECK)
+    head = find(_HEAD)
     if head is None or None in limbs.values():
         return None
-    found: dict[str, str] = {joint: bone for joint, bone in limbs.items() if bone}
-    points = {joint: ((bone, 0.0),) for joint, bone in found.items()}
-    hips = ((found["left_hip"], 0.0), (found["right_hip"], 0.0))
-    shoulders = ((found["left_shoulder"], 0.0), (found["right_shoulder"], 0.0))
-    pelvis = find(_PELVIS)
-    points["pelvis"] = ((pelvis, 0.0),) if pelvis else hips
-    points["thorax"] = ((neck, 0.0),) if neck else shoulders
-    points["neck"] = ((head, 0.0),)
-    # The middle of the skull: tails end at the crown in some rigs, beyond it in others.
-    points["head"] = ((head, 0.5),)
-    segments = {bone: JOINTS.index(joint) for joint, bone in found.items()}
-    segments[head] = JOINTS.index("head")
-    if neck:
-        segments[neck] = JOINTS.index("neck")
-    if pelvis:
-        segments[pelvis] = JOINTS.index("pelvis")
-    points["spine"] = _spine(armature, neck or head, points, segments)
+    found = {joint: (bone, 0.0) for joint, bone in limbs.items() if bone}
+    # Tails of heads end at the crown in some rigs, beyond it in others.
+    return Landmarks(found, head, find(_NECK), find(_PELVIS))
+
+
+def _rest(armature: bpy.types.Object) -> tuple[list[Bone], list[np.ndarray]]:
+    """Bones at rest in world metres, and what may be up: the world's z, else one of their axes."""
+    unit = unit_scale(bpy.context.scene)
+    matrix = np.array(armature.matrix_world, dtype=np.float64)
+
+    def place(point: Sequence[float]) -> np.ndarray:
+        return (matrix[:3, :3] @ np.array(point, dtype=np.float64) + matrix[:3, 3]) * unit
+
+    bones = [
+        Bone(
+            bone.name,
+            bone.parent.name if bone.parent else "",
+            place(bone.head_local),
+            place(bone.tail_local),
+        )
+        for bone in armature.data.bones
+    ]
+    # Who sleeps may be laid down whole.
+    own = [matrix[:3, axis] / max(np.linalg.norm(matrix[:3, axis]), 1e-9) for axis in (2, 1)]
+    return bones, [np.array([0.0, 0.0, 1.0]), *own]
+
+
+def _rig(armature: bpy.types.Object, body: Landmarks) -> Rig:
+    """The joints on a body's bones, and which joint every bone follows."""
+    points = {joint: (place,) for joint, place in body.limbs.items()}
+    hips = points["left_hip"] + points["right_hip"]
+    shoulders = points["left_shoulder"] + points["right_shoulder"]
+    points["pelvis"] = ((body.pelvis, 0.0),) if body.pelvis else hips
+    points["thorax"] = ((body.neck, 0.0),) if body.neck else shoulders
+    points["neck"] = ((body.head, 0.0),)
+    points["head"] = ((body.head, body.skull),)
+    # A limb that ends with its last bone has its last joint at that bone's tail.
+    starts = {joint: bone for joint, (bone, along) in body.limbs.items() if along == 0.0}
+    segments = {bone: JOINTS.index(joint) for joint, bone in starts.items()}
+    named = {"head": body.head, "neck": body.neck, "pelvis": body.pelvis}
+    segments |= {bone: JOINTS.index(joint) for joint, bone in named.items() if bone}
+    points["spine"] = _spine(armature, body.neck or body.head, points, segments)
     return Rig(tuple(points[joint] for joint in JOINTS), _inherit(armature, segments))
 
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+import numpy as np
 from build_scenes import box, person
 
 import addon_rfgs
@@ -209,10 +210,25 @@ def people_sharing() -> None:
 
 
 def beast() -> None:
-    """A skinned mesh whose bones have names of no human rig."""
+    """A skinned mesh whose bones have names of no human rig and stand on four legs."""
     stage()
-    for bone in bpy.data.armatures["rig"].bones:
+    rig = bpy.data.objects["rig"]
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    for bone in rig.data.edit_bones:
+        bone.use_connect = False
+    for bone in rig.data.edit_bones:
         bone.name = bone.name.replace("mixamorig:", "zz")
+        # Its back lies along -y above its hips, and its arms reach the ground.
+        ends = [
+            (x, -(z - 1.0), 1.0) if abs(x) < 0.01 else (0.1 * np.sign(x), y - 0.4, z)
+            for x, y, z in (bone.head, bone.tail)
+        ]
+        if any(part in bone.name for part in ("Shoulder", "Arm", "Hand")):
+            ends = [(x, y, 1.0 - (abs(old.x) - 0.03)) for (x, y, _), old in
+                    zip(ends, (bone.head.copy(), bone.tail.copy()), strict=True)]  # fmt: skip
+        bone.head, bone.tail = ends
+    bpy.ops.object.mode_set(mode="OBJECT")
     bpy.data.objects["body"].name = "hide"
 
 

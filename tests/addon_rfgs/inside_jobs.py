@@ -16,7 +16,7 @@ import pytest
 import addon_rfgs
 from addon_rfgs.cli import run
 from addon_rfgs.errors import AddonError
-from addon_rfgs.jobs import commands, environment, following, queue
+from addon_rfgs.jobs import commands, environment, following, queue, starting
 from addon_rfgs.jobs.plans import EvaluatePlan, GeneratePlan, TrainPlan, plan_of_json, plan_to_json
 from addon_rfgs.jobs.process import Process, birth
 from addon_rfgs.jobs.progress import Progress, read_log
@@ -329,3 +329,16 @@ def test_a_job_is_forgotten_by_command(
 def test_the_log_lies_in_the_output_folder(tmp_path: Path) -> None:
     made = plan(tmp_path, "run")
     assert log_file(made) == tmp_path / "run" / "log" / "job_train.log"
+
+
+def test_devices_of_one_s_own_are_what_is_generated(tmp_path: Path, registered: None) -> None:
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "room.blend"))
+    scene = bpy.context.scene
+    assert starting.generate_plan(scene).radios == "wifi" and not starting.doing_without(scene)
+    bpy.ops.rfgs.add_device(role="TRANSMITTER")
+    assert starting.generate_plan(scene).radios == "scene"
+    assert starting.train_plan(scene).radio == "scene" and not starting.doing_without(scene)
+    scene.rfgs.jobs.radios = "mmwave, wifi"
+    assert starting.generate_plan(scene).arguments().count("--radio=scene") == 0
+    assert starting.doing_without(scene) == "left out: transmitter (radio 'scene')"

@@ -221,6 +221,7 @@ def test_scripts_never_run(scenes: Path) -> None:
     assert any(g["what"] == "driver" and g["object"].startswith("crate") for g in guesses)
 
 
+@pytest.mark.slow
 def test_sixty_frames_of_a_detailed_person_take_seconds(
     scenes: Path, results: dict[str, Any]
 ) -> None:

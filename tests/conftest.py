@@ -79,6 +79,6 @@ def small_run(tiny_dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> R
     from rfgs_core.train.config import TrainConfig
 
     data = open_dataset(tiny_dataset)
-    config = TrainConfig(num_gaussians=40, solver_steps=2, iterations=1)
+    config = TrainConfig(num_gaussians=40, solver_steps=2, iterations=1, posture="standing")
     out = tmp_path_factory.mktemp("predicted") / "run"
     return train_sequence(data, data.sequence(), "wifi", [1, 2], config, out)

@@ -24,7 +24,7 @@ from rfgs_core.gaussians.ply import read_ply
 from rfgs_core.run import Run
 
 PICTURES = ("images", "depth", "normal", "mask")
-TINY = ["--gaussians", "40", "--iterations", "1", "--no-shader"]
+TINY = ["--gaussians", "40", "--iterations", "1", "--posture", "standing", "--no-shader"]
 
 
 def error_line(arguments: list[str], capsys) -> str:

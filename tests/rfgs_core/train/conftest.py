@@ -135,8 +135,9 @@ def state(make_gaussians, head) -> FrameState:
 
 @pytest.fixture(scope="session")
 def quick_config() -> TrainConfig:
-    """Few Gaussians and steps."""
+    """Few Gaussians and steps, and nobody is asked whether they sit, which takes ten seconds."""
     return TrainConfig(
+        posture="standing",
         num_gaussians=40,
         solver_steps=3,
         iterations=4,

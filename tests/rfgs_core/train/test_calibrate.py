@@ -160,6 +160,7 @@ def test_a_run_without_its_calibration_is_refused(calibrated: Run) -> None:
 def test_the_command_takes_it(tiny_dataset: Path, tmp_path: Path, capsys) -> None:
     out = tmp_path / "run"
     few = ["--gaussians", "30", "--iterations", "1", "--no-shader", "--frames", "1"]
+    few += ["--posture", "standing"]
     arguments = ["train", str(tiny_dataset), "--radio", "wifi", "--out", str(out), *few]
     assert main([*arguments, "--calibrate", "timing"]) == 0
     found = read_calibration(out, 1)

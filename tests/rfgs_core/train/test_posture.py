@@ -108,9 +108,10 @@ def test_only_what_is_visible_is_sampled(make_observations: Callable[..., Observ
 
 
 def test_pairs_that_hear_nothing_keep_their_place_and_say_nothing(
-    make_observations: Callable[..., Observations], cloud
+    make_observations: Callable[..., Observations], cloud, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of few pairs several rounds are averaged, pair by pair."""
+    """Of few pairs several rounds are averaged, pair by pair; few Gaussians tell that as well."""
+    monkeypatch.setattr(posture, "GAUSSIANS", 40)
     empty = make_observations(own_device_links="only")
     seen = echoing(empty, Bodies(AXIS, np.array([0.0])), seed=3)
     pair, names = seen.pairs

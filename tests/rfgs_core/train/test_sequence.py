@@ -22,6 +22,7 @@ from rfgs_core.render.shader import ShaderConfig
 from rfgs_core.render.view import fit_run_shader
 from rfgs_core.run import Run, open_run
 from rfgs_core.run.training import train_sequence
+from rfgs_core.train import posture
 from rfgs_core.train import refine as refine_module
 from rfgs_core.train.observations import observe
 
@@ -125,6 +126,17 @@ def test_another_folder_gives_the_same_bytes_and_another_seed_others(
     assert (
         result_bytes(other)["gaussians/000002.ply"] != result_bytes(again)["gaussians/000002.ply"]
     )
+
+
+def test_postures_that_are_told_give_the_same_bytes_too(
+    tiny_dataset: Path, train, quick_config, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(posture, "GAUSSIANS", 40)
+    config = replace(quick_config, posture="told")
+    first, again = (train(tiny_dataset, tmp_path / name, config, [1]) for name in "ab")
+    assert (first.path / CHECKPOINTS[0]).read_bytes() == (again.path / CHECKPOINTS[0]).read_bytes()
+    bodies = first.bodies(1)
+    assert bodies is not None and bodies.knees_rad.shape == (1,)
 
 
 @pytest.mark.parametrize("when", ["before frame 2", "within frame 2"])

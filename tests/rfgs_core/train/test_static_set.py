@@ -105,27 +105,28 @@ def error_db(got: np.ndarray, true: np.ndarray) -> float:
 
 def test_known_reflectors_are_found_in_their_own_background(room) -> None:
     observations, whole, truth = room
-    found = fit_static_set(observations, 400, seed=3)
-    assert len(found.gaussians) == 400
+    # Of 400 drawn, as few as five fall on one reflector; of 1600, 25 or more with any seed.
+    found = fit_static_set(observations, 1600, seed=3)
+    assert len(found.gaussians) == 1600
     means = found.gaussians.means.numpy().astype(np.float64)
     distance_m, nearest = (np.asarray(found) for found in KDTree(PLACES).query(means))
     low, high = observations.bounds_m
     power = np.abs(found.gamma) ** 2
     # The band resolves 25 cm, and places anywhere in this room are 1 m away on average.
     anywhere = np.random.default_rng(0).uniform(low, high, (400, 3))
-    assert np.average(distance_m, weights=power) < 0.5
+    assert np.average(distance_m, weights=power) < 0.6
     assert np.mean(KDTree(PLACES).query(anywhere)[0]) > 0.95
     near = np.bincount(nearest[distance_m < 0.4], power[distance_m < 0.4], len(PLACES))
-    # The five balls of 40 cm fill 4 % of the room.
-    assert near.sum() > 0.4 * power.sum()
-    assert near.min() > 0.01 * power.sum()
+    # The five balls of 40 cm fill 4 % of the room, each of them 0.8 %.
+    assert near.sum() > 0.35 * power.sum()
+    assert near.min() > 0.02 * power.sum()
     # What they scatter, with the direct paths taken off: on what was seen, and on hidden columns.
     straight = StaticSet(Gaussians.none(), truth.head).background(observations)
     seen = observations.links[..., None] & observations.tones
     hidden = (observations.layout.measured & ~observations.links)[..., None] & observations.tones
     scattered, got = whole - straight, found.background(observations) - straight
-    assert error_db(got[seen], scattered[seen]) < -8
-    assert error_db(got[hidden], scattered[hidden]) < -1.5
+    assert error_db(got[seen], scattered[seen]) < -11
+    assert error_db(got[hidden], scattered[hidden]) < -3
 
 
 def test_a_room_of_direct_paths_alone_has_no_static_gaussians(make_observations) -> None:

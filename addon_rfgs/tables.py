@@ -29,6 +29,9 @@ NEARER: tuple[float, ...] = tuple(_TABLES["nearer"])
 #: It keeps this far from what it came around [m].
 NOT_AT_WALL_M: float = _TABLES["not_at_wall_m"]
 
+#: Bounds that reach this far below the floor under the people hold something that fell [m].
+SUNK_M: float = _TABLES["sunk_m"]
+
 #: An array with more elements is refused by the factory.
 MOST_ELEMENTS: int = _TABLES["most_elements"]
 

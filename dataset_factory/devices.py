@@ -17,9 +17,9 @@ from rfgs_core.radio.check import check, check_devices
 
 #: Placement rules in words.
 _WHERE = {
-    "corners": "in the corners of the scene",
-    "walls": "along the walls of the scene",
-    "circle": "on a circle around the middle of the scene",
+    "corners": "in the corners of the",
+    "walls": "along the walls of the",
+    "circle": "on a circle around the middle of the",
 }
 #: A circle through a wall would name every one of its places.
 _MOST_PROBLEMS = 5
@@ -36,12 +36,12 @@ def choose_devices(bundle: Bundle, radio: Radio) -> tuple[list[DevicePose], dict
         if problem := silence(bundle.devices, radio):
             raise RfgsError(f"{bundle.info['blend_name']}: {problem}")
         return _in_order(bundle, radio, own), None
-    placed = Placement(radio, bundle).devices()
+    placed, in_room = Placement(radio, bundle).devices()
     guess = {
         "what": "devices",
         "object": radio.name,
         "value": f"{len(placed)} {'places of one device ' if radio.antennas_move else ''}"
-        f"{_WHERE[radio.placement]}",
+        f"{_WHERE[radio.placement]} {'room around the people' if in_room else 'scene'}",
         "why": "no Empty has a role with radio "
         + " or ".join(repr(name) for name in sorted(device_radios(radio))),
     }

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Places a radio's devices in the room around the people, clear of furniture.
 
-The radio's rule is tried in the scene's bounds first. Bounds are a box around everything: where
-that puts a device outside the room (under its floor, above its ceiling, behind its walls), the
-rule is tried in the room itself, and what stands in corners may come nearer to the people.
+The radio's rule is tried in the scene's bounds first, from the floor under the people up: what
+fell below it does not count. Bounds are a box around everything: where that puts a device outside
+the room (under its floor, above its ceiling, behind its walls), the rule is tried in the room
+itself, and what stands in corners may come nearer to the people.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from dataset_factory.room import all_triangles
 from rfgs_core.errors import RfgsError
 from rfgs_core.radio import DevicePose, Radio, layout, place_devices
 from rfgs_core.radio.check import enclosed
-from rfgs_core.radio.placement import NEARER, NOT_AT_WALL_M, height_m
+from rfgs_core.radio.placement import NEARER, NOT_AT_WALL_M, SUNK_M, height_m
 
 
 @dataclass
@@ -34,27 +35,37 @@ class Placement:
         self.meshes = self.bundle.static_meshes()
         self.triangles = all_triangles(self.meshes)
 
-    def devices(self) -> list[DevicePose]:
+    def devices(self) -> tuple[list[DevicePose], bool]:
         """The devices, as many as possible inside the room and outside of objects.
+
+        Returns:
+            The devices, and whether they stand by the room instead of the bounds.
 
         Raises:
             RfgsError: The arrays are longer than the walls, or there is no room for a circle.
         """
         room = self.bundle.room
-        placed, faulty = self._within(self.bundle.bounds_m)
+        placed, faulty = self._within(self._from_floor())
         if room is None or not faulty:
-            return placed
+            return placed, False
         try:
             closer, still_faulty = self._within(room.box_m, room.stand_m)
         except RfgsError:
-            return placed
+            return placed, False
         # What is as good in the bounds stays there.
-        return closer if still_faulty < faulty else placed
+        return (closer, True) if still_faulty < faulty else (placed, False)
 
     def outside(self, place_m: np.ndarray) -> bool:
         """Whether a place is outside the room around the people, where there is one."""
         room = self.bundle.room
         return room is not None and room.outside(place_m, self.triangles)
+
+    def _from_floor(self) -> np.ndarray:
+        """The bounds without what is below the floor under the people, where that is much."""
+        box_m, room = self.bundle.bounds_m.copy(), self.bundle.room
+        if room is not None and room.box_m[0, 2] - box_m[0, 2] > SUNK_M:
+            box_m[0, 2] = room.box_m[0, 2]
+        return box_m
 
     def _within(
         self, box_m: np.ndarray, stand_m: np.ndarray | None = None

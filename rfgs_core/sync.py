@@ -18,7 +18,7 @@ from rfgs_core.radio.check import ROOM_FRACTION
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.files import MOST_ELEMENTS
 from rfgs_core.radio.materials import MATERIALS
-from rfgs_core.radio.placement import NEARER, NOT_AT_WALL_M
+from rfgs_core.radio.placement import NEARER, NOT_AT_WALL_M, SUNK_M
 from rfgs_core.radio.presets import PRESETS, OwnLinks, Radio, preset
 from rfgs_core.skeleton import JOINTS, PARENTS
 
@@ -55,6 +55,7 @@ def tables() -> dict[str, Any]:
         "room_fraction": ROOM_FRACTION,
         "nearer": list(NEARER),
         "not_at_wall_m": NOT_AT_WALL_M,
+        "sunk_m": SUNK_M,
         "most_elements": MOST_ELEMENTS,
         "radios": [
             {

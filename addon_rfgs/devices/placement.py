@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import AddonError
 from ..scene.enclosure import enclosed
 from ..scene.surroundings import Surroundings
-from ..tables import NEARER, NOT_AT_WALL_M, RADIO_FIELDS, RADIO_PLACEMENTS
+from ..tables import NEARER, NOT_AT_WALL_M, RADIO_FIELDS, RADIO_PLACEMENTS, SUNK_M
 from .layout import width_m, world_elements
 
 #: Vertices [V, 3] in metres and triangles [T, 3] of something that stands in the way.
@@ -40,8 +40,9 @@ def spots(
 ) -> list[Spot]:
     """Places the devices of a preset in the room around the people, clear of furniture.
 
-    The preset's rule is tried in the bounds first; where that puts a device outside the room, it
-    is tried in the room itself, and what stands in corners may come nearer to the people.
+    The preset's rule is tried in the bounds first, from the floor under the people up; where that
+    puts a device outside the room, it is tried in the room itself, and what stands in corners may
+    come nearer to the people.
 
     Args:
         radio: Name of a preset.
@@ -54,7 +55,7 @@ def spots(
             place in the room for some device.
     """
     standing = list(meshes)
-    placed, faulty = _within(radio, bounds, standing, room)
+    placed, faulty = _within(radio, _from_floor(bounds, room), standing, room)
     if room is not None and faulty:
         box = np.clip(room.box, bounds[0], bounds[1])
         try:
@@ -70,6 +71,15 @@ def spots(
                 f"{len(placed)} devices; place them one by one, or drop what stands in the way"
             )
     return placed
+
+
+def _from_floor(bounds: np.ndarray, room: Surroundings | None) -> np.ndarray:
+    """Bounds [2, 3] without what is below the floor under the people, where that is much [m]."""
+    box = bounds.copy()
+    # Bounds around a selection may be on another storey.
+    if room is not None and bounds[0, 2] + SUNK_M < room.box[0, 2] < bounds[1, 2]:
+        box[0, 2] = room.box[0, 2]
+    return box
 
 
 def _within(

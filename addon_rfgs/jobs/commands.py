@@ -46,7 +46,13 @@ def add_generate(commands: Any) -> None:
         "panel's settings. The same command continues what was stopped.",
     )
     command.add_argument("--out", dest="dataset_folder", metavar="FOLDER", help="of the dataset")
-    command.add_argument("--radio", dest="radios", metavar="NAME[,NAME…]", help="presets to trace")
+    command.add_argument(
+        "--radio",
+        dest="radios",
+        metavar="NAME[,NAME…]",
+        help="presets to trace, or scene for the radio that the file's own devices describe, which "
+        "is the default where there are some; else wifi",
+    )
     command.add_argument("--frames", metavar="A:B[:STEP]")
     for name, text in (
         ("depth", "interactions of a path that meets a person; 0: what the scene needs"),

@@ -3,13 +3,12 @@
 
 import bpy
 
-from ..scene.taking_part import wanted_radios
 from ..tab import Tab
 from .following import chosen_job
 from .preferences import ADDON, draw_check, environment_path, preferences
 from .process import SUPPORTED
 from .queue import DONE, FAILED, RUNNING, STOPPED, STOPPING, WAITING
-from .starting import doing_without
+from .starting import doing_without, traced
 
 _ICONS = {
     WAITING: "SORTTIME",
@@ -104,11 +103,12 @@ class RFGS_PT_generate(Tab, bpy.types.Panel):
         layout.use_property_decorate = False
         for name in ("dataset_folder", "radios"):
             layout.prop(settings, name)
-        missing = doing_without(context.scene)
-        if missing:
-            layout.label(text=missing, icon="ERROR")
-        elif not settings.radios:
-            layout.label(text=f"Traces {', '.join(wanted_radios(context.scene))}", icon="INFO")
+        for line, icon in (
+            (doing_without(context.scene), "ERROR"),
+            (traced(context.scene), "INFO"),
+        ):
+            if line:
+                layout.label(text=line, icon=icon)
         for name in ("frames", "depth", "workers", "paths", "images"):
             layout.prop(settings, name)
         column = layout.column()

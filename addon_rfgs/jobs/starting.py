@@ -59,6 +59,11 @@ def doing_without(scene: bpy.types.Scene) -> str:
     return f"left out: {', '.join(groups)}" if groups else ""
 
 
+def traced(scene: bpy.types.Scene) -> str:
+    """The line below the radios of the panel: what is traced where none is named."""
+    return "" if scene.rfgs.jobs.radios else f"Traces {', '.join(wanted_radios(scene))}"
+
+
 def train_plan(scene: bpy.types.Scene) -> TrainPlan:
     """A training on the panel's dataset."""
     said = scene.rfgs.jobs

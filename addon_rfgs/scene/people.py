@@ -21,6 +21,8 @@ from .survey import Surface, evaluated_mesh, placements
 _SIZE_M = (0.3, 5.0)
 #: A person who is never this long in any direction is drawn in another unit [m].
 _SMALLEST_PERSON_M = 0.5
+#: Between these a person needs no second look, arms overhead included [m].
+_USUAL_PERSON_M = (0.8, 2.6)
 
 
 @dataclass
@@ -222,7 +224,7 @@ def _size_m(instance: Instance) -> float:
 def _size_findings(instance: Instance) -> list[Finding]:
     low, high = _first_box(instance)
     size_m, height_m, largest = float((high - low).max()), float(high[2] - low[2]), _SIZE_M[1]
-    if size_m < _SMALLEST_PERSON_M:
+    if size_m < _USUAL_PERSON_M[0]:
         # Who is curled up at first may stand up later.
         later = np.concatenate([np.ptp(surface.boxes, axis=1) for surface in instance.surfaces])
         size_m = max(size_m, float(later.max()))
@@ -230,6 +232,11 @@ def _size_findings(instance: Instance) -> list[Finding]:
     if instance.kind == "person" and not _SMALLEST_PERSON_M <= size_m <= largest:
         message = f"is a person of {size_m:.3g} m, expected {_SMALLEST_PERSON_M:g} to {largest:g} m"
         return [Finding("error", name, message, remedy, "unit_scale")]
+    usual = " to ".join(f"{value:g}" for value in _USUAL_PERSON_M)
+    if instance.kind == "person" and not _USUAL_PERSON_M[0] <= size_m <= _USUAL_PERSON_M[1]:
+        message = f"is a person of {size_m:.3g} m; {usual} m are usual"
+        # No kind of the repairs: a child is no mistake of the unit.
+        return [Finding("warning", name, message, f"{remedy} if that is not meant")]
     if height_m > largest:
         message = f"moves and is {height_m:.3g} m tall, expected at most {largest:g} m"
         remedy = f"{remedy} or drop it (class Ignore)"

@@ -51,7 +51,8 @@ def voxel_budget(instances: Sequence[dict[str, Any]], voxel_m: float = VOXEL_M) 
     if surface <= 0.0:
         raise RfgsError(
             "no instance of this sequence has a nominal_surface_m2, so there is nothing that "
-            "moves to compare with; give one in the instance table of sequence.json"
+            "moves to compare with; make the dataset again with a class for what moves (--people "
+            "NAME, --vehicles NAME) or with its Nominal surface set in Blender"
         )
     return round(VOXELS_PER_FACE * surface / voxel_m**2)
 

@@ -14,6 +14,8 @@ from rfgs_core.radio.presets import Radio
 NEARER = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8)
 #: It keeps this far from what it came around [m].
 NOT_AT_WALL_M = 0.15
+#: Bounds that reach this far below the floor under the people hold something that fell [m].
+SUNK_M = 0.3
 
 
 def height_m(radio: Radio, bounds_m: Float64[np.ndarray, "2 3"], wanted_m: float) -> float:

@@ -48,8 +48,8 @@ class LinkChannels:
                 "more than if nothing were predicted"
             )
         return (
-            f"the prediction leaves {self.error_db:.1f} dB of the change's energy (0 dB: explains "
-            "nothing)"
+            f"the prediction leaves {round(self.error_db, 1) + 0.0:.1f} dB of the change's energy "
+            "(0 dB: explains nothing)"
         )
 
 

@@ -23,6 +23,7 @@ from addon_rfgs.export.bundle import export_bundle
 ROOMS: dict[str, tuple[list[tuple[float, float]], float]] = {
     "low": ([(-2, -2.5), (2, -2.5), (2, 2.5), (-2, 2.5)], 2.1),
     "cloth": ([(-2.5, -2), (2.5, -2), (2.5, 2), (-2.5, 2)], 2.6),
+    "scarf": ([(-2.5, -2), (2.5, -2), (2.5, 2), (-2.5, 2)], 2.6),
     "ell": ([(-3, -3), (3, -3), (3, 0.9), (0.9, 0.9), (0.9, 3), (-3, 3)], 2.6),
     "flat": ([(-2.5, -2), (2.5, -2), (2.5, 2), (-2.5, 2)], 2.6),
 }
@@ -39,13 +40,17 @@ def shell(footprint: list[tuple[float, float]], height_m: float) -> None:
     bpy.context.scene.collection.objects.link(bpy.data.objects.new("shell", mesh))
 
 
-def falling_cloth() -> None:
-    """A sheet that nothing holds: it falls through the floor to 3.6 m below."""
+#: How far below the floor a sheet falls [m].
+FALLS = {"cloth": 3.6, "scarf": 0.9}
+
+
+def falling_cloth(below_m: float) -> None:
+    """A sheet that nothing holds: it falls through the floor."""
     mesh = bpy.data.meshes.new("cloth")
     mesh.from_pydata([(1, 1, 0), (1.5, 1, 0), (1.5, 1.5, 0), (1, 1.5, 0)], [], [(0, 1, 2, 3)])
     cloth = bpy.data.objects.new("cloth", mesh)
     bpy.context.scene.collection.objects.link(cloth)
-    for frame, z in ((1, 1.0), (5, -3.6)):
+    for frame, z in ((1, 1.0), (5, -below_m)):
         cloth.location.z = z
         cloth.keyframe_insert("location", frame=frame)
 
@@ -70,8 +75,8 @@ def main(folder: Path) -> None:
         scene.frame_start, scene.frame_end, scene.render.fps = 1, 5, 10
         person()
         shell(footprint, height_m)
-        if name == "cloth":
-            falling_cloth()
+        if name in FALLS:
+            falling_cloth(FALLS[name])
         if name == "flat":
             next_door()
         bpy.ops.wm.save_as_mainfile(filepath=str(folder / f"{name}.blend"))

@@ -67,6 +67,20 @@ def test_a_person_in_centimetres() -> None:
     assert scene.unit_settings.scale_length == pytest.approx(0.01)
 
 
+@pytest.mark.parametrize(
+    ("scale", "severity"), [(0.2, "error"), (0.3, "warning"), (1.6, "warning")]
+)
+def test_a_person_of_an_unlikely_size_is_named(scale: float, severity: str) -> None:
+    """With an arm overhead a person of 0.44 m is half a metre long, as a small child is."""
+    bpy.data.objects["rig"].scale = (scale,) * 3
+    bpy.context.view_layer.update()
+    rows = [row for row in repairs.findings(bpy.context.scene) if "is a person of" in row.message]
+    (row,) = rows
+    assert (row.severity, row.object) == (severity, "body") and "unit scale" in row.remedy
+    # Only the unit of what cannot be a person is put right by a button.
+    assert repairs.repairable(bpy.context.scene, row) == (severity == "error")
+
+
 def test_nothing_tells_the_unit_where_nothing_moves() -> None:
     still()
     with pytest.raises(AddonError, match="nothing moves"):

@@ -336,9 +336,40 @@ def test_devices_of_one_s_own_are_what_is_generated(tmp_path: Path, registered: 
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "room.blend"))
     scene = bpy.context.scene
     assert starting.generate_plan(scene).radios == "wifi" and not starting.doing_without(scene)
+    assert starting.traced(scene) == "Traces wifi"
     bpy.ops.rfgs.add_device(role="TRANSMITTER")
     assert starting.generate_plan(scene).radios == "scene"
     assert starting.train_plan(scene).radio == "scene" and not starting.doing_without(scene)
+    assert starting.traced(scene) == "Traces scene"
     scene.rfgs.jobs.radios = "mmwave, wifi"
+    assert starting.traced(scene) == ""
     assert starting.generate_plan(scene).arguments().count("--radio=scene") == 0
     assert starting.doing_without(scene) == "left out: transmitter (radio 'scene')"
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_the_command_names_what_is_left_out_before_the_job_begins(
+    program,
+    tmp_path: Path,
+    registered: None,
+    capfd: pytest.CaptureFixture,
+    monkeypatch: pytest.MonkeyPatch,
+    named: bool,
+) -> None:
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.rfgs.add_device(role="ACCESS_POINT", location=(1, 0, 1))
+    bpy.context.object.name, bpy.context.object.rfgs.radio = "ap", "wifi"
+    bpy.ops.rfgs.add_device(role="TRANSMITTER")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "room.blend"))
+    jobs = queue.Queue(lambda: tmp_path / "jobs.json")
+    for module in (commands, starting):
+        monkeypatch.setattr(module, "QUEUE", jobs)
+    out, python = str(tmp_path / "data"), str(program("failing"))
+    asked = ["--radio", "wifi"] if named else []
+    assert run(["generate", "--out", out, "--python", python, *asked]) == 2
+    said = capfd.readouterr()
+    left = "transmitter (radio 'scene')" if named else "ap (radio 'wifi')"
+    assert f"left out: {left}\n" in said.out and "no wall anywhere" in said.err
+    record = read_record(record_file(GeneratePlan(out=out, blend="")))
+    assert isinstance(record.plan, GeneratePlan)
+    assert record.plan.radios == ("wifi" if named else "scene")

@@ -17,7 +17,7 @@ from dataset_factory.outline import left_out
 from rfgs_core.radio import DevicePose, place_devices, preset
 
 HERE = Path(__file__).parent
-FLOOR_M, CEILINGS_M = 0.0, {"low": 2.1, "cloth": 2.6, "ell": 2.6, "flat": 2.6}
+FLOOR_M, CEILINGS_M = 0.0, {"low": 2.1, "cloth": 2.6, "scarf": 2.6, "ell": 2.6, "flat": 2.6}
 
 
 @pytest.fixture(scope="module")
@@ -43,6 +43,7 @@ def test_the_room_is_what_people_have_around_them(rooms: Path, name: str) -> Non
     low, high = {
         "low": ([-2, -2.5], [2, 2.5]),
         "cloth": ([-2.5, -2], [2.5, 2]),
+        "scarf": ([-2.5, -2], [2.5, 2]),
         "ell": ([-3, -3], [3, 3]),
         "flat": ([-2.5, -2], [2.5, 2]),
     }[name]
@@ -70,6 +71,26 @@ def test_antennas_are_inside(rooms: Path, name: str, radio: str) -> None:
 def test_bounds_alone_would_put_them_outside(rooms: Path) -> None:
     low, cloth = (by_bounds(read_bundle(rooms / name), "wifi") for name in ("low", "cloth"))
     assert low[:, 2].max() > 2.1 and (cloth[:, 2] < 0.0).all()
+
+
+@pytest.mark.parametrize("name", ["cloth", "scarf"])
+def test_heights_are_above_the_floor_under_the_people(rooms: Path, name: str) -> None:
+    """Above what fell 0.9 m below it, some would stand on the floor and none would be outside."""
+    bundle = read_bundle(rooms / name)
+    heights_m = [1.2, 2.2, 1.2, 2.2]
+    low = 0.0 - bundle.bounds_m[0, 2]
+    assert low > 0.8
+    np.testing.assert_allclose(
+        by_bounds(bundle, "wifi")[:, 2], np.subtract(heights_m, low), atol=1e-3
+    )
+    found = places(choose_devices(bundle, preset("wifi"))[0])
+    np.testing.assert_allclose(found[:, 2], heights_m, atol=1e-3)
+
+
+def test_the_guess_says_whether_the_room_or_the_scene_counted(rooms: Path) -> None:
+    for name, where in (("low", "scene"), ("ell", "room around the people")):
+        _, guess = choose_devices(read_bundle(rooms / name), preset("wifi"))
+        assert guess is not None and guess["value"] == f"4 in the corners of the {where}"
 
 
 def test_devices_in_corners_come_around_what_hides_them(rooms: Path) -> None:

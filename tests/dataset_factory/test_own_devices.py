@@ -10,17 +10,33 @@ from pathlib import Path
 
 import pytest
 
+from rfgs_core.dataset import open_dataset
+
 Factory = Callable[..., subprocess.CompletedProcess[str]]
+
+
+def with_device(blend: Path, out: Path, role: str, *more: str) -> Path:
+    """A copy of a file with one device more, as the buttons of the panel make it."""
+    add = ("devices", "add", role, *more, "--out", str(out))
+    command = [sys.executable, "-m", "addon_rfgs", "--blend", str(blend), *add]
+    subprocess.run(command, check=True, capture_output=True, timeout=120)
+    return out
 
 
 @pytest.fixture(scope="module")
 def sender(box_room: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The small room with a transmitter of its own, as the button TX makes it."""
     out = tmp_path_factory.mktemp("own") / "own_room.blend"
-    add = ("devices", "add", "transmitter", "--at", "0.5", "0.5", "1.2", "--out", str(out))
-    command = [sys.executable, "-m", "addon_rfgs", "--blend", str(box_room), *add]
-    subprocess.run(command, check=True, capture_output=True, timeout=120)
-    return out
+    return with_device(box_room, out, "transmitter", "--at", "0.5", "0.5", "1.2")
+
+
+@pytest.fixture(scope="module")
+def pair(sender: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The room with a transmitter and a receiver of its own, and a box of a preset."""
+    folder = tmp_path_factory.mktemp("pair")
+    heard = with_device(sender, folder / "pair.blend", "receiver", "--at", "2.5", "0.5", "1.2")
+    box = ("--radio", "wifi", "--name", "box", "--at", "2.5", "2.5", "1.2")
+    return with_device(heard, folder / "pair.blend", "access-point", *box)
 
 
 def test_one_s_own_radio_is_the_default_and_must_be_whole(
@@ -52,6 +68,20 @@ def test_devices_left_out_are_named_before_anything_starts(
     named = "device 'transmitter' of radio 'scene' is left out of wifi; add --radio scene"
     assert lines.index(named) < lines.index(f"{tmp_path / 'out'}: a new dataset")
     assert done.returncode == 2 and not (tmp_path / "out").exists()
+
+
+def test_one_s_own_devices_are_traced_unless_a_radio_is_named(
+    factory_here: Factory, pair: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "data"
+    asked = ("--frames", "1", "--depth", "1", "--no-images", "--workers", "1", "--out", str(out))
+    assert factory_here("generate", str(pair), *asked).returncode == 0
+    sequence = open_dataset(out).sequence()
+    assert list(sequence.radios) == ["scene"]
+    assert [device.name for device in sequence.devices("scene")] == ["receiver", "transmitter"]
+    told = factory_here("check", str(pair))
+    assert told.returncode == 0
+    assert "device 'box' of radio 'wifi' is left out of scene; add --radio wifi" in told.stdout
 
 
 def test_the_check_names_them_too(factory_here: Factory, sender: Path) -> None:

@@ -50,6 +50,8 @@ def test_an_error_louder_than_the_change_is_not_left_of_it(small_run: Run) -> No
     link = link_channels(small_run, 0, 0)
     good, bad = (replace(link, predicted=link.measured * np.complex64(x)) for x in (0.9, 3.0))
     assert good.explained.startswith("the prediction leaves -20.0 dB of the change's energy")
+    nothing = replace(link, predicted=link.measured * np.complex64(1e-3))
+    assert nothing.explained.startswith("the prediction leaves 0.0 dB of the change's energy")
     assert bad.explained.startswith("the prediction's error has 6.0 dB more energy than the change")
 
 

@@ -41,7 +41,7 @@ def choose_devices(bundle: Bundle, radio: Radio) -> tuple[list[DevicePose], dict
         "what": "devices",
         "object": radio.name,
         "value": f"{len(placed)} {'places of one device ' if radio.antennas_move else ''}"
-        f"{_WHERE[radio.placement]} {'room around the people' if in_room else 'scene'}",
+        f"{_WHERE[radio.placement]} {'room that people are in' if in_room else 'scene'}",
         "why": "no Empty has a role with radio "
         + " or ".join(repr(name) for name in sorted(device_radios(radio))),
     }

@@ -58,6 +58,25 @@ def usual_radios(devices: Iterable[dict[str, Any]]) -> tuple[str, ...]:
     return (SCENE_RADIO,) if own else ()
 
 
+def no_radio(devices: Iterable[dict[str, Any]]) -> str:
+    """Why a radio must be named for a scene without devices of somebody's own, and which."""
+    named = {row["radio"] for row in devices if row["role"] != "NONE"} - {ANY_RADIO}
+    if named:
+        several = "s" * (len(named) > 1)
+        return (
+            f"no radio given, and the scene has devices of the radio{several} "
+            f"{', '.join(map(repr, sorted(named)))}; add "
+            + " or ".join(
+                f"--radio {name if name in PRESETS else 'a file that describes it'}"
+                for name in sorted(named)
+            )
+        )
+    return (
+        "no radio given, and the scene has no devices of its own; add --radio wifi, "
+        "--radio mmwave or both"
+    )
+
+
 def device_radios(radio: Radio) -> set[str]:
     """Radios of the devices that take part in one.
 

@@ -88,10 +88,7 @@ def make_plan(scene: Scene, radios: tuple[str, ...], frames: str, **options: Any
         RfgsError: A radio is unknown, unusable or named twice, or a number is out of range.
     """
     if not radios:
-        raise RfgsError(
-            "no radio given, and the scene has no devices of its own; add --radio wifi, "
-            "--radio mmwave or both"
-        )
+        raise RfgsError("no radio given; expected at least one, such as wifi")
     chosen = chosen_radios(radios)
     limits = {"depth": (1, 3), "resolution": (16, 8192), "samples": (1, 65536), "cameras": (0, 999)}
     for name, (low, high) in limits.items():

@@ -100,7 +100,7 @@ def job_of(args: GenerateArgs) -> tuple[Job, Scene]:
     """
     from dataset_factory.blender import Blender
     from dataset_factory.job import Job
-    from dataset_factory.outline import left_out, read_outline, silence, usual_radios
+    from dataset_factory.outline import left_out, no_radio, read_outline, silence, usual_radios
     from dataset_factory.overrides import label, read_options
     from dataset_factory.plan import whole_frames
     from dataset_factory.scenes import find_scene
@@ -120,6 +120,8 @@ def job_of(args: GenerateArgs) -> tuple[Job, Scene]:
 
     seen = None if args.radio else look(args.packets_per_frame > 1)
     named = args.radio or usual_radios(seen.devices if seen else ())
+    if seen and not named:
+        raise RfgsError(f"{scene.blend}: {no_radio(seen.devices)}")
     plan = _plan(args, scene, named, frames, said)
     use_llvm()
     radios = [plan.radio(name) for name in plan.radios]

@@ -98,7 +98,8 @@ def _predict(
     radio = trained.sequence.radio_spec(name)
     devices = np.array([device.position_m for device in trained.sequence.devices(name)])
     named = [("--tx", tx_xyz), *(("--rx", place) for place in rx_xyz)]
-    check_in_scene(trained.sequence, named, devices)
+    for sentence in check_in_scene(trained.sequence, named, devices):
+        sys.stderr.write(f"{sentence}\n")
     gaussians = trained.head.radio_gaussians(trained.moving(frame))
     means = gaussians.means.numpy().astype(np.float64)
     check_positions(tx_xyz, rx_xyz, means, 0.5 * radio.wavelength_m)

@@ -16,13 +16,15 @@ from rfgs_core.radio.check import enclosed
 
 #: Places may lie this far outside the bounds [m]: outdoors the bounds end where the objects do.
 MARGIN_M = 1.0
+#: Nearer than this to the bounds is as good as inside [m].
+UNTOLD_M = 0.05
 
 
 def check_in_scene(
     sequence: Sequence,
     named: list[tuple[str, Float[np.ndarray, "3"]]],
     in_air: Float[np.ndarray, "point 3"],
-) -> None:
+) -> list[str]:
     """Refuses places far outside the scene, and places inside of what stands in it.
 
     Bounds are all that is known of a scene without geometry. Walls of a single sheet have no
@@ -33,20 +35,28 @@ def check_in_scene(
         named: Places [m], each with the option that named it.
         in_air: Points that are known to be in free air [m]: what encloses one is a room.
 
+    Returns:
+        A sentence for each place that is outside the scene, but not far.
+
     Raises:
         RfgsError: Naming the place, and the bounds or the object's extent.
     """
-    bounds_m = sequence.bounds_m
+    bounds_m, said = sequence.bounds_m, []
     for option, place in named:
         beyond_m = float(np.linalg.norm(place - np.clip(place, *bounds_m)))
+        if beyond_m < UNTOLD_M:
+            continue
+        sentence = (
+            f"{option} {spelt(place)}: {beyond_m:.1f} m outside the scene, which reaches from "
+            f"{spelt(bounds_m[0])} to {spelt(bounds_m[1])} m"
+        )
         if beyond_m > MARGIN_M:
             raise RfgsError(
-                f"{option} {spelt(place)}: {beyond_m:.1f} m outside the scene, which reaches from "
-                f"{spelt(bounds_m[0])} to {spelt(bounds_m[1])} m; expected a place in it, or at "
-                f"most {MARGIN_M:g} m outside"
+                f"{sentence}; expected a place in it, or at most {MARGIN_M:g} m outside"
             )
+        said.append(sentence)
     if not sequence.files.static_mesh.is_file():
-        return
+        return said
     places = np.stack([place for _, place in named]).astype(np.float64)
     for vertices, faces in _closed_parts(*sequence.static_mesh()):
         inside = enclosed(places, bounds_m, vertices, faces)
@@ -57,6 +67,7 @@ def check_in_scene(
                 f"{option} {spelt(place)}: inside an object that reaches from {spelt(low)} to "
                 f"{spelt(high)} m; expected a place in free air, move the antenna out of it"
             )
+    return said
 
 
 def spelt(place: Float[np.ndarray, "3"]) -> str:

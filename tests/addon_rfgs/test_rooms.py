@@ -88,7 +88,7 @@ def test_heights_are_above_the_floor_under_the_people(rooms: Path, name: str) ->
 
 
 def test_the_guess_says_whether_the_room_or_the_scene_counted(rooms: Path) -> None:
-    for name, where in (("low", "scene"), ("ell", "room around the people")):
+    for name, where in (("low", "scene"), ("ell", "room that people are in")):
         _, guess = choose_devices(read_bundle(rooms / name), preset("wifi"))
         assert guess is not None and guess["value"] == f"4 in the corners of the {where}"
 

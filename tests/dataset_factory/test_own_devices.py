@@ -54,8 +54,14 @@ def test_without_devices_of_one_s_own_a_radio_must_be_named(
     factory_here: Factory, box_room: Path, tmp_path: Path
 ) -> None:
     done = factory_here("generate", str(box_room), "--out", str(tmp_path / "out"))
-    assert done.returncode == 2 and "no radio given" in done.stderr
+    assert done.returncode == 2 and "no radio given, and the scene has no devices" in done.stderr
     assert list(tmp_path.iterdir()) == []
+    box = ("--radio", "wifi", "--at", "0.5", "0.5", "1.2")
+    preset = with_device(box_room, tmp_path / "preset.blend", "access-point", *box)
+    done = factory_here("generate", str(preset), "--out", str(tmp_path / "out"))
+    assert done.returncode == 2 and done.stderr.endswith(
+        "no radio given, and the scene has devices of the radio 'wifi'; add --radio wifi\n"
+    )
 
 
 def test_devices_left_out_are_named_before_anything_starts(

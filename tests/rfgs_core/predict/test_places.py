@@ -55,6 +55,15 @@ def test_the_margin_is_a_metre_from_the_nearest_point_of_the_bounds(furnished: S
     assert said.startswith("--rx -2.5,1,1: 2.5 m outside the scene, which reaches from 0,0,0 to 3,")
 
 
+def test_places_just_outside_are_told(furnished: Sequence) -> None:
+    below = ("--tx", np.array([1.5, 1.5, -0.5]))
+    named = [below, ("--rx", np.array([3.04, 1.0, 1.0]))]
+    (said,) = check_in_scene(furnished, named, np.zeros((0, 3)))
+    assert (
+        said == "--tx 1.5,1.5,-0.5: 0.5 m outside the scene, which reaches from 0,0,0 to 3,3,2.5 m"
+    )
+
+
 def test_only_closed_objects_have_an_inside_and_rooms_are_not_objects(furnished: Sequence) -> None:
     assert "inside an object that reaches from 0.2,0.3,0 to 0.8,1.1,2 m" in refusal(
         furnished, (0.5, 0.6, 1.0)

@@ -103,6 +103,14 @@ def test_mistakes_end_in_one_line(
     assert not (small_run.path / "predictions").exists()
 
 
+def test_an_antenna_below_the_floor_is_told_before_the_answer(
+    small_run: Run, tmp_path: Path, capsys
+) -> None:
+    out = ["--out", str(tmp_path / "below.npz")]
+    assert main(["predict", str(small_run.path), "--tx", TX, "--rx", "1,1,-0.4", *out]) == 0
+    assert "--rx 1,1,-0.4: 0.4 m outside the scene, which reaches" in capsys.readouterr().err
+
+
 def test_an_antenna_inside_the_person_is_refused(small_run: Run, capsys) -> None:
     inside = ",".join(f"{value:.4f}" for value in small_run.moving(1).means[3].tolist())
     assert main(["predict", str(small_run.path), "--tx", TX, "--rx", inside]) == 2

@@ -79,7 +79,7 @@ class ApertureTracer(BaseTracer):
                     scene = self._environment.scene
                     outlines = self._bodies.outlines(vertices, own.vertices, scene)
                     elements = self._layouts[place]
-                    passed = transmission(own, elements, outlines, self._nodes, self._shadow)
+                    passed = transmission(own, elements, outlines, self._grid, self._shadow)
             with self._timed("environment"):
                 channel = environment_channel(own, self._radio, self._layouts[place], passed)
             if points is not None:

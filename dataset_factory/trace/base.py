@@ -13,6 +13,7 @@ from dataset_factory.bundle import Bundle
 from dataset_factory.trace.bodies import Bodies
 from dataset_factory.trace.bounces import DEPTHS
 from dataset_factory.trace.environment import node_frequencies
+from dataset_factory.trace.nodes import fine_grid
 from dataset_factory.trace.scene import check_materials
 from dataset_factory.trace.shadow import Shadow
 from rfgs_core.errors import RfgsError
@@ -61,6 +62,7 @@ class BaseTracer:
         self._shadow: Shadow = shadow
         self._rays = sub_seed(seed, "environment")
         self._nodes = node_frequencies(radio)
+        self._grid = fine_grid(self._nodes)
         self._bodies = Bodies(bundle, radio, sub_seed(seed, "points"))
         self._frames_done = 0
         self.timings: dict[str, float] = dict.fromkeys(

@@ -23,7 +23,8 @@ from dataset_factory.trace.scene import (
     owners,
     set_frequency,
 )
-from dataset_factory.trace.steering import steer
+from dataset_factory.trace.shadow import Passed
+from dataset_factory.trace.steering import resampled, steer
 from rfgs_core.radio import Layout, Radio
 from rfgs_core.radio.images import DIFFUSE
 from rfgs_core.radio.layout import DevicePose
@@ -177,7 +178,7 @@ class Environment:
 
 
 def environment_channel(
-    paths: PathSet, radio: Radio, layout: Layout, transmission: np.ndarray | None = None
+    paths: PathSet, radio: Radio, layout: Layout, passed: Passed | None = None
 ) -> np.ndarray:
     """Channel of the environment, complex128, shape (tx, rx, subcarrier).
 
@@ -185,9 +186,16 @@ def environment_channel(
         paths: Paths of `Environment`.
         radio: The radio they were traced for.
         layout: Antenna elements.
-        transmission: Shadow factors as `steer` takes them; None for none.
+        passed: What bodies leave of some paths; None if there are none.
     """
-    channel = steer(paths, layout, radio.freq_hz, node_frequencies(radio), transmission)
+    nodes_hz = node_frequencies(radio)
+    if passed is None:
+        channel = steer(paths, layout, radio.freq_hz, nodes_hz)
+    else:
+        free = np.setdiff1d(np.arange(len(paths)), passed.path)
+        channel = steer(paths.select(free), layout, radio.freq_hz, nodes_hz)
+        shaded = resampled(paths.select(passed.path), nodes_hz, passed.grid_hz)
+        channel += steer(shaded, layout, radio.freq_hz, passed.grid_hz, passed.factor)
     return channel * (radio.centre_hz / radio.freq_hz)
 
 

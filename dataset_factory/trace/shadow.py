@@ -17,7 +17,9 @@ import numba
 import numpy as np
 
 from dataset_factory.trace import silhouette
+from dataset_factory.trace.nodes import Nodes, nodes_for
 from dataset_factory.trace.paths import PathSet
+from dataset_factory.trace.unfold import unfold
 from rfgs_core.radio import Layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
@@ -34,6 +36,19 @@ class Outline:
     """Triangles, shape (T, 3)."""
     beside: np.ndarray
     """Which segments of the paths it may shade, bool, shape (path, segment)."""
+
+
+@dataclass(frozen=True)
+class Passed:
+    """What is left of the paths that something shades; all others pass as they are."""
+
+    path: np.ndarray
+    """Which paths, ascending, int64, shape (shaded,)."""
+    factor: np.ndarray
+    """Factor on the amplitude, complex128, shape (shaded, tx place of the site, rx place of the
+    site, grid); ports of one element share a place."""
+    grid_hz: np.ndarray
+    """Frequencies of the factors [Hz], shape (grid,); linear in between."""
 
 
 #: Detail of the mesh that casts shadows [m]; far below the first Fresnel zone of any preset.
@@ -87,46 +102,46 @@ def transmission(
     paths: PathSet,
     layout: Layout,
     outlines: list[Outline],
-    nodes_hz: np.ndarray,
+    grid_hz: np.ndarray,
     mode: Shadow,
-) -> np.ndarray:
-    """Shadow factors of every path.
+) -> Passed:
+    """Shadow factors of the paths that pass near a body.
 
     Args:
         paths: Environment paths.
         layout: Antenna elements; every site has equally many.
         outlines: Everybody's, for these paths.
-        nodes_hz: Frequencies of the factors [Hz], shape (node,).
+        grid_hz: Frequencies of the factors [Hz], shape (grid,).
         mode: "kirchhoff", or "hard" for all or nothing.
-
-    Returns:
-        Complex128, shape (path, tx place of the site, rx place of the site, node); ports of one
-        element share a place.
     """
     tx_places = _places(layout.tx_xyz, layout.tx_site, layout.tx_port)
     rx_places = _places(layout.rx_xyz, layout.rx_site, layout.rx_port)
-    shape = (len(paths), tx_places.shape[1], rx_places.shape[1], len(nodes_hz))
+    lines, reach = unfold(paths), _reach(paths)
+    near = [
+        outline.beside
+        & _near(paths.vertices, lines[0], lines[1], reach, *_ball(outline.vertices), grid_hz.max())
+        for outline in outlines
+    ]
+    shaded = np.flatnonzero(np.any([rows.any(axis=1) for rows in near], axis=0))
+    shape = (len(shaded), tx_places.shape[1], rx_places.shape[1], len(grid_hz))
     out = np.ones(shape, dtype=np.complex128)
-    if not len(paths):
-        return out
-    unfolded = _unfold(paths)
-    tx = tx_places[paths.tx] - paths.vertices[:, :1]
-    rx = rx_places[paths.rx] - paths.vertices[:, -1:]
-    for outline in outlines:
+    some = paths.select(shaded)
+    tx = np.ascontiguousarray(tx_places[some.tx] - some.vertices[:, :1])
+    rx = np.ascontiguousarray(rx_places[some.rx] - some.vertices[:, -1:])
+    for outline, rows in zip(outlines, near, strict=True):
         _shade(
-            paths.vertices,
-            outline.beside,
-            (*unfolded, _reach(paths)),
-            np.ascontiguousarray(tx),
-            np.ascontiguousarray(rx),
+            some.vertices,
+            rows[shaded],
+            (lines[0][shaded], lines[1][shaded], lines[2][shaded], lines[3][shaded], reach[shaded]),
+            (tx, rx),
             np.ascontiguousarray(outline.vertices, dtype=np.float64),
             np.ascontiguousarray(outline.faces, dtype=np.int64),
-            SPEED_OF_LIGHT / np.asarray(nodes_hz, dtype=np.float64),
+            nodes_for(grid_hz),
             silhouette.FRESNEL,
             mode == "hard",
             out,
         )
-    return out
+    return Passed(shaded, out, grid_hz)
 
 
 def _places(xyz: np.ndarray, site: np.ndarray, port: np.ndarray) -> np.ndarray:
@@ -136,78 +151,78 @@ def _places(xyz: np.ndarray, site: np.ndarray, port: np.ndarray) -> np.ndarray:
     return xyz[first][order].reshape(site.max() + 1, -1, 3)
 
 
-def _unfold(paths: PathSet) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Where each segment lies on its unfolded line, and how offsets of the ends appear there.
+def _ball(vertices: np.ndarray) -> tuple[np.ndarray, float]:
+    """Centre and radius of a ball around a body [m]."""
+    centre = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0)).astype(np.float64)
+    return centre, float(np.linalg.norm(vertices - centre, axis=1).max())
 
-    A scattering point starts a new line: beyond it the transmitter's elements are one point.
 
-    Returns:
-        Length before and after each segment [m], shape (path, depth + 1), and matrices that
-        take offsets of TX and RX elements to the segment, shape (path, depth + 1, 3, 3).
+@numba.njit(cache=True)
+def _near(
+    corners: np.ndarray,
+    before: np.ndarray,
+    after: np.ndarray,
+    reach: np.ndarray,
+    centre: np.ndarray,
+    radius: float,
+    freq_hz: float,
+) -> np.ndarray:
+    """Which segments a ball may come nearer to than the reach, bool, shape (path, segment).
+
+    Fresnel coordinates grow towards the ends of the unfolded line: what counts is their scale
+    where the ball is nearest to its middle.
     """
-    steps = np.diff(paths.vertices, axis=1)
-    length = np.linalg.norm(steps, axis=2)
-    k = steps / np.maximum(length, 1e-12)[:, :, None]
-    count, segments = length.shape
-    before, after = np.zeros((count, segments)), np.zeros((count, segments))
-    tx_turn = np.broadcast_to(np.eye(3), (count, segments, 3, 3)).copy()
-    rx_turn = tx_turn.copy()
-    breaks = paths.breaks()
-    reflect = _reflections(paths, k)
-    for i in range(segments - 1):
-        broken = breaks[:, i]
-        before[:, i + 1] = np.where(broken, 0.0, before[:, i] + length[:, i])
-        turned = reflect[:, i] @ tx_turn[:, i]
-        tx_turn[:, i + 1] = np.where(broken[:, None, None], 0.0, turned)
-    for i in range(segments - 2, -1, -1):
-        broken = breaks[:, i]
-        after[:, i] = np.where(broken, 0.0, after[:, i + 1] + length[:, i + 1])
-        turned = reflect[:, i] @ rx_turn[:, i + 1]
-        rx_turn[:, i] = np.where(broken[:, None, None], 0.0, turned)
-    return before, after, tx_turn, rx_turn
-
-
-def _reflections(paths: PathSet, k: np.ndarray) -> np.ndarray:
-    """Mirror matrix of each interaction, the identity where nothing bends (path, depth, 3, 3)."""
-    normal = k[:, 1:] - k[:, :-1]
-    size = np.linalg.norm(normal, axis=2)
-    bends = paths.mirrors() & (size > 1e-9)
-    normal = np.where(bends[:, :, None], normal / np.maximum(size, 1e-12)[:, :, None], 0.0)
-    return np.eye(3) - 2.0 * normal[..., :, None] * normal[..., None, :]
+    near = np.zeros(before.shape, dtype=np.bool_)
+    for p in range(near.shape[0]):
+        for i in range(near.shape[1]):
+            way = corners[p, i + 1] - corners[p, i]
+            to = centre - corners[p, i]
+            length = np.sqrt((way * way).sum())
+            if length < 1e-6:
+                continue
+            depth = (to * way).sum() / length
+            low, high = max(depth - radius, 0.0), min(depth + radius, length)
+            if low >= high:
+                continue
+            beside = np.sqrt(max((to * to).sum() - depth * depth, 0.0)) - radius
+            whole = before[p, i] + length + after[p, i]
+            at = min(max(0.5 * whole, before[p, i] + low), before[p, i] + high)
+            per_m = np.sqrt(2.0 * (1.0 / at + 1.0 / (whole - at)) * freq_hz / SPEED_OF_LIGHT)
+            near[p, i] = beside * per_m <= reach[p]
+    return near
 
 
 @numba.njit(cache=True, parallel=True)
 def _shade(
     corners: np.ndarray,
-    beside: np.ndarray,
-    unfolded: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray],
-    tx_offset: np.ndarray,
-    rx_offset: np.ndarray,
+    near: np.ndarray,
+    lines: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray],
+    offsets: tuple[np.ndarray, np.ndarray],
     vertices: np.ndarray,
     faces: np.ndarray,
-    wavelengths: np.ndarray,
+    nodes: Nodes,
     table: np.ndarray,
     hard: bool,
     out: np.ndarray,
 ) -> None:
     """Multiplies the factors of one body into `out`."""
-    before, after, tx_turn, rx_turn, reach = unfolded
-    shortest = wavelengths.min()
+    before, after, tx_turn, rx_turn, reach = lines
+    tx_offset, rx_offset = offsets
+    band = nodes.hz[-1] - nodes.hz[len(nodes.hz) - out.shape[3]]
     for p in numba.prange(len(corners)):
         for i in range(corners.shape[1] - 1):
+            if not near[p, i]:
+                continue
             way = corners[p, i + 1] - corners[p, i]
             length = np.sqrt((way * way).sum())
-            if length < 1e-6 or not beside[p, i]:
-                continue
             xy, between, plane, scale, axes = silhouette.project(
                 vertices, corners[p, i], corners[p, i + 1], before[p, i], after[p, i]
             )
             if scale == 0.0:
                 continue
-            per_m = np.sqrt(2.0 * scale / shortest)
-            runs, heights = silhouette.runs_of(
-                xy, between, faces, silhouette.WINDOW / per_m, reach[p] / per_m
-            )
+            per_m = np.sqrt(2.0 * scale * nodes.hz[-1] / SPEED_OF_LIGHT)
+            window = min(silhouette.WINDOW, silhouette.WINDOW_PER_REACH * reach[p])
+            runs, heights = silhouette.runs_of(xy, between, faces, window / per_m, reach[p] / per_m)
             if not len(runs):
                 continue
             if hard:
@@ -224,8 +239,49 @@ def _shade(
                 for axis in range(2):
                     shifts[axis, e] = (to_tx[axis] * tx_offset[p, t]).sum()
                     shifts[axis, e] += (to_rx[axis] * rx_offset[p, r]).sum()
-            for n in range(len(wavelengths)):
-                per_m = np.sqrt(2.0 * scale / wavelengths[n])
-                factors = silhouette.screen_factors(table, runs, heights, shifts, per_m)
-                for e in range(len(factors)):
-                    out[p, e // n_rx, e % n_rx, n] *= factors[e]
+            # Seconds that the farthest edge answers later, by which its share turns.
+            late = silhouette.farthest(runs, heights, shifts) ** 2 * scale / (2.0 * SPEED_OF_LIGHT)
+            choice = _choice(nodes.counts, np.pi * band * late)
+            first = nodes.counts[:choice].sum()
+            count = nodes.counts[choice]
+            every = np.zeros((2, shifts.shape[1] * count))
+            per_m_of = np.zeros(every.shape[1])
+            for line in range(every.shape[1]):
+                every[:, line] = shifts[:, line // count]
+                wave = nodes.hz[first + line % count] / SPEED_OF_LIGHT
+                per_m_of[line] = np.sqrt(2.0 * scale * wave)
+            flat = silhouette.screen_factors(table, runs, heights, every, per_m_of)
+            factors = flat.reshape((shifts.shape[1], count))
+            weights = nodes.weights[first : first + count]
+            for e in range(shifts.shape[1]):
+                _times(out[p, e // n_rx, e % n_rx], factors[e], weights)
+
+
+@numba.njit(cache=True)
+def _choice(counts: np.ndarray, degree: float) -> int:
+    """Which number of nodes tells a wave that turns by ± `degree` [rad] over the band.
+
+    Its Chebyshev coefficients are Bessel functions J_n of the degree, 5e-4 or less from there on.
+    """
+    least = degree + 1.5 * np.cbrt(degree) + 3.0
+    choice = 0
+    while choice < len(counts) - 1 and counts[choice] < least:
+        choice += 1
+    return choice
+
+
+@numba.njit(cache=True)
+def _times(out: np.ndarray, factors: np.ndarray, weights: np.ndarray) -> None:
+    """Multiplies into `out` the polynomial through some factors, or these where it has none."""
+    if not len(weights):
+        for g in range(len(out)):
+            out[g] *= factors[g]
+        return
+    real, imaginary = np.zeros(len(out)), np.zeros(len(out))
+    for n in range(len(factors)):
+        row, re, im = weights[n], factors[n].real, factors[n].imag
+        for g in range(len(row)):
+            real[g] += row[g] * re
+            imaginary[g] += row[g] * im
+    for g in range(len(out)):
+        out[g] *= complex(real[g], imaginary[g])

@@ -20,6 +20,8 @@ NUM_ROWS = 160
 FAR = 10.0
 #: Beyond this coordinate a silhouette counts as unbounded.
 WINDOW = 20.0
+#: And so it does, relative to how far silhouettes matter at all, on weaker paths.
+WINDOW_PER_REACH = WINDOW / FAR
 _TABLE_END = 30.0
 _TABLE_PER_UNIT = 512
 #: Gaps between triangles smaller than this are rounding, not light [m].
@@ -40,12 +42,17 @@ FRESNEL = _fresnel_table()
 
 @numba.njit(cache=True, fastmath={"contract", "nsz"})
 def _add_fresnel(
-    table: np.ndarray, edge: float, shift: np.ndarray, per_m: float, sign: float, out: np.ndarray
+    table: np.ndarray,
+    edge: float,
+    shift: np.ndarray,
+    per_m: np.ndarray,
+    sign: float,
+    out: np.ndarray,
 ) -> None:
     """Adds sign · F((edge − shift) · per_m) for many shifts; `out` holds real and imaginary."""
     last = table.shape[1] - 2
     for e in range(len(shift)):
-        nu = (edge - shift[e]) * per_m
+        nu = (edge - shift[e]) * per_m[e]
         place = min(abs(nu) * _TABLE_PER_UNIT, last - 0.0)
         i = np.int32(place)
         share = place - i
@@ -236,34 +243,78 @@ def runs_of(
 
 
 @numba.njit(cache=True)
+def _add_boundary(
+    table: np.ndarray,
+    edge: float,
+    shift: np.ndarray,
+    per_m: np.ndarray,
+    below: np.ndarray,
+    above: np.ndarray,
+    at: np.ndarray,
+    total: np.ndarray,
+) -> None:
+    """Adds F at the boundary of two rows times what the lower one has more; `at` is scratch."""
+    at[:] = 0.0
+    _add_fresnel(table, edge, shift, per_m, 1.0, at)
+    for e in range(len(total)):
+        re, im = below[0, e] - above[0, e], below[1, e] - above[1, e]
+        total[e] += complex(at[0, e] * re - at[1, e] * im, at[0, e] * im + at[1, e] * re)
+
+
+@numba.njit(cache=True)
 def screen_factors(
-    table: np.ndarray, runs: np.ndarray, heights: np.ndarray, shifts: np.ndarray, per_m: float
+    table: np.ndarray, runs: np.ndarray, heights: np.ndarray, shifts: np.ndarray, per_m: np.ndarray
 ) -> np.ndarray:
-    """Kirchhoff factors T of a silhouette for several lines through its plane.
+    """Kirchhoff factors T of a silhouette for lines through its plane, each at its frequency.
 
     Args:
         table: `FRESNEL`.
         runs: Runs of the silhouette [m], shape (N, 2).
         heights: Rows of the runs [m], shape (N, 2).
         shifts: Where each line crosses the plane [m], rows x and y, shape (2, line).
-        per_m: Fresnel coordinate per metre, √(2 s/λ).
+        per_m: Fresnel coordinate per metre for each line, √(2 s/λ), shape (line,).
 
     Returns:
         Factors on the amplitudes, complex128, shape (line,); 1 without a silhouette.
     """
+    # The integral over y of each row is a difference of two values, so that each boundary
+    # between rows takes one value, times how the rows differ.
     total = np.zeros(shifts.shape[1], dtype=np.complex128)
-    across, row = np.zeros((2, shifts.shape[1])), np.zeros((2, shifts.shape[1]))
+    shape = (2, shifts.shape[1])
+    across, before, at = np.zeros(shape), np.zeros(shape), np.zeros(shape)
     for i in range(len(runs) + 1):
-        if i == len(runs) or (i > 0 and heights[i, 0] != heights[i - 1, 0]):
-            row[:] = 0.0
-            _add_fresnel(table, heights[i - 1, 1], shifts[1], per_m, 1.0, row)
-            _add_fresnel(table, heights[i - 1, 0], shifts[1], per_m, -1.0, row)
-            total += (row[0] + 1j * row[1]) * (across[0] + 1j * across[1])
+        first = i == 0 or i == len(runs) or heights[i, 0] != heights[i - 1, 0]
+        if first and i > 0:
+            _add_boundary(table, heights[i - 1, 0], shifts[1], per_m, before, across, at, total)
+            before, across = across, before
             across[:] = 0.0
+            if i == len(runs) or heights[i, 0] != heights[i - 1, 1]:
+                _add_boundary(table, heights[i - 1, 1], shifts[1], per_m, before, across, at, total)
+                before[:] = 0.0
         if i < len(runs):
             _add_fresnel(table, runs[i, 1], shifts[0], per_m, 1.0, across)
             _add_fresnel(table, runs[i, 0], shifts[0], per_m, -1.0, across)
     return 1.0 - 0.5j * total
+
+
+@numba.njit(cache=True)
+def farthest(runs: np.ndarray, heights: np.ndarray, shifts: np.ndarray) -> float:
+    """Distance of the farthest corner within bounds from any of the lines' crossings [m].
+
+    Args:
+        runs: As `runs_of` gives them.
+        heights: Likewise.
+        shifts: As `screen_factors` takes them.
+    """
+    most = 0.0
+    ways = np.abs(shifts[0]).max(), np.abs(shifts[1]).max()
+    for i in range(len(runs)):
+        for x in runs[i]:
+            for y in heights[i]:
+                across = abs(x) + ways[0] if math.isfinite(x) else 0.0
+                along = abs(y) + ways[1] if math.isfinite(y) else 0.0
+                most = max(most, math.sqrt(across * across + along * along))
+    return most
 
 
 @numba.njit(cache=True)

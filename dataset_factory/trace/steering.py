@@ -10,6 +10,7 @@ seen from each end. Amplitudes scale with the changed distance.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numba
 import numpy as np
@@ -76,6 +77,20 @@ def steer(
             )
     out[~layout.measured] = 0.0
     return out
+
+
+def resampled(paths: PathSet, nodes_hz: np.ndarray, grid_hz: np.ndarray) -> PathSet:
+    """The same paths with the amplitudes that `steer` would take at other frequencies.
+
+    Args:
+        paths: Paths with amplitudes at nodes.
+        nodes_hz: These nodes [Hz], ascending.
+        grid_hz: Frequencies between them [Hz], shape (grid,).
+    """
+    left, share = _interpolation(grid_hz, nodes_hz)
+    right = np.minimum(left + 1, len(nodes_hz) - 1)
+    known = paths.amplitude
+    return replace(paths, amplitude=(1.0 - share) * known[..., left] + share * known[..., right])
 
 
 def _interpolation(freq_hz: np.ndarray, nodes_hz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from dataset_factory.trace.bodies import Bodies
 from dataset_factory.trace.bounces import with_facets
-from dataset_factory.trace.environment import node_frequencies
+from dataset_factory.trace.environment import WIDE_BAND_NODES, node_frequencies
 from dataset_factory.trace.held import Trace
 from dataset_factory.trace.met import Met, doppler_hz
 from dataset_factory.trace.patches import (
@@ -22,6 +22,7 @@ from dataset_factory.trace.patches import (
 from dataset_factory.trace.paths import PathSet, empty, merged
 from dataset_factory.trace.scene import centres, owners
 from dataset_factory.trace.shadow import Outline, Shadow, transmission
+from dataset_factory.trace.steering import resampled
 from rfgs_core.radio import Layout, Radio
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.images import SCATTERING
@@ -49,6 +50,16 @@ def centre_layout(layout: Layout) -> Layout:
     return Layout(**kept, measured=layout.measured[np.ix_(tx, rx)])
 
 
+def table_frequencies(radio: Radio) -> np.ndarray:
+    """Frequencies of a table's amplitudes [Hz].
+
+    Nine over a band over which walls need fewer: shadows are then linear in between to 0.001 at
+    160 MHz around 5.8 GHz, for silhouettes up to a Fresnel coordinate of 10.
+    """
+    count = max(len(node_frequencies(radio)), WIDE_BAND_NODES)
+    return np.linspace(radio.freq_min_hz, radio.freq_max_hz, count)
+
+
 class TableMaker:
     """Turns what was traced into tables."""
 
@@ -58,7 +69,7 @@ class TableMaker:
         self._radio, self._devices = radio, devices
         self._layout, self._centres = layout, centre_layout(layout)
         self._shadow: Shadow = shadow
-        self._nodes = node_frequencies(radio)
+        self._nodes = table_frequencies(radio)
         self._wavelength_m = SPEED_OF_LIGHT / radio.centre_hz
 
     def environment(
@@ -78,10 +89,11 @@ class TableMaker:
         """
         if not len(paths):
             return self._table(paths, np.zeros((0, 0), np.int32), np.zeros(0))
+        paths = resampled(paths, node_frequencies(self._radio), self._nodes)
         amplitude = paths.amplitude * (self._radio.centre_hz / self._nodes)
         if outlines:
             passed = transmission(paths, self._centres, outlines, self._nodes, self._shadow)
-            amplitude = amplitude * passed[:, 0, 0, None, :]
+            amplitude[passed.path] *= passed.factor[:, 0, 0, None, :]
         turns = np.zeros(len(paths))
         if vehicles is not None:
             velocity = met.velocity(paths, *vehicles)

@@ -196,7 +196,7 @@ class Tracer(BaseTracer):
         passed = None
         if outlines:
             with self._timed("shadow"):
-                passed = transmission(paths, self._layout, outlines, self._nodes, self._shadow)
+                passed = transmission(paths, self._layout, outlines, self._grid, self._shadow)
         with self._timed("environment"):
             return environment_channel(paths, self._radio, self._layout, passed)
 

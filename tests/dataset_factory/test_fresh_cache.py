@@ -16,6 +16,7 @@ os.environ["NUMBA_CACHE_DIR"] = sys.argv[1]
 import numpy as np, torch
 from dataset_factory.trace import silhouette
 from dataset_factory.trace.facets import facet_sum
+from dataset_factory.trace.nodes import nodes_for
 from dataset_factory.trace.shadow import _shade
 from dataset_factory.trace.steering import _steer
 from rfgs_core.propagation import EnvironmentPaths, Links, Tones, scatter, shadow
@@ -55,8 +56,8 @@ past = np.ones((20, 4, 8, 5), dtype=np.complex128)
 _shade(
     corners, np.ones((20, 1), dtype=bool),
     (still, still, turn, turn, np.full(20, silhouette.FAR)),
-    rng.normal(size=(20, 4, 3)) * 0.1, rng.normal(size=(20, 8, 3)) * 0.1,
-    body, np.arange(600).reshape(3, 200).T.copy(), 3e8 / np.linspace(5.7e9, 5.9e9, 5),
+    (rng.normal(size=(20, 4, 3)) * 0.1, rng.normal(size=(20, 8, 3)) * 0.1),
+    body, np.arange(600).reshape(3, 200).T.copy(), nodes_for(np.linspace(5.7e9, 5.9e9, 5)),
     silhouette.FRESNEL, False, past,
 )
 assert np.abs(past - 1).max() > 0.1, "expected a shadow"

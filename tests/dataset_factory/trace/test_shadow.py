@@ -42,7 +42,10 @@ def shaded(
     paths: PathSet, layout: Layout, body: tuple[np.ndarray, np.ndarray], mode: str = "kirchhoff"
 ) -> np.ndarray:
     everywhere = np.ones((len(paths), paths.vertices.shape[1] - 1), bool)
-    return transmission(paths, layout, [Outline(*body, everywhere)], FREQ_HZ, mode)
+    passed = transmission(paths, layout, [Outline(*body, everywhere)], FREQ_HZ, mode)
+    out = np.ones((len(paths), *passed.factor.shape[1:]), np.complex128)
+    out[passed.path] = passed.factor
+    return out
 
 
 def factor(body: tuple[np.ndarray, np.ndarray], mode: str = "kirchhoff") -> complex:

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Shadows at every subcarrier of every preset, against closed forms of rectangles."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.special import fresnel
+
+from dataset_factory.trace.environment import environment_channel, node_frequencies
+from dataset_factory.trace.nodes import COUNTS, fine_grid, nodes_for
+from dataset_factory.trace.paths import PathSet
+from dataset_factory.trace.shadow import Outline, transmission
+from rfgs_core.radio import PRESETS, Layout, Radio, preset
+from rfgs_core.radio.constants import SPEED_OF_LIGHT
+
+D_1, D_2 = 2.5, 3.5
+#: Rectangles in Fresnel coordinates at the top of the band: x from and to, y from and to. A
+#: person beside the path, far from it, across it, a limb, a corner that just reaches in.
+RECTANGLES = [
+    (0.8, 2.9, -9.0, 4.0),
+    (-1.2, 1.0, -12.0, 3.0),
+    (7.5, 9.9, -11.0, 6.0),
+    (9.6, 14.0, -3.0, 3.0),
+    (-9.9, -9.3, -13.0, 13.0),
+    (-0.2, 0.3, -9.5, -0.4),
+    (3.0, 17.0, 2.0, 16.0),
+    (-13.0, 13.0, -12.0, -9.0),
+]
+
+
+def fresnel_integral(nu: np.ndarray) -> np.ndarray:
+    """∫_0^ν e^{−jπt²/2} dt."""
+    sine, cosine = fresnel(nu)
+    return cosine - 1j * sine
+
+
+def rectangle_factor(box: tuple[float, ...], freq_hz: np.ndarray, top_hz: float) -> np.ndarray:
+    """Kirchhoff factor of an opaque rectangle, given in coordinates at the band's top."""
+    scale = np.sqrt(freq_hz / top_hz)
+    x, y = (
+        fresnel_integral(high * scale) - fresnel_integral(low * scale)
+        for low, high in (box[:2], box[2:])
+    )
+    return 1.0 - 0.5j * x * y
+
+
+def straight(radio: Radio) -> tuple[PathSet, Layout]:
+    """One direct path of unit amplitude along x."""
+    zero, none = np.zeros(1, np.int64), np.zeros((1, 0), np.int64)
+    ends = np.array([[[0.0, 0.0, 0.0], [D_1 + D_2, 0.0, 0.0]]])
+    amplitude = np.ones((1, 1, len(node_frequencies(radio))), np.complex128)
+    upright = np.array([[1.0, 0.0, 0.0, 0.0]])
+    elements = Layout(
+        ends[:, 0], ends[:, 1], zero, zero, zero, np.ones((1, 1), bool), zero, zero, zero, zero,
+        upright, upright,
+    )  # fmt: skip
+    return PathSet(zero, zero, amplitude, ends, none, none, none), elements
+
+
+def screen(box: tuple[float, ...], top_hz: float) -> tuple[np.ndarray, np.ndarray]:
+    """The rectangle as a mesh across the path, D_1 from its start."""
+    per_m = np.sqrt(2.0 * (1 / D_1 + 1 / D_2) * top_hz / SPEED_OF_LIGHT)
+    x0, x1, y0, y1 = np.array(box) / per_m
+    corners = [[D_1, x0, y0], [D_1, x1, y0], [D_1, x1, y1], [D_1, x0, y1]]
+    return np.array(corners), np.array([[0, 1, 2], [0, 2, 3]])
+
+
+@pytest.mark.parametrize("name", sorted(PRESETS))
+@pytest.mark.parametrize("box", RECTANGLES)
+def test_every_subcarrier_is_shaded_as_the_closed_form_says(name: str, box) -> None:
+    radio = preset(name)
+    paths, elements = straight(radio)
+    free = environment_channel(paths, radio, elements)[0, 0]
+    outline = Outline(*screen(box, radio.freq_max_hz), np.ones((1, 1), bool))
+    grid = fine_grid(node_frequencies(radio))
+    passed = transmission(paths, elements, [outline], grid, "kirchhoff")
+    found = environment_channel(paths, radio, elements, passed)[0, 0] / free
+    expected = rectangle_factor(box, radio.freq_hz, radio.freq_max_hz)
+    assert np.abs(expected - 1.0).max() > 0.005
+    assert np.abs(found - expected).max() < 0.003
+
+
+def test_two_bodies_shade_one_after_the_other() -> None:
+    radio = preset("mmwave")
+    paths, elements = straight(radio)
+    boxes = RECTANGLES[0], RECTANGLES[2]
+    grid = fine_grid(node_frequencies(radio))
+    outlines = [Outline(*screen(box, radio.freq_max_hz), np.ones((1, 1), bool)) for box in boxes]
+    passed = transmission(paths, elements, outlines, grid, "kirchhoff")
+    single = [rectangle_factor(box, grid, radio.freq_max_hz) for box in boxes]
+    assert np.abs(passed.factor[0, 0, 0] - single[0] * single[1]).max() < 0.003
+
+
+def test_what_nothing_is_near_to_is_not_computed() -> None:
+    radio = preset("wifi")
+    paths, elements = straight(radio)
+    grid = fine_grid(node_frequencies(radio))
+    vertices, faces = screen((-1.0, 1.0, -1.0, 1.0), radio.freq_max_hz)
+    everywhere = np.ones((1, 1), bool)
+    # Far to the side, behind the receiver, and before the transmitter.
+    for away in ([0.0, 5.0, 0.0], [5.0, 0.0, 0.0], [-4.0, 0.0, 0.0]):
+        outline = Outline(vertices + away, faces, everywhere)
+        assert len(transmission(paths, elements, [outline], grid, "kirchhoff").path) == 0
+    here = Outline(vertices, faces, everywhere)
+    assert transmission(paths, elements, [here], grid, "kirchhoff").path.tolist() == [0]
+    hidden = replace(here, beside=np.zeros((1, 1), bool))
+    assert len(transmission(paths, elements, [hidden], grid, "kirchhoff").path) == 0
+
+
+def test_polynomials_pass_through_their_nodes() -> None:
+    grid = np.linspace(60e9, 64e9, 49)
+    nodes = nodes_for(grid)
+    middle, half = 62e9, 2e9
+    first = 0
+    for count in nodes.counts[:-1]:
+        weights = nodes.weights[first : first + count]
+        x = (nodes.hz[first : first + count] - middle) / half
+        for power in range(count):
+            found = x**power @ weights
+            np.testing.assert_allclose(found, ((grid - middle) / half) ** power, atol=1e-9)
+        first += count
+    assert [*nodes.counts[:-1]] == [count for count in COUNTS if count < len(grid)]
+    np.testing.assert_array_equal(nodes.hz[first:], grid)

@@ -50,7 +50,8 @@ WIDE_BAND_NODES = 9
 NODE_SPACING_HZ = 0.125e9
 #: Receiving sites per call, which bounds memory to 1.5 GB.
 SITES_AT_ONCE = 8
-#: Frequencies of a narrow band, where only the shadow changes.
+#: Frequencies of a narrow band: over 160 MHz at 5.8 GHz a slab of 12.5 mm plasterboard, half a
+#: wave thick, changes paths by −37 dB of the channel.
 NARROW_BAND_NODES = 3
 
 
@@ -129,7 +130,7 @@ class Environment:
             add_antennas(self._scene, self._layout, self._devices, group)
             parts.append(self._at_nodes(self._specular(found, group), group))
             if self._scatters:
-                rays = self._at_nodes(self._scattered, group)
+                rays = self._at_centre(self._scattered, group)
                 parts.append(rays.select((rays.kinds == DIFFUSE).any(axis=1)))
         return merged(parts)
 
@@ -157,11 +158,15 @@ class Environment:
 
     def _at_nodes(self, traced: Callable[[float], rt.Paths], group: Group) -> PathSet:
         """Paths between the sites of a group with one amplitude for each node frequency."""
+        nodes = node_frequencies(self._radio)
+        return joined([self._read(traced(float(f)), group, float(f)) for f in nodes])
+
+    def _at_centre(self, traced: Callable[[float], rt.Paths], group: Group) -> PathSet:
+        """The same of rays, with the amplitudes of a narrow band's centre throughout."""
         nodes, centre_hz = node_frequencies(self._radio), self._radio.centre_hz
         if self._radio.bandwidth_hz / centre_hz > WIDE_BAND:
-            return joined([self._read(traced(float(f)), group, float(f)) for f in nodes])
+            return self._at_nodes(traced, group)
         at_centre = self._read(traced(centre_hz), group, centre_hz)
-        # Walls hardly change over a narrow band.
         return replace(at_centre, amplitude=np.repeat(at_centre.amplitude, len(nodes), axis=2))
 
     def _read(self, paths: rt.Paths, group: Group, freq_hz: float) -> PathSet:

@@ -17,7 +17,9 @@ from rfgs_core.errors import RfgsError
 #: Name on the command line → module of this package and about how long it takes [s].
 GROUPS: dict[str, tuple[str, float]] = {
     "friis": ("friis", 15.0),
-    "box": ("box", 40.0),
+    "box": ("box", 20.0),
+    "reciprocity": ("reciprocity", 30.0),
+    "targets": ("targets", 30.0),
 }
 
 

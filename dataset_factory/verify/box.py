@@ -11,7 +11,7 @@ from dataset_factory.verify.card import Curve, Group, Plot, Row, within
 from dataset_factory.verify.closed_forms import C, db, error_db
 from dataset_factory.verify.description import MARKER, Description, Device, room, stepping
 from dataset_factory.verify.images import Box, box_channel, delays_s
-from dataset_factory.verify.tracing import Links, static_links
+from dataset_factory.verify.tracing import Links, single, static_links
 from dataset_factory.verify.workshop import Workshop, devices_of
 from rfgs_core.radio import Radio, preset
 
@@ -34,12 +34,6 @@ def scene(box: Box) -> Description:
     )
     walls = room(box.size_m, box.material, box.thickness_m)
     return Description((*walls, stepping(MARKER, [(2.0, 1.4, 0.4), (2.2, 1.4, 0.4)])), devices)
-
-
-def single(radio: Radio, **fields: object) -> Radio:
-    """A radio of one element each way, at one place, that hears the other devices alone."""
-    alone = {"tx_rows": 1, "tx_cols": 1, "rx_rows": 1, "rx_cols": 1, "tx_offset_m": (0.0, 0.0, 0.0)}
-    return replace(radio, **{**alone, "own_device_links": "excluded", **fields})
 
 
 def verify(workshop: Workshop, built: Box = CONCRETE) -> Group:

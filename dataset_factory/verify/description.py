@@ -30,8 +30,9 @@ class Part:
     """Euler angles about x, then y, then z [deg]."""
     cells: int = 1
     """Quads along each side of a face; of a ball, subdivisions of an icosahedron."""
-    kind: Literal["STATIC", "PERSON", "VEHICLE"] = "STATIC"
-    """What it is to the radio: scenery, facets that scatter and shade, or rigid metal."""
+    kind: Literal["STATIC", "PERSON", "AUTO", "VEHICLE"] = "STATIC"
+    """What it is to the radio: scenery, facets that scatter and shade (a person, or whatever else
+    moves), or rigid metal."""
     keys: tuple[tuple[int, Place, float], ...] = ()
     """Frame, centre [m] and angle about z [deg]; it moves evenly in between."""
 

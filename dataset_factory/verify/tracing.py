@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from dataset_factory.bundle import Bundle
+from dataset_factory.verify.workshop import devices_of
 from rfgs_core.radio import DevicePose, Layout, Radio, layout
 
 #: Arrays nearly one above the other have no defined sign of a vertical polarisation.
@@ -73,3 +75,45 @@ def links(elements: Layout, csi: np.ndarray) -> Links:
         elements.rx_xyz[rx],
         np.abs(way[:, 2]) > STEEP * np.linalg.norm(way, axis=1),
     )
+
+
+def single(radio: Radio, **fields: Any) -> Radio:
+    """A radio of one element each way at one place, which hears other devices alone.
+
+    Args:
+        radio: Gives the band and everything that `fields` does not.
+        **fields: Further fields of the radio.
+    """
+    alone = {"tx_rows": 1, "tx_cols": 1, "rx_rows": 1, "rx_cols": 1, "tx_offset_m": (0.0, 0.0, 0.0)}
+    return replace(radio, **{**alone, "own_device_links": "excluded", **fields})
+
+
+def monostatic(radio: Radio, tones: int, **fields: Any) -> Radio:
+    """A radio of one element each way, 5 cm apart, that all but hears nothing of its own way there.
+
+    Args:
+        radio: Gives the band and everything that `fields` does not.
+        tones: Number of subcarriers.
+        **fields: Further fields of the radio.
+    """
+    near = {"tx_offset_m": (0.0, 0.0, -0.05), "isolation_db": 100.0, "own_device_links": "included"}
+    return single(radio, **{**near, "num_subcarriers": tones, **fields})
+
+
+def echoes(bundle: Bundle, radio: Radio, depth: int = 1, seed: int = 0) -> np.ndarray:
+    """What moving things add to the channel of each frame, without the shadows that they cast.
+
+    Args:
+        bundle: Scene bundle.
+        radio: Its radio.
+        depth: Interactions of their paths.
+        seed: Root seed.
+
+    Returns:
+        Complex128, shape (frame, tx, rx, subcarrier).
+    """
+    from dataset_factory.trace import Tracer
+
+    tracer = Tracer(bundle, radio, devices_of(bundle, radio), depth=depth, shadow="hard", seed=seed)
+    static = tracer.static().astype(np.complex128)
+    return np.stack([tracer.frame(bundle.frame(frame)) - static for frame in bundle.frames])

@@ -19,7 +19,9 @@ GROUPS: dict[str, tuple[str, float]] = {
     "friis": ("friis", 15.0),
     "box": ("box", 20.0),
     "reciprocity": ("reciprocity", 30.0),
-    "targets": ("targets", 30.0),
+    "targets": ("targets", 15.0),
+    "delay": ("delay", 20.0),
+    "energy": ("energy", 10.0),
 }
 
 

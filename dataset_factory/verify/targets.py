@@ -55,7 +55,7 @@ def plate(distance_m: float) -> Description:
 
 def cube(cells: int) -> Description:
     """A cube of metal that turns from frame to frame, with devices around it."""
-    part = Part("cube", "box", (CUBE_M,) * 3, cells=cells, kind="AUTO")
+    part = Part("cube", "box", (CUBE_M, CUBE_M, CUBE_M), cells=cells, kind="AUTO")
     turning = stepping(part, [CUBE_AT] * len(YAWS_DEG), YAWS_DEG)
     places = ((0.0, 0.0), (0.0, 1.0), (0.0, 3.0), (0.0, 7.0), (30.0, 12.0), (45.0, 12.0))
     devices = tuple(_device(f"{n}", *place) for n, place in enumerate(places))
@@ -64,7 +64,7 @@ def cube(cells: int) -> Description:
 
 def ball() -> Description:
     """A ball of metal that turns from frame to frame."""
-    part = Part("ball", "ball", (2 * RADIUS_M,) * 3, cells=5, kind="AUTO")
+    part = Part("ball", "ball", (2 * RADIUS_M, 2 * RADIUS_M, 2 * RADIUS_M), cells=5, kind="AUTO")
     yaws = [17.0 * n for n in range(8)]
     x, y, z = SPHERE_AT
     device = Device("a", (x + RADIUS_M + BEFORE_M, y, z))
@@ -101,7 +101,7 @@ def _plate_far(workshop: Workshop, radio: Radio) -> list[Row]:
     bundle = workshop.bundle(plate(12.0))
     found = echoes(bundle, radio)[0]
     elements = layout(radio, devices_of(bundle, radio))
-    face = np.array(PLATE_AT) + [0.0, PLATE_M[1] / 2, 0.0]
+    face = np.array([PLATE_AT[0], PLATE_AT[1] + PLATE_M[1] / 2, PLATE_AT[2]])
     ways = (np.linalg.norm(xyz[0] - face) for xyz in (elements.tx_xyz, elements.rx_xyz))
     sigma = cross_section(_own(elements, found), radio.freq_hz, float(np.prod(list(ways))))
     area, wavelength = PLATE_M[0] * PLATE_M[2], 299_792_458.0 / radio.freq_hz
@@ -119,10 +119,10 @@ def _plate(workshop: Workshop, name: str, radio: Radio, phase_deg: float) -> lis
     ends = elements.tx_xyz[0], elements.rx_xyz[0]
     exact = METAL * scattered([cuboid(PLATE_M, PLATE_AT)], *ends, radio.freq_hz)
     got = _own(elements, found)
-    levels = (10 * np.log10(np.mean(np.abs(h) ** 2)) for h in (exact, got))
+    level, measured = (float(10 * np.log10(np.mean(np.abs(h) ** 2))) for h in (exact, got))
     turned = abs(float(np.degrees(np.angle(np.sum(got * exact.conj())))))
     return [
-        near(f"plate, {name}, level", *levels, LEVEL_DB, "dB", PO),
+        near(f"plate, {name}, level", level, measured, LEVEL_DB, "dB", PO),
         within(f"plate, {name}, phase error", turned, phase_deg, "°", PO),
     ]
 

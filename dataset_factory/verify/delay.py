@@ -5,10 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from dataset_factory.bundle import Bundle
 from dataset_factory.verify.card import Curve, Group, Plot, within
@@ -48,7 +46,7 @@ def verify(workshop: Workshop) -> Group:
         limit_mm = 1e3 * 0.5 * radio.range_resolution_m
         static, change = _links(bundle, radio)
         echo_m = np.array(
-            [sphere_path_m(t, r) for t, r in zip(change.tx_xyz, change.rx_xyz, strict=True)]
+            [sphere_path_m(t, r, np.array(CENTRE), RADIUS_M) for t, r in zip(change.tx_xyz, change.rx_xyz, strict=True)]
         )
         for what, found, path_m in (
             ("straight way", static, static.distance_m),
@@ -69,28 +67,6 @@ def verify(workshop: Workshop) -> Group:
         rows,
         plots,
     )
-
-
-def sphere_path_m(tx: np.ndarray, rx: np.ndarray) -> float:
-    """Length of the way from one place to another by the surface of the sphere [m].
-
-    The point of reflection lies in the plane of both places and the centre, where the way is
-    shortest.
-    """
-    a, b = tx - np.array(CENTRE), rx - np.array(CENTRE)
-    u = a / np.linalg.norm(a)
-    across = b - (b @ u) * u
-    size = np.linalg.norm(across)
-    v = across / size if size > 1e-9 else np.zeros(3)
-    opening = float(np.arctan2(b @ v, b @ u))
-
-    def length(angle: float) -> float:
-        point = RADIUS_M * (np.cos(angle) * u + np.sin(angle) * v)
-        return float(np.linalg.norm(a - point) + np.linalg.norm(b - point))
-
-    bounds = (min(0.0, opening) - 1e-9, max(0.0, opening) + 1e-9)
-    found: Any = minimize_scalar(length, bounds=bounds, method="bounded")
-    return float(found.fun)
 
 
 def profile(channel: np.ndarray, radio: Radio) -> tuple[np.ndarray, np.ndarray]:

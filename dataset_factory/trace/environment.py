@@ -28,6 +28,7 @@ from rfgs_core.radio import Layout, Radio
 from rfgs_core.radio.images import DIFFUSE
 from rfgs_core.radio.layout import DevicePose
 from rfgs_core.simulate import (
+    Faces,
     SpecularPaths,
     Surroundings,
     faces_of,
@@ -75,6 +76,7 @@ class Environment:
         devices: list[DevicePose],
         seed: int,
         vehicles: Movers | None = None,
+        faces: Callable[..., Faces] = faces_of,
     ) -> None:
         """Builds the scene.
 
@@ -85,10 +87,12 @@ class Environment:
             devices: Poses of the devices.
             seed: Seed of the rays, the same for a whole sequence.
             vehicles: Rigid metal that `paths` moves; None leaves everything that moves out.
+            faces: Gathers the scene's triangles into faces that mirror; `faces_of` with other
+                numbers shows whether its own are enough.
         """
         self._radio, self._layout, self._seed = radio, layout, seed
         self._devices, self._groups = devices, groups(layout)
-        self._vehicles = vehicles
+        self._vehicles, self._faces = vehicles, faces
         self._scatters = any(row["scattering_coefficient"] > 0.0 for row in bundle.materials)
         self._scene = environment_scene(bundle, radio, vehicles)
         self.meshes = SceneMeshes(bundle, vehicles)
@@ -122,7 +126,7 @@ class Environment:
         """
         if self._vehicles is not None and vertices is not None:
             move_vehicles(self._scene, self._vehicles, vertices)
-        faces = faces_of(*self.meshes.triangles(vertices))
+        faces = self._faces(*self.meshes.triangles(vertices))
         self.around = surroundings(faces, *centres(self._layout))
         found = specular_paths(self.around, measured_pairs(self._layout), MAX_DEPTH)
         parts = []

@@ -20,10 +20,12 @@ GROUPS: dict[str, tuple[str, float]] = {
     "box": ("box", 20.0),
     "reciprocity": ("reciprocity", 30.0),
     "targets": ("targets", 15.0),
-    "shadow": ("shadow", 30.0),
+    "shadow": ("shadow", 45.0),
     "doppler": ("doppler", 20.0),
     "delay": ("delay", 12.0),
-    "energy": ("energy", 10.0),
+    "energy": ("energy", 5.0),
+    "pictures": ("pictures", 20.0),
+    "convergence": ("convergence", 60.0),
 }
 
 

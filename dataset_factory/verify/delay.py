@@ -45,9 +45,8 @@ def verify(workshop: Workshop) -> Group:
         # Half a range bin c/(2B) of range, which is half of the path there and back.
         limit_mm = 1e3 * 0.5 * radio.range_resolution_m
         static, change = _links(bundle, radio)
-        echo_m = np.array(
-            [sphere_path_m(t, r, np.array(CENTRE), RADIUS_M) for t, r in zip(change.tx_xyz, change.rx_xyz, strict=True)]
-        )
+        ends, middle = zip(change.tx_xyz, change.rx_xyz, strict=True), np.array(CENTRE)
+        echo_m = np.array([sphere_path_m(t, r, middle, RADIUS_M) for t, r in ends])
         for what, found, path_m in (
             ("straight way", static, static.distance_m),
             ("echo of a sphere", change, echo_m),

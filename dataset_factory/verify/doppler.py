@@ -34,8 +34,10 @@ def scene(way: str) -> Description:
     part = Part("ball", "ball", (2 * RADIUS_M, 2 * RADIUS_M, 2 * RADIUS_M), cells=5, kind="AUTO")
     places = [_place(start + velocity * n / FPS) for n in range(3)]
     if way == "bistatic":
-        ends = ("TRANSMITTER", (0.0, 0.0, 1.2)), ("RECEIVER", (4.0, 0.4, 1.9))
-        devices = tuple(Device(role, at, role=role) for role, at in ends)
+        devices = (
+            Device("a", (0.0, 0.0, 1.2), role="TRANSMITTER"),
+            Device("b", (4.0, 0.4, 1.9), role="RECEIVER"),
+        )
     else:
         devices = (Device("a", (0.0, 0.0, 1.2)),)
     return Description((stepping(part, places),), devices, frames=3, fps=FPS)
@@ -74,7 +76,7 @@ def verify(workshop: Workshop) -> Group:
     )
 
 
-def _packets(workshop: Workshop, way: str, radio: Radio) -> tuple[tuple[float, ...], Plot]:
+def _packets(workshop: Workshop, way: str, radio: Radio) -> tuple[tuple[float, float, float], Plot]:
     """Expected and found shift and its tolerance [Hz], and the phases over time."""
     from dataset_factory.trace import Tracer
 

@@ -19,8 +19,9 @@ from rfgs_core.radio import Radio, preset
 FACTOR, GRAZING_DB = 0.01, 0.1
 #: Distances of the screen from transmitter and receiver [m]. Beyond 20 Fresnel zones a screen
 #: counts as unbounded, so these are short.
-D_1, D_2 = 0.9, 1.1
-HEIGHT_M, MIDDLE_M = 4.8, 2.5
+D_1, D_2, MIDDLE_M = 0.9, 1.1, 2.5
+#: Half the extent of an unbounded screen in Fresnel zones, at the highest frequency.
+UNBOUNDED = 22.0
 #: Places of the edge in Fresnel coordinates at the middle of a band.
 NU = np.linspace(-3.0, 3.0, 13)
 SLAB_M = 0.4
@@ -34,13 +35,15 @@ class Screen:
 
     width_m: float
     """Its width [m]."""
+    height_m: float
+    """Its height [m], half above and half below the line."""
     edges_m: tuple[float, ...]
     """Where its upper edge across the line is in each frame [m]; 0 touches the line."""
 
     def scene(self) -> Description:
         """A sheet without rims, and devices on both sides of it."""
         places = [(D_1, edge - self.width_m / 2, MIDDLE_M) for edge in self.edges_m]
-        size = (HEIGHT_M, self.width_m, 0.0)
+        size = (self.height_m, self.width_m, 0.0)
         part = Part("screen", "sheet", size, turn_deg=(0.0, 90.0, 0.0), kind="PERSON")
         devices = (
             Device("a", (0.0, 0.0, MIDDLE_M), role="TRANSMITTER"),
@@ -83,19 +86,18 @@ def verify(workshop: Workshop) -> Group:
     }
     for name, radio in bands.items():
         edges = tuple(float(nu) for nu in NU / per_m(radio.centre_hz))
-        screen = Screen(5.0, edges)
-        found = _factors(workshop, screen, radio)
-        exact = knife_edge(np.outer(edges, per_m(radio.freq_hz)))
+        half_m = UNBOUNDED / float(per_m(radio.freq_max_hz))
+        found = _factors(workshop, Screen(half_m + edges[-1], 2.0 * half_m, edges), radio)
+        nu = np.outer(edges, per_m(radio.freq_hz))
+        exact = knife_edge(nu)
         rows.append(_worst(f"knife edge, {name}", found, exact, KNIFE))
         touching = np.mean(found[len(NU) // 2])
         label = f"knife edge at grazing, {name}"
         rows.append(near(label, -6.0206, float(db(touching)), GRAZING_DB, "dB", KNIFE))
         plots.append(_plot(f"Knife edge, {name}", found, exact, radio))
-        slab_edges = tuple(edge + SLAB_M / 2 for edge in np.linspace(-0.5, 0.5, 11))
-        slab = Screen(SLAB_M, slab_edges)
-        high = np.outer(slab_edges, per_m(radio.freq_hz))
-        exact = strip(high - SLAB_M * per_m(radio.freq_hz), high)
-        rows.append(_worst(f"slab of 40 cm, {name}", _factors(workshop, slab, radio), exact, SLAB))
+        found = _factors(workshop, Screen(SLAB_M, 2.0 * half_m, edges), radio)
+        exact = strip(nu - SLAB_M * per_m(radio.freq_hz), nu)
+        rows.append(_worst(f"slab of 40 cm, {name}", found, exact, SLAB))
     return Group(
         "shadow",
         "Shadows: knife edge and Fresnel slab",
@@ -108,7 +110,7 @@ def verify(workshop: Workshop) -> Group:
 
 
 def _factors(workshop: Workshop, screen: Screen, radio: Radio) -> np.ndarray:
-    """csi / csi_static of the only link, shape (frame, subcarrier)."""
+    """Csi / csi_static of the only link, shape (frame, subcarrier)."""
     from dataset_factory.trace import Tracer
 
     bundle = workshop.bundle(screen.scene())

@@ -19,6 +19,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "stats": ("stats", "StatsArgs"),
     "convert": ("convert", "ConvertArgs"),
     "bench": ("bench", "BenchArgs"),
+    "verify": ("verify", "VerifyArgs"),
 }
 
 _FIRST_STEPS = r"""A first dataset, about two minutes on two cores:

@@ -9,12 +9,15 @@ and at every frequency, which the solver could not do. Wall coefficients stay at
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
 import mitsuba as mi
 import numpy as np
 import sionna.rt as rt
+from sionna.rt.path_solvers.sb_candidate_generator import SBCandidateGenerator
 from sionna.rt.rcs import ConstantCPM, ConstantRCS, RCSSolver, ScatteringModel, SensingTarget
 
 from dataset_factory.trace.direct import PosedPoints
@@ -41,8 +44,9 @@ DEPTHS = (2, 3)
 #: Paths weaker than this share of the strongest are left out: facets damped to nothing.
 NEGLIGIBLE = 1e-4
 
-#: Places in which a point's legs are told apart; Sionna's default reserves 8 MB per point.
-TABLE = 4096
+#: Places in which a point's legs are told apart, 1 MB of them per point; Sionna's 10⁶ take 8 MB.
+#: Of 2¹⁵, legs worth −30 dB of some points' paths were lost to collisions, of 2¹⁶ none.
+TABLE = 1 << 17
 
 
 class JoiningSolver(RCSSolver):
@@ -57,8 +61,6 @@ class JoiningSolver(RCSSolver):
         """Takes which pairs of sites are measured, bool, shape (tx, rx), and the depth."""
         super().__init__(deterministic=True)
         self._measured = measured
-        # Of this generator alone: every other solver needs Sionna's own, or it loses paths.
-        self._candidate_generator.MIN_SPEC_COUNT_SIZE = TABLE
         if depth == 2:
             self._candidate_generator = self.legs = LegCandidates()
 
@@ -83,6 +85,20 @@ class JoiningSolver(RCSSolver):
         fits = walls_tx[tx] + walls_rx[rx] + 1 <= max_depth
         fits &= self._measured[device_tx[tx], device_rx[rx]]
         return mi.UInt(tx[fits].astype(np.uint32)), mi.UInt(rx[fits].astype(np.uint32))
+
+
+@contextmanager
+def _small_table() -> Iterator[None]:
+    """Sionna with `TABLE` places for each source, which it looks up on the class alone.
+
+    Put back at once: every other solver needs Sionna's own, or it loses paths.
+    """
+    own = SBCandidateGenerator.MIN_SPEC_COUNT_SIZE
+    SBCandidateGenerator.MIN_SPEC_COUNT_SIZE = TABLE
+    try:
+        yield
+    finally:
+        SBCandidateGenerator.MIN_SPEC_COUNT_SIZE = own
 
 
 class Bounces:
@@ -139,8 +155,10 @@ class Bounces:
             Amplitudes are those of points of unit cross-section; `primitives` of the sensing
             interaction is the index of the point.
         """
-        starts = range(0, len(points.areas), CHUNK)
-        found = merged([self._chunk(points.lifted[i : i + CHUNK], i, around) for i in starts])
+        # With two walls each point takes a table and room for many legs.
+        size = CHUNK if self._depth == 2 else CHUNK // 4
+        starts = range(0, len(points.areas), size)
+        found = merged([self._chunk(points.lifted[i : i + size], i, around) for i in starts])
         return follow(found, points.positions)
 
     def _chunk(self, places: np.ndarray, first: int, around: Surroundings) -> PathSet:
@@ -150,14 +168,15 @@ class Bounces:
         if self._depth == 2:
             legs, sites = mirror_legs(around, places), len(around.tx_xyz) + len(around.rx_xyz)
             room = self._solver.legs.prepare(self._scene, self._meshes, legs, len(places), sites)
-        paths = self._solver(
-            self._scene,
-            max_depth=self._depth,
-            samples_per_sp=NUM_SAMPLES,
-            buffer_size_per_sp=room,
-            synthetic_array=True,
-            seed=self._seed,
-        )
+        with _small_table():
+            paths = self._solver(
+                self._scene,
+                max_depth=self._depth,
+                samples_per_sp=NUM_SAMPLES,
+                buffer_size_per_sp=room,
+                synthetic_array=True,
+                seed=self._seed,
+            )
         tx_centres, rx_centres = centres(self._layout)
         found = path_set(paths, tx_centres, rx_centres)
         if not len(found):

@@ -29,6 +29,7 @@ from rfgs_core.radio import Layout, Radio
 from rfgs_core.radio.images import DIFFUSE
 from rfgs_core.radio.layout import DevicePose
 from rfgs_core.simulate import (
+    Faces,
     SpecularPaths,
     Surroundings,
     faces_of,
@@ -51,7 +52,8 @@ WIDE_BAND_NODES = 9
 NODE_SPACING_HZ = 0.125e9
 #: Receiving sites per call, which bounds memory to 1.5 GB.
 SITES_AT_ONCE = 8
-#: Frequencies of a narrow band, where only the shadow changes.
+#: Frequencies of a narrow band: over 160 MHz at 5.8 GHz a slab of 12.5 mm plasterboard, half a
+#: wave thick, changes paths by −37 dB of the channel.
 NARROW_BAND_NODES = 3
 
 
@@ -75,6 +77,7 @@ class Environment:
         devices: list[DevicePose],
         seed: int,
         vehicles: Movers | None = None,
+        faces: Callable[..., Faces] = faces_of,
     ) -> None:
         """Builds the scene.
 
@@ -85,10 +88,12 @@ class Environment:
             devices: Poses of the devices.
             seed: Seed of the rays, the same for a whole sequence.
             vehicles: Rigid metal that `paths` moves; None leaves everything that moves out.
+            faces: Gathers the scene's triangles into faces that mirror; `faces_of` with other
+                numbers shows whether its own are enough.
         """
         self._radio, self._layout, self._seed = radio, layout, seed
         self._devices, self._groups = devices, groups(layout)
-        self._vehicles = vehicles
+        self._vehicles, self._faces = vehicles, faces
         self._scatters = any(row["scattering_coefficient"] > 0.0 for row in bundle.materials)
         self._scene = environment_scene(bundle, radio, vehicles)
         self.meshes = SceneMeshes(bundle, vehicles)
@@ -122,7 +127,7 @@ class Environment:
         """
         if self._vehicles is not None and vertices is not None:
             move_vehicles(self._scene, self._vehicles, vertices)
-        faces = faces_of(*self.meshes.triangles(vertices))
+        faces = self._faces(*self.meshes.triangles(vertices))
         self.around = surroundings(faces, *centres(self._layout))
         found = specular_paths(self.around, measured_pairs(self._layout), MAX_DEPTH)
         parts = []
@@ -130,7 +135,7 @@ class Environment:
             add_antennas(self._scene, self._layout, self._devices, group)
             parts.append(self._at_nodes(self._specular(found, group), group))
             if self._scatters:
-                rays = self._at_nodes(self._scattered, group)
+                rays = self._at_centre(self._scattered, group)
                 parts.append(rays.select((rays.kinds == DIFFUSE).any(axis=1)))
         return merged(parts)
 
@@ -158,11 +163,15 @@ class Environment:
 
     def _at_nodes(self, traced: Callable[[float], rt.Paths], group: Group) -> PathSet:
         """Paths between the sites of a group with one amplitude for each node frequency."""
+        nodes = node_frequencies(self._radio)
+        return joined([self._read(traced(float(f)), group, float(f)) for f in nodes])
+
+    def _at_centre(self, traced: Callable[[float], rt.Paths], group: Group) -> PathSet:
+        """The same of rays, with the amplitudes of a narrow band's centre throughout."""
         nodes, centre_hz = node_frequencies(self._radio), self._radio.centre_hz
         if self._radio.bandwidth_hz / centre_hz > WIDE_BAND:
-            return joined([self._read(traced(float(f)), group, float(f)) for f in nodes])
+            return self._at_nodes(traced, group)
         at_centre = self._read(traced(centre_hz), group, centre_hz)
-        # Walls hardly change over a narrow band.
         return replace(at_centre, amplitude=np.repeat(at_centre.amplitude, len(nodes), axis=2))
 
     def _read(self, paths: rt.Paths, group: Group, freq_hz: float) -> PathSet:

@@ -108,7 +108,6 @@ def test_bounces_match_those_of_many_rays(
     bounces, nodes = tracer._bounces, tracer._nodes
     bounces._hang(points.lifted)
     solver = RCSSolver(deterministic=True)
-    solver._candidate_generator.MIN_SPEC_COUNT_SIZE = 1 << 16
     traced = solver(
         tracer._bodies.scene, max_depth=2, samples_per_sp=20_000, buffer_size_per_sp=1000
     )
@@ -120,6 +119,39 @@ def test_bounces_match_those_of_many_rays(
     theirs = steer(paths, elements, small_radio.freq_hz, nodes)
     assert len(paths) > 500
     assert error_db(ours, theirs) < -80.0
+
+
+def test_two_walls_lose_no_path_to_a_small_table(
+    person_bundle: Bundle,
+    small_radio: Radio,
+    two_devices: list[DevicePose],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Sionna looks the size up on its class, where it is small for this solver's time alone."""
+    from sionna.rt.path_solvers.sb_candidate_generator import SBCandidateGenerator
+
+    from dataset_factory.trace import Tracer, bounces
+
+    tracer = Tracer(person_bundle, small_radio, two_devices, depth=3)
+    vertices = person_bundle.frame(1).vertices
+    whole = tracer._bodies.points(vertices)
+    assert whole is not None
+    fields = ("positions", "normals", "areas", "material")
+    points = replace(whole, **{name: getattr(whole, name)[::16] for name in fields})
+    tracer._bodies.move(vertices)
+    asked = []
+    solve = bounces.JoiningSolver.__call__
+
+    def watched(*args, **options):
+        asked.append(SBCandidateGenerator.MIN_SPEC_COUNT_SIZE)
+        return solve(*args, **options)
+
+    monkeypatch.setattr(bounces.JoiningSolver, "__call__", watched)
+    usual = bounced(tracer, points)
+    monkeypatch.setattr(bounces, "TABLE", 1 << 20)
+    assert error_db(usual, bounced(tracer, points)) < -80.0
+    assert asked == [1 << 17, 1 << 20]
+    assert SBCandidateGenerator.MIN_SPEC_COUNT_SIZE == 1_000_000
 
 
 def test_settings_of_one_solver_do_not_reach_another(

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Channels of bundles, link by link, from the tracers that make datasets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from dataset_factory.bundle import Bundle
+from dataset_factory.verify.workshop import devices_of
+from rfgs_core.radio import DevicePose, Layout, Radio, layout
+
+#: Arrays nearly one above the other have no defined sign of a vertical polarisation.
+STEEP = 0.999
+
+
+@dataclass(frozen=True)
+class Links:
+    """Measured links of a radio, one after the other."""
+
+    channel: np.ndarray
+    """Complex128, shape (link, subcarrier)."""
+    tx_xyz: np.ndarray
+    """Transmitting element of each [m], shape (link, 3)."""
+    rx_xyz: np.ndarray
+    """Receiving element of each [m], shape (link, 3)."""
+    steep: np.ndarray
+    """Whether the centres of its arrays are one above the other, bool, shape (link,)."""
+
+    @property
+    def distance_m(self) -> np.ndarray:
+        """Distance of the elements of each link [m], shape (link,)."""
+        return np.linalg.norm(self.rx_xyz - self.tx_xyz, axis=1)
+
+
+def static_links(bundle: Bundle, radio: Radio, devices: list[DevicePose], seed: int = 0) -> Links:
+    """What every measured link hears of a scene without anything that moves.
+
+    Args:
+        bundle: Scene bundle.
+        radio: Its radio.
+        devices: Its devices.
+        seed: Root seed.
+
+    Returns:
+        Those of all places of a radio that moves.
+    """
+    from dataset_factory.trace import ApertureTracer, Tracer
+
+    if radio.antennas_move:
+        csi = ApertureTracer(bundle, radio, devices, seed=seed).static()
+    else:
+        csi = Tracer(bundle, radio, devices, depth=1, seed=seed).static()[None]
+    parts = [links(layout(radio, devices, n), channel) for n, channel in enumerate(csi)]
+    columns = zip(*(vars(part).values() for part in parts), strict=True)
+    return Links(*(np.concatenate(column) for column in columns))
+
+
+def links(elements: Layout, csi: np.ndarray) -> Links:
+    """The measured links of a channel of shape (tx, rx, subcarrier)."""
+    tx, rx = np.nonzero(elements.measured)
+    tx_middle, rx_middle = (
+        np.stack([xyz[site == s].mean(axis=0) for s in site])
+        for xyz, site in (
+            (elements.tx_xyz, elements.tx_site),
+            (elements.rx_xyz, elements.rx_site),
+        )
+    )
+    way = rx_middle[rx] - tx_middle[tx]
+    return Links(
+        csi[tx, rx].astype(np.complex128),
+        elements.tx_xyz[tx],
+        elements.rx_xyz[rx],
+        np.abs(way[:, 2]) > STEEP * np.linalg.norm(way, axis=1),
+    )
+
+
+def single(radio: Radio, **fields: Any) -> Radio:
+    """A radio of one element each way at one place, which hears other devices alone.
+
+    Args:
+        radio: Gives the band and everything that `fields` does not.
+        **fields: Further fields of the radio.
+    """
+    alone = {"tx_rows": 1, "tx_cols": 1, "rx_rows": 1, "rx_cols": 1, "tx_offset_m": (0.0, 0.0, 0.0)}
+    return replace(radio, **{**alone, "own_device_links": "excluded", **fields})
+
+
+def monostatic(radio: Radio, tones: int, **fields: Any) -> Radio:
+    """A radio of one element each way, 5 cm apart, that all but hears nothing of its own way there.
+
+    Args:
+        radio: Gives the band and everything that `fields` does not.
+        tones: Number of subcarriers.
+        **fields: Further fields of the radio.
+    """
+    near = {"tx_offset_m": (0.0, 0.0, -0.05), "isolation_db": 100.0, "own_device_links": "included"}
+    return single(radio, **{**near, "num_subcarriers": tones, **fields})
+
+
+def echoes(bundle: Bundle, radio: Radio, depth: int = 1, seed: int = 0) -> np.ndarray:
+    """What moving things add to the channel of each frame, without the shadows that they cast.
+
+    Args:
+        bundle: Scene bundle.
+        radio: Its radio.
+        depth: Interactions of their paths.
+        seed: Root seed.
+
+    Returns:
+        Complex128, shape (frame, tx, rx, subcarrier).
+    """
+    from dataset_factory.trace import Tracer
+
+    tracer = Tracer(bundle, radio, devices_of(bundle, radio), depth=depth, shadow="hard", seed=seed)
+    static = tracer.static().astype(np.complex128)
+    return np.stack([tracer.frame(bundle.frame(frame)) - static for frame in bundle.frames])

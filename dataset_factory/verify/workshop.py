@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From a description to a scene bundle, by the way that every dataset takes: Blender and export."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from dataset_factory.blender import Blender
+from dataset_factory.bundle import Bundle, read_bundle
+from dataset_factory.children import child_environment, end_with_parent
+from dataset_factory.devices import choose_devices
+from dataset_factory.verify.description import Description
+from rfgs_core.errors import RfgsError
+from rfgs_core.files import write_json
+from rfgs_core.radio import DevicePose, Radio
+
+
+@dataclass(frozen=True)
+class Workshop:
+    """A folder in which scenes are built and exported, each once."""
+
+    folder: Path
+    """Where `.blend` files and bundles lie."""
+
+    def blend(self, description: Description) -> Path:
+        """The Blender file of a description.
+
+        Raises:
+            RfgsError: The builder failed.
+        """
+        text = json.dumps(description.as_json(), sort_keys=True)
+        stem = hashlib.sha256(text.encode("utf-8")).hexdigest()[:12]
+        out, source = self.folder / f"{stem}.blend", self.folder / f"{stem}.json"
+        if out.is_file():
+            return out
+        write_json(source, description.as_json())
+        fresh = self.folder / f"{stem}.new.blend"
+        module = [sys.executable, "-m", "blender_scenes.verification"]
+        done = subprocess.run(
+            [*module, str(source), "--out", str(fresh)],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            env=child_environment(),
+            start_new_session=True,
+            preexec_fn=end_with_parent,
+        )
+        if done.returncode:
+            said = [line for line in done.stderr.splitlines() if line.strip()]
+            reason = said[-1] if said else f"code {done.returncode}"
+            raise RfgsError(f"a scene of the card could not be built: {reason}")
+        fresh.rename(out)
+        return out
+
+    def bundle(self, description: Description, *options: str) -> Bundle:
+        """The exported scene of a description.
+
+        Args:
+            description: The scene.
+            *options: More arguments of the add-on's `export`.
+        """
+        blend = self.blend(description)
+        folder = blend.with_suffix("".join(["", *options]).replace("-", ".") + ".bundle")
+        if not folder.is_dir():
+            fresh = folder.with_name(f"new.{folder.name}")
+            Blender(blend).run("export", "--out", str(fresh), *options)
+            fresh.rename(folder)
+        return read_bundle(folder)
+
+
+def devices_of(bundle: Bundle, radio: Radio) -> list[DevicePose]:
+    """The scene's own devices, as `generate` chooses them."""
+    return choose_devices(bundle, radio)[0]

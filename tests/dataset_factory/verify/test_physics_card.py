@@ -108,8 +108,8 @@ def test_command_fails_where_a_row_misses(
         "    return Group('off', 'Off', 'Words.', [row])\n"
     )
     monkeypatch.setattr(verify, "__path__", [*verify.__path__, str(tmp_path)])
-    monkeypatch.setitem(verify.GROUPS, "off", ("off_by_half", 1.0))
-    assert cli.main(["verify", "--only", "off", "--out", str(tmp_path / "out")]) == 1
+    monkeypatch.setitem(verify.GROUPS, "off_by_half", 1.0)
+    assert cli.main(["verify", "--only", "off_by_half", "--out", str(tmp_path / "out")]) == 1
     assert "Missed: off: level." in capsys.readouterr().err
     assert "MISSED" in (tmp_path / "out" / "physics.md").read_text("utf-8")
 

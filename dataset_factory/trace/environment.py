@@ -65,19 +65,6 @@ def node_frequencies(radio: Radio) -> np.ndarray:
     return np.linspace(radio.freq_min_hz, radio.freq_max_hz, count)
 
 
-def shadow_frequencies(radio: Radio) -> np.ndarray:
-    """Frequencies [Hz] between which shadows are interpolated: those of nodes, and more.
-
-    At 60 GHz the far edge of a body turns by more than two radians from node to node, which
-    shadows of 0.4 m miss by 0.012; half way they hold within 0.01, at next to no time. In an
-    ultra-wide band nodes are near enough, and factors take most of a frame's time.
-    """
-    nodes = node_frequencies(radio)
-    if radio.bandwidth_hz / radio.centre_hz <= WIDE_BAND or radio.ultra_wide:
-        return nodes
-    return np.linspace(nodes[0], nodes[-1], 2 * len(nodes) - 1)
-
-
 class Environment:
     """The scene without people, between centres of sites, ready to be traced."""
 
@@ -207,17 +194,9 @@ def environment_channel(
         paths: Paths of `Environment`.
         radio: The radio they were traced for.
         layout: Antenna elements.
-        transmission: Shadow factors at `shadow_frequencies`, as `steer` takes them; None for
-            none.
+        transmission: Shadow factors as `steer` takes them; None for none.
     """
-    nodes = node_frequencies(radio)
-    finer = shadow_frequencies(radio)
-    if transmission is not None and len(finer) > len(nodes):
-        between = 0.5 * (paths.amplitude[:, :, :-1] + paths.amplitude[:, :, 1:])
-        amplitude = np.zeros((*paths.amplitude.shape[:2], len(finer)), dtype=np.complex128)
-        amplitude[:, :, ::2], amplitude[:, :, 1::2] = paths.amplitude, between
-        paths, nodes = replace(paths, amplitude=amplitude), finer
-    channel = steer(paths, layout, radio.freq_hz, nodes, transmission)
+    channel = steer(paths, layout, radio.freq_hz, node_frequencies(radio), transmission)
     return channel * (radio.centre_hz / radio.freq_hz)
 
 

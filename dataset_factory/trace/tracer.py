@@ -15,7 +15,6 @@ from dataset_factory.trace.direct import PosedPoints, direct_channel, in_sight
 from dataset_factory.trace.environment import (
     Environment,
     environment_channel,
-    shadow_frequencies,
 )
 from dataset_factory.trace.held import Trace, follow, mixed
 from dataset_factory.trace.met import Met
@@ -197,8 +196,7 @@ class Tracer(BaseTracer):
         passed = None
         if outlines:
             with self._timed("shadow"):
-                nodes = shadow_frequencies(self._radio)
-                passed = transmission(paths, self._layout, outlines, nodes, self._shadow)
+                passed = transmission(paths, self._layout, outlines, self._nodes, self._shadow)
         with self._timed("environment"):
             return environment_channel(paths, self._radio, self._layout, passed)
 

@@ -14,7 +14,7 @@ class VerifyArgs:
 
     Every scene goes the way of any other: built in Blender, exported by the add-on, traced. Prints
     each closed form beside what came out, and writes a page with plots. Exit code 1 if a row
-    misses its tolerance. About eight minutes on two cores; `--only friis` takes less than one.
+    misses its tolerance. Two to four minutes on two cores; `--only friis` takes a quarter of one.
     Groups: friis, box, reciprocity, targets, shadow, doppler, delay, energy, pictures,
     convergence.
     """
@@ -42,7 +42,7 @@ def run(args: VerifyArgs) -> int:
     if args.markdown is not None:
         refuse_place(args.markdown)
     prepare()
-    usual_s = sum(GROUPS[name][1] for name in chosen_groups(args.only))
+    usual_s = sum(GROUPS[name] for name in chosen_groups(args.only))
     args.out.mkdir(parents=True, exist_ok=True)
     form = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}<{remaining}"
     with tqdm(total=usual_s, bar_format=form) as bar:

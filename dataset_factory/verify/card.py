@@ -68,7 +68,7 @@ class Curve:
     """One line or set of dots."""
 
     label: str
-    """For the legend."""
+    """For the legend; empty stays out of it."""
     x: np.ndarray
     """Shape (point,)."""
     y: np.ndarray
@@ -91,6 +91,8 @@ class Plot:
     """Its curves."""
     tolerance: float = 0.0
     """Half the width of the band around closed forms, in units of y; 0 draws none."""
+    log_x: bool = False
+    """Whether x is drawn on a logarithmic axis."""
 
 
 @dataclass(frozen=True)

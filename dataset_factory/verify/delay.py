@@ -10,6 +10,7 @@ import numpy as np
 
 from dataset_factory.bundle import Bundle
 from dataset_factory.verify.card import Curve, Group, Plot, within
+from dataset_factory.verify.closed_forms import sphere_path_m
 from dataset_factory.verify.description import Description, Device, Part, stepping
 from dataset_factory.verify.tracing import Links, links
 from dataset_factory.verify.workshop import Workshop, devices_of

@@ -96,9 +96,8 @@ def exponent(distance_m: np.ndarray, power: np.ndarray) -> float:
 
 
 def _plot(title: str, distance: np.ndarray, exact: np.ndarray, got: np.ndarray, form: str) -> Plot:
-    log_d = np.log10(distance)
     curves = [
-        Curve(form, log_d, 10 * np.log10(exact), "closed form"),
-        Curve("measured", log_d, 10 * np.log10(got), "measured"),
+        Curve(form, distance, 10 * np.log10(exact), "closed form"),
+        Curve("measured", distance, 10 * np.log10(got), "measured"),
     ]
-    return Plot(title, "log₁₀ of the distance [m]", "|H|² [dB]", curves)
+    return Plot(title, "distance [m]", "|H|² [dB]", curves, log_x=True)

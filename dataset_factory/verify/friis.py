@@ -43,10 +43,10 @@ def verify(workshop: Workshop) -> Group:
         shown = np.linspace(0, radio.num_subcarriers - 1, 12).astype(int)
         farthest, freq_ghz = int(np.argmax(distance)), radio.freq_hz / 1e9
         exact = db(friis(radio.freq_hz, distance[farthest]))
-        curves.append(Curve(f"Friis, {name}", freq_ghz, exact, "closed form"))
+        curves.append(Curve("" if curves else "Friis", freq_ghz, exact, "closed form"))
         dots = db(found.channel[farthest, shown])
         curves.append(Curve(name, freq_ghz[shown], dots, "measured"))
-    plot = Plot("Longest link of each preset", "frequency [GHz]", "|H| [dB]", curves)
+    plot = Plot("Longest link of each preset", "frequency [GHz]", "|H| [dB]", curves, log_x=True)
     return Group(
         "friis",
         "Free space: Friis at both band edges",

@@ -181,7 +181,7 @@ def _cube(workshop: Workshop, radio: Radio) -> tuple[list[Row], Plot]:
         Curve("8 × 8 quads", yaws, own[2], "measured"),
     ]
     title = "Echo of a turning cube, mean over the band"
-    return rows, Plot(title, "angle [°]", "|H|² [dB]", curves)
+    return rows, Plot(title, "angle [°]", "|H|² [dB]", curves, LEVEL_DB)
 
 
 def _cube_exact(elements: Layout, radio: Radio, yaw_deg: float) -> np.ndarray:

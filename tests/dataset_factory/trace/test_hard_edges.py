@@ -10,11 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from physical_optics import Box, box, in_sight, mesh_of, scattered
+from box_meshes import mesh_of
 
 from dataset_factory.bundle import SHARP, SMOOTH, UNSAID, Bundle, read_bundle
 from dataset_factory.trace.facets import facet_sum
 from dataset_factory.trace.points import SurfacePoints, surface_points, triangle_areas
+from dataset_factory.verify.physical_optics import Cuboid as Box
+from dataset_factory.verify.physical_optics import cuboid as box
+from dataset_factory.verify.physical_optics import in_sight, scattered
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.radio import DevicePose, Radio, layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT

@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from level_errors import error_db
 
 from dataset_factory.bundle import Bundle, read_bundle
+from dataset_factory.verify.closed_forms import error_db
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json, write_json
 from rfgs_core.radio import DevicePose, Radio, frame_samples

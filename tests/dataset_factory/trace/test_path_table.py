@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from level_errors import error_db
 
 from dataset_factory.bundle import Bundle
+from dataset_factory.verify.closed_forms import error_db
 from rfgs_core.radio import DevicePose, Radio, layout, preset
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.images import SCATTERING, SPECULAR

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numba
 import numpy as np
 import pytest
-from level_errors import error_db
 
 from dataset_factory.bundle import Bundle
+from dataset_factory.verify.closed_forms import error_db
 from rfgs_core.radio import DevicePose, Radio, layout
 
 MakeBundle = Callable[..., Bundle]

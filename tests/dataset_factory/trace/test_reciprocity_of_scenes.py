@@ -16,6 +16,7 @@ from dataset_factory.bundle import Bundle, read_bundle
 from dataset_factory.trace.setup import prepare
 from rfgs_core.radio import DevicePose, Layout, layout, place_devices, preset
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.simulate import Faces, faces_of
 
 prepare()
 
@@ -34,14 +35,18 @@ def exchanged(elements: Layout) -> Layout:
 
 
 def channel(
-    bundle: Bundle, radio: str, devices: list[DevicePose], turn: Callable[[Layout], Layout]
+    bundle: Bundle,
+    radio: str,
+    devices: list[DevicePose],
+    turn: Callable[[Layout], Layout],
+    faces: Callable[..., Faces] = faces_of,
 ) -> np.ndarray:
     """Specular channel between centres of sites, shape (tx, rx, subcarrier)."""
     from dataset_factory.trace.environment import Environment
 
     spec = preset(radio)
     elements = turn(layout(spec, devices))
-    paths = Environment(bundle, spec, elements, devices, seed=1).paths()
+    paths = Environment(bundle, spec, elements, devices, seed=1, faces=faces).paths()
     shape = elements.tx_site.max() + 1, elements.rx_site.max() + 1, spec.num_subcarriers
     out = np.zeros(shape, dtype=complex)
     turned = np.exp(-2j * np.pi * spec.freq_hz * paths.length_m[:, None] / SPEED_OF_LIGHT)
@@ -63,16 +68,14 @@ def worst_db(found: np.ndarray, expected: np.ndarray) -> float:
 @pytest.mark.parametrize("radio", ["wifi", "mmwave"])
 @pytest.mark.parametrize("blend", SCENES, ids=lambda path: path.stem)
 def test_static_channel_of_every_scene_is_reciprocal(
-    blend: Path, radio: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    blend: Path, radio: str, tmp_path: Path
 ) -> None:
-    from dataset_factory.trace import environment
-
     Blender(blend).run("export", "--out", str(tmp_path / "bundle"), "--frames", "20:20")
     bundle = read_bundle(tmp_path / "bundle")
     devices = place_devices(preset(radio), np.array(bundle.bounds_m))
     there = channel(bundle, radio, devices, lambda elements: elements)
     back = channel(bundle, radio, devices, exchanged)
     assert worst_db(back.transpose(1, 0, 2), there) < -60.0
-    denser = partial(environment.faces_of, max_faces=20_000, sample_m=0.1)
-    monkeypatch.setattr(environment, "faces_of", denser)
-    assert worst_db(there, channel(bundle, radio, devices, lambda elements: elements)) < -50.0
+    denser = partial(faces_of, max_faces=20_000, sample_m=0.1)
+    finer = channel(bundle, radio, devices, lambda elements: elements, denser)
+    assert worst_db(there, finer) < -50.0

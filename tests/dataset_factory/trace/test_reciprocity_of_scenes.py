@@ -28,7 +28,7 @@ def exchanged(elements: Layout) -> Layout:
     sides = {
         f"{side}_{what}": getattr(elements, f"{other}_{what}")
         for side, other in (("tx", "rx"), ("rx", "tx"))
-        for what in ("xyz", "device", "site", "port")
+        for what in ("xyz", "device", "site", "port", "quat_wxyz")
     }
     columns = np.zeros(len(elements.tx_xyz), dtype=np.int64)
     return replace(elements, measured=elements.measured.T, rx_column=columns, **sides)

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`python -m blender_scenes list`, `… build [NAME] [--out FILE]` and `… sheet --out FILE`."""
+"""`python -m blender_scenes` lists and builds our scenes, and small ones of plain shapes."""
 
 from __future__ import annotations
 
 import argparse
 import importlib
+import json
 import os
 import sys
 from pathlib import Path
@@ -24,6 +25,9 @@ def main(arguments: list[str] | None = None) -> int:
     sheet.add_argument("--out", type=Path, required=True, help="the picture, .jpg or .png")
     sheet.add_argument("--size", type=int, default=300, help="width of each picture [pixel]")
     sheet.add_argument("--samples", type=int, default=32, help="samples per pixel")
+    shapes = commands.add_parser("shapes", help="build a small scene of plain shapes")
+    shapes.add_argument("description", type=Path, help="JSON file, see `verification.py`")
+    shapes.add_argument("--out", type=Path, required=True, help="the .blend to write")
     args = parser.parse_args(arguments)
     known = scenes()
     if args.command == "list":
@@ -31,12 +35,27 @@ def main(arguments: list[str] | None = None) -> int:
             frames = f"{scene.frame_start}:{scene.frame_end} at {scene.fps} fps"
             sys.stdout.write(f"{scene.name}  {frames}  {scene.description}\n")
         return 0
+    if args.command == "shapes":
+        return _shapes(args.description, args.out)
     if args.command == "sheet":
         return _sheet(args.out, args.size, args.samples)
     if args.name not in known:
         sys.stderr.write(f"error: no scene {args.name!r}; there are: {', '.join(known)}\n")
         return 2
     return _build(known[args.name].name, args.out or known[args.name].path)
+
+
+def _shapes(description: Path, out: Path) -> int:
+    try:
+        parts = json.loads(description.read_text("utf-8"))
+    except (OSError, ValueError) as error:
+        sys.stderr.write(f"error: {description}: expected a JSON file, got: {error}\n")
+        return 2
+    from blender_scenes.verification import build
+
+    build(parts, out)
+    sys.stdout.write(f"wrote {out}\n")
+    return 0
 
 
 def _sheet(out: Path, size_px: int, samples: int) -> int:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Builds small scenes of plain shapes from a description: what physics has closed forms for.
 
-`python -m blender_scenes.verification DESCRIPTION --out FILE`, where DESCRIPTION is a JSON file:
+`python -m blender_scenes shapes DESCRIPTION --out FILE`, where DESCRIPTION is a JSON file:
 
     {"frames": 3, "fps": 10,
      "parts": [{"name": "wall", "shape": "sheet", "size": [4, 3, 0], "cells": 1, "at": [0, 0, 1],
@@ -16,11 +16,7 @@
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
-import os
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -147,25 +143,3 @@ def _camera(camera: dict[str, Any]) -> bpy.types.Object:
     way = Vector(camera["to"]) - Vector(camera["at"])
     item.rotation_euler = way.to_track_quat("-Z", "Y").to_euler()
     return item
-
-
-def main(arguments: list[str] | None = None) -> int:
-    """Runs the command; returns the exit code."""
-    parser = argparse.ArgumentParser(
-        prog="python -m blender_scenes.verification",
-        description="Builds a small scene of plain shapes from a JSON description.",
-    )
-    parser.add_argument("description", type=Path, help="JSON file, see the module's docstring")
-    parser.add_argument("--out", type=Path, required=True, help="the .blend to write")
-    args = parser.parse_args(arguments)
-    build(json.loads(args.description.read_text("utf-8")), args.out)
-    sys.stdout.write(f"wrote {args.out}\n")
-    return 0
-
-
-if __name__ == "__main__":
-    code = main()
-    sys.stdout.flush()
-    sys.stderr.flush()
-    # bpy may wait for ever on its own threads when the interpreter takes it down.
-    os._exit(code)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize_scalar
+from scipy.special import fresnel
 
 #: Speed of light [m/s], exact by definition of the metre.
 C = 299_792_458.0
@@ -29,6 +30,12 @@ def friis(freq_hz: np.ndarray, distance_m: np.ndarray | float) -> np.ndarray:
     wavelength = C / np.asarray(freq_hz, dtype=np.float64)
     d = np.asarray(distance_m, dtype=np.float64)[..., None]
     return wavelength / (4.0 * np.pi * d) * np.exp(-2j * np.pi * d / wavelength)
+
+
+def fresnel_integral(nu: np.ndarray | float) -> np.ndarray:
+    """F(ν) = ∫_0^ν e^{−jπt²/2} dt (Abramowitz and Stegun, 7.3)."""
+    sine, cosine = fresnel(nu)
+    return cosine - 1j * sine
 
 
 def db(ratio: np.ndarray | complex | float) -> np.ndarray:

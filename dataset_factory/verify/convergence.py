@@ -31,7 +31,7 @@ def verify(workshop: Workshop) -> Group:
         "convergence",
         "Convergence",
         "The furnished room and a ball of metal, traced again with something refined. Where "
-        "spacing is halved, a band twice as high asks for it: the tones that are compared are the "
+        "spacing is halved, a band twice as high asks for it: the subcarriers compared are the "
         "same.",
         [*_static(bundle), *_targets(workshop), _depth(bundle)],
     )
@@ -67,10 +67,10 @@ def _static(bundle: Bundle) -> list[Row]:
 def _targets(workshop: Workshop) -> list[Row]:
     """A ball's mean level with four times the faces, and with points at half the distance."""
     usual = monostatic(preset("wifi"), 8, own_device_links="only")
-    # The same tones and as many again above them, up to twice the frequency.
-    tones = math.ceil((2.0 * usual.freq_max_hz - usual.freq_min_hz) / usual.subcarrier_spacing_hz)
-    top_hz = usual.freq_min_hz + tones * usual.subcarrier_spacing_hz
-    fine = replace(usual, num_subcarriers=tones, freq_max_hz=top_hz)
+    # The same subcarriers and as many again above them, up to twice the frequency.
+    count = math.ceil((2.0 * usual.freq_max_hz - usual.freq_min_hz) / usual.subcarrier_spacing_hz)
+    top_hz = usual.freq_min_hz + count * usual.subcarrier_spacing_hz
+    fine = replace(usual, num_subcarriers=count, freq_max_hz=top_hz)
     levels = [
         10.0 * np.log10(ball_sections(workshop, radio, cells).mean())
         for radio, cells in ((usual, 5), (usual, 6), (fine, 5))

@@ -12,7 +12,7 @@ from dataset_factory.bundle import Bundle
 from dataset_factory.verify.card import Curve, Group, Plot, within
 from dataset_factory.verify.closed_forms import sphere_path_m
 from dataset_factory.verify.description import Description, Device, Part, stepping
-from dataset_factory.verify.tracing import Links, links
+from dataset_factory.verify.tracing import Links, joined, links
 from dataset_factory.verify.workshop import Workshop, devices_of
 from rfgs_core.radio import PRESETS, Radio, layout
 
@@ -71,9 +71,9 @@ def verify(workshop: Workshop) -> Group:
 
 def profile(channel: np.ndarray, radio: Radio) -> tuple[np.ndarray, np.ndarray]:
     """Path lengths [m], shape (n,), and amplitudes of delay profiles, shape (link, n)."""
-    tones = radio.num_subcarriers
-    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * (np.arange(tones) + 0.5) / tones)
-    count = _FINER * tones
+    number = radio.num_subcarriers
+    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * (np.arange(number) + 0.5) / number)
+    count = _FINER * number
     length_m = np.arange(count) * (radio.unambiguous_path_m / count)
     return length_m, np.abs(np.fft.ifft(channel * window, count, axis=-1))
 
@@ -98,7 +98,7 @@ def _links(bundle: Bundle, radio: Radio) -> tuple[Links, Links]:
             (layout(radio, devices, n) for n in range(len(still))), still, moved, strict=True
         )
     ]
-    static, change = (_joined(column) for column in zip(*pairs, strict=True))
+    static, change = (joined(column) for column in zip(*pairs, strict=True))
     return static, change
 
 
@@ -113,11 +113,6 @@ def _traced(bundle: Bundle, radio: Radio) -> Iterator[np.ndarray]:
         return
     tracer = Tracer(bundle, radio, devices, depth=1, shadow="hard")
     yield from (tracer.static()[None], tracer.frame(frame)[None])
-
-
-def _joined(parts: tuple[Links, ...]) -> Links:
-    columns = zip(*(vars(part).values() for part in parts), strict=True)
-    return Links(*(np.concatenate(column) for column in columns))
 
 
 def _plot(name: str, radio: Radio, found: Links, path_m: np.ndarray) -> Plot:

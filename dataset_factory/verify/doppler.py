@@ -94,9 +94,9 @@ def _packets(workshop: Workshop, way: str, radio: Radio) -> tuple[tuple[float, f
             for t in time_s
         ]
     )
-    tone = radio.num_subcarriers // 2
-    wavelength = C / radio.freq_hz[tone]
-    turns = np.unwrap(np.angle(echo[:, 0, 0, tone])) / (2.0 * np.pi)
+    middle = radio.num_subcarriers // 2
+    wavelength = C / radio.freq_hz[middle]
+    turns = np.unwrap(np.angle(echo[:, 0, 0, middle])) / (2.0 * np.pi)
     exact_hz, found_hz = (
         float(np.polyfit(time_s, values, 1)[0]) for values in (-path_m / wavelength, turns)
     )

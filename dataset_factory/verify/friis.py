@@ -51,9 +51,9 @@ def verify(workshop: Workshop) -> Group:
         "friis",
         "Free space: Friis at both band edges",
         "Two devices in empty space, every preset as it is: every measured link of every antenna "
-        "element, at the lowest and the highest tone. A device whose transmitter hangs straight "
-        "below its receivers counts in level only: along the vertical, a vertical polarisation "
-        "has no defined sign.",
+        "element, at the lowest and the highest subcarrier. A device whose transmitter hangs "
+        "straight below its receivers counts in level only: along the vertical, a vertical "
+        "polarisation has no defined sign.",
         rows,
         [plot],
     )
@@ -69,14 +69,14 @@ def _rows(name: str, found: np.ndarray, ratio: np.ndarray, level: np.ndarray) ->
         level: Which links are level enough to have a phase, shape (link,).
     """
     rows = []
-    for edge, tone in (("lower", 0), ("upper", -1)):
-        off_db = db(ratio[:, tone])
+    for edge, end in (("lower", 0), ("upper", -1)):
+        off_db = db(ratio[:, end])
         worst = int(np.argmax(np.abs(off_db)))
-        got = float(db(found[worst, tone]))
+        got = float(db(found[worst, end]))
         exact = got - float(off_db[worst])
         label = f"{name}, {edge} edge, level"
         rows.append(near(label, exact, got, LEVEL_DB, "dB", SOURCE))
-        off_deg = np.degrees(np.angle(ratio[level, tone]))
+        off_deg = np.degrees(np.angle(ratio[level, end]))
         label = f"{name}, {edge} edge, phase error"
         rows.append(within(label, float(np.abs(off_deg).max()), PHASE_DEG, "°", SOURCE))
     return rows

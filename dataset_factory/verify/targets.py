@@ -83,7 +83,7 @@ def ball_sections(workshop: Workshop, radio: Radio, cells: int) -> np.ndarray:
 
     Args:
         workshop: Where scenes are built.
-        radio: A monostatic radio, whose first eight tones are taken.
+        radio: A monostatic radio, whose first eight subcarriers are taken.
         cells: Subdivisions of the ball's icosahedron.
     """
     found = echoes(workshop.bundle(ball(cells)), radio)[..., :8]

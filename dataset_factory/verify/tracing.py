@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -53,7 +54,11 @@ def static_links(bundle: Bundle, radio: Radio, devices: list[DevicePose], seed: 
         csi = ApertureTracer(bundle, radio, devices, seed=seed).static()
     else:
         csi = Tracer(bundle, radio, devices, depth=1, seed=seed).static()[None]
-    parts = [links(layout(radio, devices, n), channel) for n, channel in enumerate(csi)]
+    return joined([links(layout(radio, devices, n), channel) for n, channel in enumerate(csi)])
+
+
+def joined(parts: Sequence[Links]) -> Links:
+    """Links of several places as one set."""
     columns = zip(*(vars(part).values() for part in parts), strict=True)
     return Links(*(np.concatenate(column) for column in columns))
 
@@ -88,16 +93,16 @@ def single(radio: Radio, **fields: Any) -> Radio:
     return replace(radio, **{**alone, "own_device_links": "excluded", **fields})
 
 
-def monostatic(radio: Radio, tones: int, **fields: Any) -> Radio:
+def monostatic(radio: Radio, subcarriers: int, **fields: Any) -> Radio:
     """A radio of one element each way, 5 cm apart, that all but hears nothing of its own way there.
 
     Args:
         radio: Gives the band and everything that `fields` does not.
-        tones: Number of subcarriers.
+        subcarriers: Their number.
         **fields: Further fields of the radio.
     """
     near = {"tx_offset_m": (0.0, 0.0, -0.05), "isolation_db": 100.0, "own_device_links": "included"}
-    return single(radio, **{**near, "num_subcarriers": tones, **fields})
+    return single(radio, **{**near, "num_subcarriers": subcarriers, **fields})
 
 
 def echoes(bundle: Bundle, radio: Radio, depth: int = 1, seed: int = 0) -> np.ndarray:

@@ -40,7 +40,7 @@ class Workshop:
             return out
         write_json(source, description.as_json())
         fresh = self.folder / f"{stem}.new.blend"
-        module = [sys.executable, "-m", "blender_scenes.verification"]
+        module = [sys.executable, "-m", "blender_scenes", "shapes"]
         done = subprocess.run(
             [*module, str(source), "--out", str(fresh)],
             stdin=subprocess.DEVNULL,

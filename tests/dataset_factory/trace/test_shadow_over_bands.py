@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.special import fresnel
 
 from dataset_factory.trace.environment import environment_channel, node_frequencies
 from dataset_factory.trace.nodes import COUNTS, fine_grid, nodes_for
 from dataset_factory.trace.paths import PathSet
 from dataset_factory.trace.shadow import Outline, transmission
+from dataset_factory.verify.closed_forms import fresnel_integral
 from rfgs_core.radio import PRESETS, Layout, Radio, preset
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
@@ -29,12 +29,6 @@ RECTANGLES = [
     (3.0, 17.0, 2.0, 16.0),
     (-13.0, 13.0, -12.0, -9.0),
 ]
-
-
-def fresnel_integral(nu: np.ndarray) -> np.ndarray:
-    """∫_0^ν e^{−jπt²/2} dt."""
-    sine, cosine = fresnel(nu)
-    return cosine - 1j * sine
 
 
 def rectangle_factor(box: tuple[float, ...], freq_hz: np.ndarray, top_hz: float) -> np.ndarray:

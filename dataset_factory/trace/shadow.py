@@ -85,17 +85,22 @@ def coarse_mesh(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np
     return kept, thin[np.sort(first)]
 
 
-def _reach(paths: PathSet) -> np.ndarray:
-    """Fresnel coordinate up to which a shadow on each path matters, shape (path,).
+def _relative(paths: PathSet) -> np.ndarray:
+    """Amplitude of each path relative to the strongest of its pair of sites, shape (path,)."""
+    strength = np.abs(paths.amplitude).max(axis=(1, 2))
+    pair = paths.tx * (int(paths.rx.max(initial=0)) + 1) + paths.rx
+    strongest = np.zeros(int(pair.max(initial=0)) + 1)
+    np.maximum.at(strongest, pair, strength)
+    return strength / np.maximum(strongest[pair], 1e-300)
+
+
+@numba.njit(cache=True)
+def _reach(relative: float) -> float:
+    """Fresnel coordinate up to which a shadow on a path of some relative amplitude matters.
 
     At ν from its edge a screen changes a path by about 1/(√2 π ν) of its amplitude.
     """
-    strength = np.abs(paths.amplitude).max(axis=(1, 2))
-    pair = paths.tx * (int(paths.rx.max()) + 1) + paths.rx
-    strongest = np.zeros(int(pair.max()) + 1)
-    np.maximum.at(strongest, pair, strength)
-    relative = strength / np.maximum(strongest[pair], 1e-300)
-    return np.minimum(relative / (np.sqrt(2.0) * np.pi * NEGLIGIBLE), silhouette.FAR)
+    return min(relative / (np.sqrt(2.0) * np.pi * NEGLIGIBLE), silhouette.FAR)
 
 
 def transmission(
@@ -116,10 +121,12 @@ def transmission(
     """
     tx_places = _places(layout.tx_xyz, layout.tx_site, layout.tx_port)
     rx_places = _places(layout.rx_xyz, layout.rx_site, layout.rx_port)
-    lines, reach = unfold(paths), _reach(paths)
+    lines, relative = unfold(paths), _relative(paths)
     near = [
         outline.beside
-        & _near(paths.vertices, lines[0], lines[1], reach, *_ball(outline.vertices), grid_hz.max())
+        & _near(
+            paths.vertices, lines[0], lines[1], relative, *_ball(outline.vertices), grid_hz.max()
+        )
         for outline in outlines
     ]
     shaded = np.flatnonzero(np.any([rows.any(axis=1) for rows in near], axis=0))
@@ -132,7 +139,13 @@ def transmission(
         _shade(
             some.vertices,
             rows[shaded],
-            (lines[0][shaded], lines[1][shaded], lines[2][shaded], lines[3][shaded], reach[shaded]),
+            (
+                lines[0][shaded],
+                lines[1][shaded],
+                lines[2][shaded],
+                lines[3][shaded],
+                relative[shaded],
+            ),
             (tx, rx),
             np.ascontiguousarray(outline.vertices, dtype=np.float64),
             np.ascontiguousarray(outline.faces, dtype=np.int64),
@@ -162,7 +175,7 @@ def _near(
     corners: np.ndarray,
     before: np.ndarray,
     after: np.ndarray,
-    reach: np.ndarray,
+    relative: np.ndarray,
     centre: np.ndarray,
     radius: float,
     freq_hz: float,
@@ -188,7 +201,7 @@ def _near(
             whole = before[p, i] + length + after[p, i]
             at = min(max(0.5 * whole, before[p, i] + low), before[p, i] + high)
             per_m = np.sqrt(2.0 * (1.0 / at + 1.0 / (whole - at)) * freq_hz / SPEED_OF_LIGHT)
-            near[p, i] = beside * per_m <= reach[p]
+            near[p, i] = beside * per_m <= _reach(relative[p])
     return near
 
 
@@ -206,7 +219,7 @@ def _shade(
     out: np.ndarray,
 ) -> None:
     """Multiplies the factors of one body into `out`."""
-    before, after, tx_turn, rx_turn, reach = lines
+    before, after, tx_turn, rx_turn, relative = lines
     tx_offset, rx_offset = offsets
     band = nodes.hz[-1] - nodes.hz[len(nodes.hz) - out.shape[3]]
     for p in numba.prange(len(corners)):
@@ -221,8 +234,12 @@ def _shade(
             if scale == 0.0:
                 continue
             per_m = np.sqrt(2.0 * scale * nodes.hz[-1] / SPEED_OF_LIGHT)
-            window = min(silhouette.WINDOW, silhouette.WINDOW_PER_REACH * reach[p])
-            runs, heights = silhouette.runs_of(xy, between, faces, window / per_m, reach[p] / per_m)
+            reach = _reach(relative[p])
+            window = min(silhouette.WINDOW, silhouette.WINDOW_PER_REACH * reach)
+            pitch = silhouette.ROW / max(relative[p], 1e-6) / per_m
+            runs, heights = silhouette.runs_of(
+                xy, between, faces, window / per_m, reach / per_m, pitch
+            )
             if not len(runs):
                 continue
             if hard:

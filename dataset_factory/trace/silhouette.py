@@ -14,8 +14,11 @@ import numba
 import numpy as np
 from scipy.special import fresnel
 
-#: Rows that a silhouette is cut into; 1.1 cm for a standing person.
-NUM_ROWS = 160
+#: Height of the rows that a silhouette is cut into, in Fresnel coordinates; level edges are off
+#: by half of it, which is 0.003 of a path past a person.
+ROW = 0.02
+#: Fewest and most rows.
+LEAST_ROWS, MOST_ROWS = 40, 2048
 #: Silhouettes wholly beyond this Fresnel coordinate change a path by less than −33 dB.
 FAR = 10.0
 #: Beyond this coordinate a silhouette counts as unbounded.
@@ -204,7 +207,12 @@ def _merged(spans: np.ndarray, window: float) -> np.ndarray:
 
 @numba.njit(cache=True)
 def runs_of(
-    xy: np.ndarray, between: np.ndarray, faces: np.ndarray, window: float, far: float
+    xy: np.ndarray,
+    between: np.ndarray,
+    faces: np.ndarray,
+    window: float,
+    far: float,
+    pitch: float,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Silhouette as runs.
 
@@ -214,6 +222,7 @@ def runs_of(
         faces: Triangles, shape (T, 3).
         window: Half width beyond which the silhouette counts as unbounded [m].
         far: Distance beyond which there is no silhouette [m].
+        pitch: Largest height of a row, within the limits of their number [m].
 
     Returns:
         Runs (x from, x to) and the lower and upper y of their rows [m], each shape (N, 2).
@@ -224,16 +233,17 @@ def runs_of(
     x0, x1, y0, y1, distance = _box(xy, between, window)
     if distance > far or x1 <= x0 or y1 <= y0:
         return nothing, nothing
-    pitch = (y1 - y0) / NUM_ROWS
-    offsets, spans = _spans(xy, between, faces, y0, pitch, NUM_ROWS)
+    rows = min(max(math.ceil((y1 - y0) / pitch), LEAST_ROWS), MOST_ROWS)
+    pitch = (y1 - y0) / rows
+    offsets, spans = _spans(xy, between, faces, y0, pitch, rows)
     runs, heights = np.zeros_like(spans), np.zeros_like(spans)
     count = 0
-    for row in range(NUM_ROWS):
+    for row in range(rows):
         merged = _merged(spans[offsets[row] : offsets[row + 1]], window)
         low, high = y0 + row * pitch, y0 + (row + 1) * pitch
         if row == 0 and y0 <= -window:
             low = -math.inf
-        if row == NUM_ROWS - 1 and y1 >= window:
+        if row == rows - 1 and y1 >= window:
             high = math.inf
         for i in range(len(merged)):
             runs[count] = merged[i]

@@ -55,7 +55,7 @@ still, turn = np.zeros((20, 1)), np.broadcast_to(np.eye(3), (20, 1, 3, 3)).copy(
 past = np.ones((20, 4, 8, 5), dtype=np.complex128)
 _shade(
     corners, np.ones((20, 1), dtype=bool),
-    (still, still, turn, turn, np.full(20, silhouette.FAR)),
+    (still, still, turn, turn, np.ones(20)),
     (rng.normal(size=(20, 4, 3)) * 0.1, rng.normal(size=(20, 8, 3)) * 0.1),
     body, np.arange(600).reshape(3, 200).T.copy(), nodes_for(np.linspace(5.7e9, 5.9e9, 5)),
     silhouette.FRESNEL, False, past,

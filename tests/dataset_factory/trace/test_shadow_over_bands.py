@@ -7,11 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
+from PIL import Image, ImageDraw
 
 from dataset_factory.trace.environment import environment_channel, node_frequencies
 from dataset_factory.trace.nodes import COUNTS, fine_grid, nodes_for
 from dataset_factory.trace.paths import PathSet
 from dataset_factory.trace.shadow import Outline, transmission
+from dataset_factory.trace.silhouette import WINDOW
 from dataset_factory.verify.closed_forms import fresnel_integral
 from rfgs_core.radio import PRESETS, Layout, Radio, preset
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
@@ -118,3 +121,81 @@ def test_polynomials_pass_through_their_nodes() -> None:
         first += count
     assert [*nodes.counts[:-1]] == [count for count in COUNTS if count < len(grid)]
     np.testing.assert_array_equal(nodes.hz[first:], grid)
+
+
+def figure() -> tuple[np.ndarray, np.ndarray]:
+    """Limbs, trunk and head of capsules and a ball, legs and arms aslant."""
+    parts = []
+    for start, end, radius in (
+        ((0.05, 0.05, 0.1), (0.0, 0.08, 0.85), 0.07),
+        ((-0.1, -0.25, 0.1), (0.0, -0.08, 0.85), 0.07),
+        ((0.0, 0.0, 0.9), (0.0, 0.0, 1.35), 0.16),
+        ((0.1, 0.2, 1.35), (0.2, 0.5, 1.0), 0.045),
+        ((-0.1, -0.2, 1.35), (-0.15, -0.3, 0.8), 0.045),
+        ((0.0, 0.0, 1.62), (0.0, 0.0, 1.66), 0.1),
+    ):
+        a, b = np.array(start), np.array(end)
+        turn = trimesh.geometry.align_vectors([0.0, 0.0, 1.0], (b - a) / np.linalg.norm(b - a))
+        part = trimesh.creation.capsule(height=float(np.linalg.norm(b - a)), radius=radius)
+        part.apply_transform(turn)
+        part.apply_translation(a)
+        parts.append(part)
+    vertices = np.concatenate([part.vertices for part in parts])
+    first = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    faces = [part.faces + n for part, n in zip(parts, first, strict=False)]
+    return vertices, np.concatenate(faces)
+
+
+def filled(vertices: np.ndarray, faces: np.ndarray, tx: np.ndarray, rx: np.ndarray, px: float):
+    """Silhouette on the plane across a straight path, as another library fills polygons.
+
+    Each vertex stands where its Fresnel coordinate is the same at the mean depth.
+
+    Returns:
+        Coordinates of columns and rows [m], what is covered, and s = 1/d_1 + 1/d_2 [1/m].
+    """
+    length = np.linalg.norm(rx - tx)
+    way = (rx - tx) / length
+    across = np.cross([0.0, 0.0, 1.0], way)
+    across /= np.linalg.norm(across)
+    depth = (vertices - tx) @ way
+    scale, at = 1 / depth + 1 / (length - depth), depth.mean()
+    whole = 1 / at + 1 / (length - at)
+    flat = np.stack([(vertices - tx) @ across, (vertices - tx) @ np.cross(way, across)], axis=1)
+    flat *= np.sqrt(scale / whole)[:, None]
+    low = flat.min(axis=0) - px
+    size = np.ceil((flat.max(axis=0) + px - low) / px).astype(int)
+    picture = Image.new("1", (int(size[0]), int(size[1])))
+    draw = ImageDraw.Draw(picture)
+    for triangle in (flat[faces] - low) / px - 0.5:
+        draw.polygon([(float(x), float(y)) for x, y in triangle], fill=1)
+    x, y = (low[i] + px * (np.arange(size[i]) + 0.5) for i in (0, 1))
+    return x, y, np.asarray(picture).T, whole
+
+
+@pytest.mark.parametrize("name", ["wifi24", "wifi", "uwb", "mmwave"])
+@pytest.mark.parametrize("side", [(0.3, 0.2), (-0.45, -0.3), (0.1, 0.5)])
+def test_a_figure_is_shaded_as_a_sum_over_its_picture_says(name: str, side) -> None:
+    radio = preset(name)
+    vertices, faces = figure()
+    middle = np.array([0.0, side[0], 0.9 + side[1]])
+    tx, rx = middle - np.array([1.9, 0.3, 0.1]), middle + np.array([2.6, -0.4, 0.2])
+    paths, elements = straight(radio)
+    paths = replace(paths, vertices=np.stack([tx, rx])[None])
+    elements = replace(elements, tx_xyz=tx[None], rx_xyz=rx[None])
+    outline = Outline(vertices, faces, np.ones((1, 1), bool))
+    free = environment_channel(paths, radio, elements)[0, 0]
+    grid = fine_grid(node_frequencies(radio))
+    passed = transmission(paths, elements, [outline], grid, "kirchhoff")
+    found = environment_channel(paths, radio, elements, passed)[0, 0] / free
+    px = 1.2e-4 if name == "uwb" else 2.5e-4
+    x, y, covered, scale = filled(vertices, faces, tx, rx, px)
+    reach = max(np.abs(x).max(), np.abs(y).max())
+    reach *= np.sqrt(2.0 * scale * radio.freq_max_hz / SPEED_OF_LIGHT)
+    # What is beyond ν = 20 counts as unbounded, so that an edge there is not heard.
+    limit = 0.003 + (1.0 / (np.sqrt(2.0) * np.pi * WINDOW) if reach > WINDOW else 0.0)
+    for n in (0, radio.num_subcarriers // 3, radio.num_subcarriers - 1):
+        rate = scale * radio.freq_hz[n] / SPEED_OF_LIGHT
+        row = np.exp(-1j * np.pi * rate * x**2) @ covered
+        expected = 1.0 - 1j * rate * px**2 * (row @ np.exp(-1j * np.pi * rate * y**2))
+        assert abs(found[n] - expected) < limit, (n, found[n], expected)

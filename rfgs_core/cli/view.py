@@ -75,11 +75,12 @@ def _serve(viewer: Viewer, server: ViserServer, open_page: bool) -> int:
     from rfgs_core.view.server import address
 
     where = address(server)
-    sys.stdout.write(f"{where} shows the run; Ctrl-C ends\n")
-    sys.stdout.flush()
-    if open_page and not webbrowser.open(where):
-        sys.stderr.write("no browser was found; open the address yourself\n")
+    # Ctrl-C counts from the first word on: whoever reads it may answer at once.
     try:
+        sys.stdout.write(f"{where} shows the run; Ctrl-C ends\n")
+        sys.stdout.flush()
+        if open_page and not webbrowser.open(where):
+            sys.stderr.write("no browser was found; open the address yourself\n")
         viewer.follow()
     except KeyboardInterrupt:
         sys.stderr.write("\nthe viewer has ended\n")

@@ -30,11 +30,11 @@ from rfgs_core.radio.images import DIFFUSE
 from rfgs_core.radio.layout import DevicePose
 from rfgs_core.simulate import (
     Faces,
+    Sight,
     SpecularPaths,
     Surroundings,
     faces_of,
     specular_paths,
-    surroundings,
 )
 
 #: Interactions of an environment path; a fourth would change bistatic links by −39 dB.
@@ -99,6 +99,7 @@ class Environment:
         self.meshes = SceneMeshes(bundle, vehicles)
         #: Faces of the scene and what the sites see of them, where it was traced last.
         self.around: Surroundings | None = None
+        self._sight = Sight(*centres(layout))
         self._fields, self._solver = Fields(), rt.PathSolver(deterministic=True)
 
     @property
@@ -127,8 +128,8 @@ class Environment:
         """
         if self._vehicles is not None and vertices is not None:
             move_vehicles(self._scene, self._vehicles, vertices)
-        faces = self._faces(*self.meshes.triangles(vertices))
-        self.around = surroundings(faces, *centres(self._layout))
+        triangles, mesh = self.meshes.triangles(vertices)
+        self.around = self._sight.of(self._faces(triangles, mesh), self.meshes.moves[mesh])
         found = specular_paths(self.around, measured_pairs(self._layout), MAX_DEPTH)
         parts = []
         for group in self._groups:

@@ -31,6 +31,8 @@ class SceneMeshes:
         self._driven = [faces for _, _, faces in driven]
         self.names = [static_name(index) for index in range(len(static))]
         self.names += [name for name, _, _ in driven]
+        #: Which of the meshes move, bool, shape (mesh,).
+        self.moves = np.arange(len(self.names)) >= len(static)
         counts = [len(part) for part in [*self._static, *self._driven]]
         self._first = np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
 

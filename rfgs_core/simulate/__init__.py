@@ -4,11 +4,12 @@
 from rfgs_core.simulate.faces import Faces, faces_of
 from rfgs_core.simulate.legs import Legs, mirror_legs
 from rfgs_core.simulate.specular import SpecularPaths, specular_paths
-from rfgs_core.simulate.surroundings import Surroundings, surroundings
+from rfgs_core.simulate.surroundings import Sight, Surroundings, surroundings
 
 __all__ = [
     "Faces",
     "Legs",
+    "Sight",
     "SpecularPaths",
     "Surroundings",
     "faces_of",

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from rfgs_core.simulate.bvh import SAME_M, crossings
+from rfgs_core.simulate.bvh import SAME_M
 from rfgs_core.simulate.faces import Faces, height, mirrored
 
 #: Footprints narrower than this share of the face they fall on are searched in order of place.
@@ -30,27 +30,6 @@ class Beams(NamedTuple):
     """Lower corner of the footprint along the face's axes [m], shape (2, beam)."""
     high: np.ndarray
     """Upper corner of the footprint [m], shape (2, beam)."""
-
-
-@numba.njit(cache=True, nogil=True)
-def hidden_by(faces: Faces, place: np.ndarray, most: int) -> np.ndarray:
-    """Fewest surfaces between a place and any of each face's samples, at most `most`, (face,)."""
-    count = len(faces.normal)
-    out = np.full(count, most, dtype=np.int64)
-    at_m, triangle = np.zeros(most), np.zeros(most, dtype=np.int64)
-    rim_m = 2.0 * SAME_M
-    samples = faces.samples
-    for face in range(count):
-        if abs(height(faces, face, place)) < SAME_M:
-            continue
-        for i in range(faces.sample_start[face], faces.sample_start[face + 1]):
-            # No need to know by how many more than so far.
-            room = out[face] - 1
-            found = crossings(faces.bvh, place, samples[i], rim_m, at_m[:room], triangle)
-            out[face] = min(out[face], found)
-            if out[face] == 0:
-                break
-    return out
 
 
 @numba.njit(cache=True, nogil=True)

@@ -213,6 +213,20 @@ def _distance(room: bpy.types.Collection) -> None:
         ):
             beyond.sheet([[(x, y, z - 0.004) for x in xs] for y in (y0, y1)], what)
     for_the_eye(beyond.build(room))
+    _far_houses(room)
+    for direction in (-1, 1):
+        end = Builder(f"end_{direction}")
+        end.box((4.0, 12.0, 9.0), (0, 0, 4.5), "facade_slate")
+        for level in range(3):
+            for column in range(5):
+                glow = "shop_glow" if (level + 2 * column) % 3 == 0 else "glass_dark"
+                y, z = 2.2 * (column - 2), 2.0 + 2.5 * level
+                end.box((0.1, 1.0, 1.4), (-2.0 * direction, y, z), glow)
+        for_the_eye(end.build(room, location=(direction * 40.0, 0.0, 0.0)))
+
+
+def _far_houses(room: bpy.types.Collection) -> None:
+    """Houses and trees on both sides of where the street goes on."""
     rng = np.random.default_rng(5)
     paints = ("facade_cream", "facade_brick", "facade_slate", "facade_white")
     for index in range(16):
@@ -231,15 +245,6 @@ def _distance(room: bpy.types.Collection) -> None:
             place = (direction * (HALF_M + 2.5 + 7.0 * row), side * 3.9, KERB_M)
             for part in tree(f"far_tree_{index}", 4.6, "foliage", 70 + index):
                 for_the_eye(part.build(room, location=place))
-    for direction in (-1, 1):
-        end = Builder(f"end_{direction}")
-        end.box((4.0, 12.0, 9.0), (0, 0, 4.5), "facade_slate")
-        for level in range(3):
-            for column in range(5):
-                glow = "shop_glow" if (level + 2 * column) % 3 == 0 else "glass_dark"
-                y, z = 2.2 * (column - 2), 2.0 + 2.5 * level
-                end.box((0.1, 1.0, 1.4), (-2.0 * direction, y, z), glow)
-        for_the_eye(end.build(room, location=(direction * 40.0, 0.0, 0.0)))
 
 
 def _light(scene: bpy.types.Scene, van: Vehicle, stage: bpy.types.Collection) -> None:

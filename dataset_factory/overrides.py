@@ -81,14 +81,12 @@ def read_options(options: SceneOptions) -> dict[str, Any]:
         if more:
             said[name] = [*_listed(said.get(name, [])), *more]
     given = {"materials": options.material, "object_materials": options.object_material}
-    for name, rows in given.items():
-        if rows:
-            # The first pattern that fits decides, so options stand first.
-            rules = dict(map(_rule, rows))
-            said[name] = {**rules, **_mapping(source, name, said.get(name)), **rules}
     for name in _RULES:
-        if name in said:
-            said[name] = [list(rule) for rule in _mapping(source, name, said[name]).items()]
+        # The first pattern that fits decides, so options stand first.
+        rules = dict(map(_rule, given[name]))
+        if rules or name in said:
+            rules = {**rules, **_mapping(source, name, said.get(name)), **rules}
+            said[name] = [list(rule) for rule in rules.items()]
     if options.ring is not None:
         said["cameras"] = {**_mapping(source, "cameras", said.get("cameras")), "ring": options.ring}
     for name, value in said.items():

@@ -66,18 +66,7 @@ def _scene_faults(sequence: Sequence, layout: Layout, table: PathTable) -> Itera
     if not set(zip(table.tx_site.tolist(), table.rx_site.tolist(), strict=True)) <= pairs:
         yield "tx_site, rx_site: pairs that are not measured"
         return
-    for name, site, device in (
-        ("tx", layout.tx_site, layout.tx_device),
-        ("rx", layout.rx_site, layout.rx_device),
-    ):
-        xyz = layout.tx_xyz if name == "tx" else layout.rx_xyz
-        own, end = getattr(table, f"{name}_site"), table.vertices[:, 0 if name == "tx" else -1]
-        centres = np.stack([xyz[site == i].mean(axis=0) for i in range(site.max() + 1)])
-        if np.abs(end - centres[own]).max() > END_LIMIT_M:
-            yield f"vertices: paths that do not end at their {name}_site"
-        owner = device[np.unique(site, return_index=True)[1]]
-        if (owner[own] != getattr(table, f"{name}_device")).any():
-            yield f"{name}_device: not the device of {name}_site"
+    yield from _end_faults(layout, table)
     length_m = np.linalg.norm(np.diff(table.vertices.astype(np.float64), axis=1), axis=2).sum(1)
     if np.abs(length_m - table.delay_s * SPEED_OF_LIGHT).max() > LENGTH_LIMIT_M:
         yield "delay_s: differs from the length of vertices"
@@ -92,6 +81,22 @@ def _scene_faults(sequence: Sequence, layout: Layout, table: PathTable) -> Itera
     ids = [row["id"] for row in sequence.info.objects]
     if not np.isin(table.object[table.kind != 0], ids).all():
         yield "object: ids missing in sequence.json"
+
+
+def _end_faults(layout: Layout, table: PathTable) -> Iterator[str]:
+    """Faults of sites and devices at both ends."""
+    for name, site, device in (
+        ("tx", layout.tx_site, layout.tx_device),
+        ("rx", layout.rx_site, layout.rx_device),
+    ):
+        xyz = layout.tx_xyz if name == "tx" else layout.rx_xyz
+        own, end = getattr(table, f"{name}_site"), table.vertices[:, 0 if name == "tx" else -1]
+        centres = np.stack([xyz[site == i].mean(axis=0) for i in range(site.max() + 1)])
+        if np.abs(end - centres[own]).max() > END_LIMIT_M:
+            yield f"vertices: paths that do not end at their {name}_site"
+        owner = device[np.unique(site, return_index=True)[1]]
+        if (owner[own] != getattr(table, f"{name}_device")).any():
+            yield f"{name}_device: not the device of {name}_site"
 
 
 def channel_error_db(

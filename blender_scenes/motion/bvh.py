@@ -83,7 +83,7 @@ def _hierarchy(
     try:
         for word in words:
             if word in ("ROOT", "JOINT"):
-                parents.append(next((j for j in reversed(line) if j is not None), -1))
+                parents.append(_last_joint(line))
                 names.append(next(words))
                 line.append(len(names) - 1)
             elif word == "End":
@@ -91,14 +91,10 @@ def _hierarchy(
                 line.append(None)
             elif word == "OFFSET":
                 offset = [float(next(words)) for _ in range(3)]
-                if line[-1] is not None:
-                    offsets.append(offset)
+                # The end of a limb has an offset too, but is no joint.
+                offsets += [offset] if line[-1] is not None else []
             elif word == "CHANNELS":
-                row = [next(words) for _ in range(int(next(words)))]
-                unknown = [name for name in row if name not in _ABOUT and name not in _ALONG]
-                if unknown:
-                    raise ValueError(f"{path}: unknown channels {', '.join(unknown)}")
-                channels.append(row)
+                channels.append(_channels(path, words))
             elif word == "}":
                 line.pop()
             elif word != "{":
@@ -108,6 +104,19 @@ def _hierarchy(
     if not names or line or not len(names) == len(offsets) == len(channels):
         raise ValueError(f"{path}: expected an OFFSET and CHANNELS for every joint")
     return names, parents, offsets, channels
+
+
+def _last_joint(line: list[int | None]) -> int:
+    """The innermost joint with an open brace, −1 for none."""
+    return next((joint for joint in reversed(line) if joint is not None), -1)
+
+
+def _channels(path: Path, words: Iterator[str]) -> list[str]:
+    row = [next(words) for _ in range(int(next(words)))]
+    unknown = [name for name in row if name not in _ABOUT and name not in _ALONG]
+    if unknown:
+        raise ValueError(f"{path}: unknown channels {', '.join(unknown)}")
+    return row
 
 
 def _motion(path: Path, body: str, columns: int) -> tuple[np.ndarray, float]:

@@ -249,13 +249,7 @@ def _shade(
             d_1, d_2 = before[p, i] + plane, after[p, i] + length - plane
             to_tx = (axes @ tx_turn[p, i]) * (d_2 / (d_1 + d_2))
             to_rx = (axes @ rx_turn[p, i]) * (d_1 / (d_1 + d_2))
-            n_rx = rx_offset.shape[1]
-            shifts = np.zeros((2, tx_offset.shape[1] * n_rx))
-            for e in range(shifts.shape[1]):
-                t, r = e // n_rx, e % n_rx
-                for axis in range(2):
-                    shifts[axis, e] = (to_tx[axis] * tx_offset[p, t]).sum()
-                    shifts[axis, e] += (to_rx[axis] * rx_offset[p, r]).sum()
+            shifts = _shifts(to_tx, to_rx, tx_offset[p], rx_offset[p])
             # Seconds that the farthest edge answers later, by which its share turns.
             late = silhouette.farthest(runs, heights, shifts) ** 2 * scale / (2.0 * SPEED_OF_LIGHT)
             choice = _choice(nodes.counts, np.pi * band * late)
@@ -268,10 +262,24 @@ def _shade(
                 wave = nodes.hz[first + line % count] / SPEED_OF_LIGHT
                 per_m_of[line] = np.sqrt(2.0 * scale * wave)
             flat = silhouette.screen_factors(table, runs, heights, every, per_m_of)
-            factors = flat.reshape((shifts.shape[1], count))
-            weights = nodes.weights[first : first + count]
+            weights, n_rx = nodes.weights[first : first + count], rx_offset.shape[1]
             for e in range(shifts.shape[1]):
-                _times(out[p, e // n_rx, e % n_rx], factors[e], weights)
+                factors = flat[e * count : (e + 1) * count]
+                _times(out[p, e // n_rx, e % n_rx], factors, weights)
+
+
+@numba.njit(cache=True)
+def _shifts(
+    to_tx: np.ndarray, to_rx: np.ndarray, tx_offset: np.ndarray, rx_offset: np.ndarray
+) -> np.ndarray:
+    """Where the line of each pair of elements meets the screen [m], shape (2, tx * rx)."""
+    n_rx = len(rx_offset)
+    shifts = np.zeros((2, len(tx_offset) * n_rx))
+    for e in range(shifts.shape[1]):
+        for axis in range(2):
+            shifts[axis, e] = (to_tx[axis] * tx_offset[e // n_rx]).sum()
+            shifts[axis, e] += (to_rx[axis] * rx_offset[e % n_rx]).sum()
+    return shifts
 
 
 @numba.njit(cache=True)

@@ -74,9 +74,7 @@ class Viewer:
             raise RfgsError(
                 f"{run.path}: no frame {begin}; it has {', '.join(map(str, self.frames))}"
             )
-        chosen = np.linspace(0, len(self.frames) - 1, min(len(self.frames), _KEPT_FRAMES))
-        bar = tqdm(chosen, desc="read", unit="frame", delay=_PATIENCE_S, leave=False)
-        samples = [self._frame_of(self.frames[round(index)]) for index in bar]
+        samples = self._samples()
         self.scales = scales_of(samples)
         if mode not in self.scales:
             raise RfgsError(
@@ -110,6 +108,12 @@ class Viewer:
         self.update()
         self.panel.on_change(self._changed.set)
         self.panel.on_look(self._look)
+
+    def _samples(self) -> list[ShownFrame]:
+        """Some frames, spread over the run."""
+        chosen = np.linspace(0, len(self.frames) - 1, min(len(self.frames), _KEPT_FRAMES))
+        bar = tqdm(chosen, desc="read", unit="frame", delay=_PATIENCE_S, leave=False)
+        return [self._frame_of(self.frames[round(index)]) for index in bar]
 
     def follow(self) -> None:
         """Follows the controls until it is interrupted."""

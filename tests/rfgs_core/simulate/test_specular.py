@@ -85,6 +85,21 @@ def test_box_room_has_every_image_path(subdivisions: int) -> None:
     assert set(paths.kinds.ravel()) == {0, SPECULAR}
 
 
+def mirror_places(planes: list[tuple[np.ndarray, float]]) -> list[np.ndarray]:
+    """Where the way by some mirrors meets them; fewer where it misses one."""
+    images = [TX]
+    for n, o in planes:
+        images.append(images[-1] - 2 * (images[-1] @ n - o) * n)
+    corners, target = [], RX
+    for (n, o), image in zip(planes[::-1], images[:0:-1], strict=True):
+        over, under = image @ n - o, target @ n - o
+        if over * under >= 0:
+            break
+        target = image + (target - image) * over / (over - under)
+        corners.insert(0, target)
+    return corners
+
+
 def plain(meshes: list[np.ndarray], depth: int) -> list[tuple]:
     """Every sequence of planes, tried one by one: kinds and corners of the paths."""
     triangles = np.concatenate(meshes)
@@ -114,18 +129,7 @@ def plain(meshes: list[np.ndarray], depth: int) -> list[tuple]:
     found = []
     for count in range(depth + 1):
         for chain in product(range(len(planes)), repeat=count):
-            images = [TX]
-            for plane in chain:
-                n, o = planes[plane]
-                images.append(images[-1] - 2 * (images[-1] @ n - o) * n)
-            corners, target = [], RX
-            for plane, image in zip(chain[::-1], images[:0:-1], strict=True):
-                n, o = planes[plane]
-                over, under = image @ n - o, target @ n - o
-                if over * under >= 0:
-                    break
-                target = image + (target - image) * over / (over - under)
-                corners.insert(0, target)
+            corners = mirror_places([planes[plane] for plane in chain])
             if len(corners) < count:
                 continue
             stops, kinds, places = [TX, *corners, RX], [], []

@@ -138,7 +138,7 @@ class Bundle:
         Raises:
             RfgsFormatError: The file is missing, damaged or does not fit the topology.
         """
-        path = self.path / "frames" / f"{frame:06d}.npz"
+        path = frame_file(self.path, frame)
         arrays = read_arrays(path, _FRAME_ARRAYS)
         vertices = arrays["vertices"]
         _expect(path, "vertices", vertices, self.topology.rest_vertices.shape)
@@ -206,6 +206,11 @@ def sanitised(name: str) -> str:
     return "".join(
         char if char.isascii() and (char.isalnum() or char in "_-") else "_" for char in name
     )
+
+
+def frame_file(bundle: Path, frame: int) -> Path:
+    """Where a bundle keeps what moves at a frame."""
+    return bundle / "frames" / f"{frame:06d}.npz"
 
 
 def read_bundle(path: Path) -> Bundle:

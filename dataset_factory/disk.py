@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dataset_factory.bundle import Bundle
+from dataset_factory.bundle import Bundle, frame_file
 from dataset_factory.job import Job
 from rfgs_core.dataset.csi_store import open_csi
 from rfgs_core.dataset.schema import SequenceInfo, device_pose
@@ -42,7 +42,7 @@ def space(job: Job, bundle: Bundle, sequence: SequenceInfo) -> Space:
     the largest of those that are there, or else as in a furnished room.
     """
     frames = len(sequence.frames)
-    frame_bytes = 2.0 * (bundle.path / "frames" / f"{sequence.frames[0]:06d}.npz").stat().st_size
+    frame_bytes = 2.0 * frame_file(bundle.path, sequence.frames[0]).stat().st_size
     once = 2.0 * sum(
         file.stat().st_size
         for file in bundle.path.rglob("*")

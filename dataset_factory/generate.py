@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from dataset_factory.bundle import Bundle, read_bundle
-from dataset_factory.cluster import threads
 from dataset_factory.devices import check_scene, choose_devices
 from dataset_factory.disk import refuse_small_disk, space
 from dataset_factory.folder import locked, open_folder, sweep
@@ -23,8 +22,9 @@ from dataset_factory.progress import progress_bar
 from dataset_factory.radios import SCENE_RADIO, scene_radio
 from dataset_factory.render import render
 from dataset_factory.scene_check import table
+from dataset_factory.schedule.channels import trace
+from dataset_factory.schedule.workers import count_workers
 from dataset_factory.sequence import describe_sequence, write_geometry
-from dataset_factory.tracing import trace
 from rfgs_core.dataset import Sequence
 from rfgs_core.dataset.csi_store import create_csi
 from rfgs_core.dataset.impaired_store import has_impaired, remove_impaired
@@ -60,7 +60,7 @@ def generate(job: Job) -> bool:
         return False
     if job.scheduler:
         # A cluster that is not there is known before the scene is exported for it.
-        threads(job.scheduler)
+        count_workers(job.scheduler)
     asked = job.plan
     begun = (job.out / "dataset.json").exists()
     logger.info("%s: %s", job.out, "continuing" if begun else "a new dataset")

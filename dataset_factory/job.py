@@ -30,7 +30,7 @@ class Job:
     blender: Blender
     """Opens the scene."""
     workers: int
-    """Tracing processes; on a cluster, those that it has when tracing begins."""
+    """Worker processes; on a cluster, those that it has when tracing begins."""
     worker_memory_gb: float = 0.0
     """Memory that each of them may take [GB]; 0 shares the machine's."""
     scheduler: str = ""

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from dataset_factory.bundle import Bundle, read_arrays
+from dataset_factory.bundle import Bundle, frame_file, read_arrays
 from rfgs_core.arrays import load_arrays
 from rfgs_core.errors import RfgsFormatError
 
@@ -54,7 +54,7 @@ def read_motion(bundle: Bundle, frame: int, span_s: float) -> Motion:
             f"{bundle.path}: holds no poses over {span_s:g} s after each frame; "
             f"export it with --span {span_s!r}"
         )
-    path = bundle.path / "frames" / f"{frame:06d}.npz"
+    path = frame_file(bundle.path, frame)
     arrays = read_arrays(path, ("vertices", "pose_offset_s", "pose_vertices"))
     wanted = np.array(rows[0]["offset_s"], dtype=np.float64)
     index = np.searchsorted(arrays["pose_offset_s"], wanted)
@@ -74,7 +74,7 @@ def read_velocity(bundle: Bundle, frame: int) -> np.ndarray:
     Raises:
         RfgsFormatError: The bundle holds none, or they do not fit its topology.
     """
-    path = bundle.path / "frames" / f"{frame:06d}.npz"
+    path = frame_file(bundle.path, frame)
     name, shape = "vertex_velocity", bundle.topology.rest_vertices.shape
     remedy = "export the scene again with --velocities"
     return load_arrays(path, remedy, {name: shape}, others=False)[name].astype(np.float64)

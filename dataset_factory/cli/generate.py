@@ -54,10 +54,11 @@ class GenerateArgs:
     seed: int = 0
     """Root seed; the same seed gives the same bytes."""
     workers: int = 2
-    """Tracing processes; each keeps one core busy."""
+    """Worker processes that trace; each keeps one core busy."""
     worker_memory: float = 0.0
     """Memory of each [GB]: at 80 % of it a process is replaced after its frame, beyond it the
-    process is killed and the frame tried once more; 0 shares 90 % of the machine's memory."""
+    process is killed and the frame tried once more; 0 shares 90 % of the machine's memory. On a
+    cluster its own limit counts."""
     scheduler: str = ""
     """Address of a Dask scheduler, as in tcp://node1:8786, whose workers trace instead. They
     need this version of RF-GS, no shared storage; see docs/cluster.md."""

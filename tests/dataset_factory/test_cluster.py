@@ -9,6 +9,7 @@ import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -19,26 +20,30 @@ from dataset_factory.job import Job
 from dataset_factory.plan import versions
 from rfgs_core.errors import RfgsError
 
-pytest.importorskip("distributed", reason="the extra 'cluster' is not installed")
-
 MakeJob = Callable[..., Job]
 Factory = Callable[..., subprocess.CompletedProcess[str]]
 Bytes = Callable[[Path], dict[str, bytes]]
 
 
-@pytest.fixture
-def cluster(tmp_path: Path) -> Iterator[Any]:
-    """Two workers of this machine, each a process that comes back when it is killed."""
+@contextmanager
+def running(folder: Path, threads: int = 1) -> Iterator[Any]:
+    """A cluster of two processes of this machine, which come back when they are killed."""
     from distributed import LocalCluster
 
     with LocalCluster(
         n_workers=2,
-        threads_per_worker=1,
+        threads_per_worker=threads,
         processes=True,
         dashboard_address=None,
-        local_directory=str(tmp_path / "dask"),
+        local_directory=str(folder / "dask"),
         silence_logs=50,
     ) as cluster:
+        yield cluster
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[Any]:
+    with running(tmp_path) as cluster:
         yield cluster
 
 
@@ -96,7 +101,7 @@ def test_workers_with_other_versions_are_refused(
     make_job: MakeJob, cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     wanted = {**versions(), "sionna-rt": "0.0.1"}
-    monkeypatch.setattr("dataset_factory.cluster.versions", lambda: wanted)
+    monkeypatch.setattr("dataset_factory.schedule.channels.versions", lambda: wanted)
     job = make_job(tmp_path / "out", images=False, scheduler=cluster.scheduler_address)
     with pytest.raises(RfgsError, match=r"a worker of the cluster has sionna-rt 2.2.0, this"):
         generate(job)
@@ -105,8 +110,16 @@ def test_workers_with_other_versions_are_refused(
 def test_an_address_without_a_scheduler_is_named(
     make_job: MakeJob, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("dataset_factory.cluster._PATIENCE_S", 1)
+    monkeypatch.setattr("dataset_factory.schedule.workers._PATIENCE_S", 1)
     job = make_job(tmp_path / "out", images=False, scheduler="tcp://127.0.0.1:9")
     with pytest.raises(RfgsError, match=r"--scheduler tcp://127.0.0.1:9: no Dask scheduler"):
         generate(job)
+    assert not (tmp_path / "out").exists(), "nothing is exported for nobody"
+
+
+def test_workers_of_several_threads_are_refused(make_job: MakeJob, tmp_path: Path) -> None:
+    with running(tmp_path, threads=2) as cluster:
+        job = make_job(tmp_path / "out", images=False, scheduler=cluster.scheduler_address)
+        with pytest.raises(RfgsError, match=r"has 2 threads, .* --nworkers 2 --nthreads 1"):
+            generate(job)
     assert not (tmp_path / "out").exists(), "nothing is exported for nobody"

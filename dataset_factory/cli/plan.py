@@ -21,8 +21,8 @@ class PlanArgs(GenerateArgs):
 
 def run(args: PlanArgs) -> int:
     """Prints the estimate."""
-    from dataset_factory.disk import gigabytes, refuse_small_disk
-    from dataset_factory.estimate import estimate
+    from dataset_factory.make.estimate import estimate
+    from dataset_factory.plan.disk import gigabytes, refuse_small_disk
     from dataset_factory.schedule.workers import count_workers
 
     job, scene = job_of(args)

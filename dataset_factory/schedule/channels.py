@@ -20,10 +20,10 @@ from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
-from dataset_factory.bundle import Bundle, frame_file
-from dataset_factory.job import Job
-from dataset_factory.pace import Clock
-from dataset_factory.plan import missing_channels, versions
+from dataset_factory.plan.contents import missing_channels, versions
+from dataset_factory.plan.job import Job
+from dataset_factory.plan.speed import Clock
+from dataset_factory.scene.bundle import Bundle, frame_file
 from dataset_factory.schedule.worker import Answer, Request, Task, trace_frame
 from dataset_factory.schedule.workers import Workers, workers_here, workers_of
 from rfgs_core.dataset.csi_store import write_csi
@@ -81,7 +81,7 @@ def _trace(
         moving = b"" if task.frame is None else frame_file(bundle.path, task.frame).read_bytes()
         return client.submit(trace_frame, request, scene, moving, task, pure=False)
 
-    pace, spent = _Paces(job), Counter()
+    speed, spent = _Speeds(job), Counter()
     with tqdm(total=len(tasks), desc="trace", unit="frame") as bar:
         for task, answer in workers.answers(tasks, submit):
             start = time.perf_counter()
@@ -90,10 +90,10 @@ def _trace(
             spent.update({f"{task.radio}.{stage}": value for stage, value in seconds.items()})
             bar.set_postfix_str(str(task), refresh=False)
             bar.update()
-            pace.step(task)
+            speed.step(task)
             told = {"seconds": seconds, "memory_bytes": answer.memory_bytes}
             job.traced.append((task.radio, task.frame, told))
-    pace.note()
+    speed.note()
     job.seconds.update({f"trace.{name}": round(value, 3) for name, value in sorted(spent.items())})
 
 
@@ -139,8 +139,8 @@ def _write(files: SequenceFiles, sequence: SequenceInfo, task: Task, answer: Ans
     write_csi(files.csi(task.radio), index, answer.value, marker)
 
 
-class _Paces:
-    """The pace of each radio's frames; radios follow one another."""
+class _Speeds:
+    """The speed of each radio's frames; radios follow one another."""
 
     def __init__(self, job: Job) -> None:
         self._job = job
@@ -156,5 +156,5 @@ class _Paces:
         self._clock.step()
 
     def note(self) -> None:
-        """Keeps the pace of the last radio."""
-        self._job.note_pace(f"trace {self._radio}", self._clock)
+        """Keeps the speed of the last radio."""
+        self._job.note_speed(f"trace {self._radio}", self._clock)

@@ -20,9 +20,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import psutil
 
-from dataset_factory.bundle import BundleFrame, frame_file, read_bundle
 from dataset_factory.children import end_with_parent
-from dataset_factory.plan import versions
+from dataset_factory.plan.contents import versions
+from dataset_factory.scene.bundle import BundleFrame, frame_file, read_bundle
 from rfgs_core.dataset.path_store import write_paths
 from rfgs_core.dataset.schema import device_pose, radio_from_json
 from rfgs_core.errors import RfgsError

@@ -10,6 +10,7 @@ from __future__ import annotations
 import logging
 import os
 import signal
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -248,6 +249,10 @@ def _hush() -> None:
     """Keeps Dask's log off the terminal: lost workers are told by what becomes of their frames."""
     for name in ("distributed", "distributed.client"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
+    quiet = "ignore:resource_tracker"
+    if quiet not in sys.warnoptions:
+        # For multiprocessing's own process: it would count what a killed run has left.
+        sys.warnoptions.append(quiet)
 
 
 @contextmanager

@@ -35,7 +35,7 @@ class Scene:
 
 def catalogue_file() -> Path:
     """The list of scenes in the installed source tree."""
-    return Path(__file__).resolve().parents[1] / "blender_scenes" / "catalogue.json"
+    return Path(__file__).resolve().parents[2] / "blender_scenes" / "catalogue.json"
 
 
 def catalogue() -> list[Scene]:

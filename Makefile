@@ -52,7 +52,7 @@ $(READY): pyproject.toml constraints.txt
 	$(PYTHON_FOUND) -m venv .venv
 	$(VENV)/python -m pip install --quiet --upgrade pip
 	@echo "Installing the pinned packages (about 4 GB on disk, several minutes) ..."
-	$(VENV)/python -m pip install --quiet --constraint constraints.txt --editable ".[dev,cluster,scenes]"
+	$(VENV)/python -m pip install --quiet --constraint constraints.txt --editable ".[dev,scenes]"
 	@touch $(READY)
 
 clean:

@@ -30,8 +30,8 @@ def run(args: BenchArgs) -> int:
     """Prints one number per line."""
     import tempfile
 
-    from dataset_factory.bench import FactoryBench, bench
-    from dataset_factory.scenes import find_scene
+    from dataset_factory.make.bench import FactoryBench, bench
+    from dataset_factory.scene.catalogue import find_scene
     from dataset_factory.trace.setup import prepare
     from rfgs_core.files import write_json
 

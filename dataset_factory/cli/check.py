@@ -10,7 +10,7 @@ from pathlib import Path
 
 import tyro
 
-from dataset_factory.overrides import SceneOptions
+from dataset_factory.scene.overrides import SceneOptions
 
 
 @dataclass(frozen=True)
@@ -57,12 +57,12 @@ class CheckArgs:
 
 def run(args: CheckArgs) -> int:
     """Prints the table, or the report as JSON."""
-    from dataset_factory.blender import Blender
-    from dataset_factory.overrides import label, read_options
-    from dataset_factory.plan import refuse_packets, whole_frames
-    from dataset_factory.radios import chosen_radios
-    from dataset_factory.scene_check import check_file, has_errors, table
-    from dataset_factory.scenes import find_scene
+    from dataset_factory.plan.contents import refuse_packets, whole_frames
+    from dataset_factory.scene.blender import Blender
+    from dataset_factory.scene.catalogue import find_scene
+    from dataset_factory.scene.overrides import label, read_options
+    from dataset_factory.scene.radios import chosen_radios
+    from dataset_factory.scene.report import check_file, has_errors, table
     from rfgs_core.files import write_json
 
     refuse_packets(args.packets_per_frame)

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 
-from dataset_factory.overrides import SceneOptions
+from dataset_factory.scene.overrides import SceneOptions
 from rfgs_core.errors import RfgsError
 
 if TYPE_CHECKING:
-    from dataset_factory.job import Job
-    from dataset_factory.outline import Outline
-    from dataset_factory.plan import Plan
-    from dataset_factory.scenes import Scene
+    from dataset_factory.plan.contents import Plan
+    from dataset_factory.plan.job import Job
+    from dataset_factory.scene.catalogue import Scene
+    from dataset_factory.scene.outline import Outline
 
 logger = logging.getLogger(__name__)
 
@@ -54,10 +54,11 @@ class GenerateArgs:
     seed: int = 0
     """Root seed; the same seed gives the same bytes."""
     workers: int = 2
-    """Tracing processes; each keeps one core busy."""
+    """Worker processes that trace; each keeps one core busy."""
     worker_memory: float = 0.0
     """Memory of each [GB]: at 80 % of it a process is replaced after its frame, beyond it the
-    process is killed and the frame tried once more; 0 shares 90 % of the machine's memory."""
+    process is killed and the frame tried once more; 0 shares 90 % of the machine's memory. On a
+    cluster its own limit counts."""
     scheduler: str = ""
     """Address of a Dask scheduler, as in tcp://node1:8786, whose workers trace instead. They
     need this version of RF-GS, no shared storage; see docs/cluster.md."""
@@ -84,7 +85,7 @@ class GenerateArgs:
 
 def run(args: GenerateArgs) -> int:
     """Makes the dataset, or what is missing of it."""
-    from dataset_factory.generate import generate
+    from dataset_factory.make.generate import generate
 
     made = generate(job_of(args)[0])
     what = "finished" if made else "already complete"
@@ -98,12 +99,18 @@ def job_of(args: GenerateArgs) -> tuple[Job, Scene]:
     Raises:
         RfgsError: An argument is out of range, or names nothing.
     """
-    from dataset_factory.blender import Blender
-    from dataset_factory.job import Job
-    from dataset_factory.outline import left_out, no_radio, read_outline, silence, usual_radios
-    from dataset_factory.overrides import label, read_options
-    from dataset_factory.plan import whole_frames
-    from dataset_factory.scenes import find_scene
+    from dataset_factory.plan.contents import whole_frames
+    from dataset_factory.plan.job import Job
+    from dataset_factory.scene.blender import Blender
+    from dataset_factory.scene.catalogue import find_scene
+    from dataset_factory.scene.outline import (
+        left_out,
+        no_radio,
+        read_outline,
+        silence,
+        usual_radios,
+    )
+    from dataset_factory.scene.overrides import label, read_options
     from rfgs_core.llvm import use_llvm
     from rfgs_core.radio import pose_span_s
 
@@ -144,7 +151,7 @@ def _plan(
     Raises:
         RfgsError: An argument is out of range, or names nothing.
     """
-    from dataset_factory.plan import make_plan
+    from dataset_factory.plan.contents import make_plan
     from rfgs_core.radio.impairments import read_impairments
 
     _refuse_depth(scene, radios, args.depth)
@@ -172,8 +179,8 @@ def _refuse_depth(scene: Scene, radios: tuple[str, ...], depth: int | None) -> N
     Raises:
         RfgsError: Naming the radio and the remedy.
     """
-    from dataset_factory.radios import SCENE_RADIO, chosen_radios
-    from dataset_factory.scenes import DEFAULT_DEPTH
+    from dataset_factory.scene.catalogue import DEFAULT_DEPTH
+    from dataset_factory.scene.radios import SCENE_RADIO, chosen_radios
     from rfgs_core.radio.check import too_deep
 
     for name, radio in chosen_radios(radios).items():

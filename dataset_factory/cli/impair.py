@@ -33,7 +33,7 @@ class ImpairArgs:
 
 def run(args: ImpairArgs) -> int:
     """Adds the impaired channels and seals the dataset anew."""
-    from dataset_factory.impair import impair_dataset
+    from dataset_factory.make.impair import impair_dataset
     from rfgs_core.radio.impairments import read_impairments
 
     settings = read_impairments(args.impairments)

@@ -21,13 +21,13 @@ class PlanArgs(GenerateArgs):
 
 def run(args: PlanArgs) -> int:
     """Prints the estimate."""
-    from dataset_factory.cluster import threads
-    from dataset_factory.disk import gigabytes, refuse_small_disk
-    from dataset_factory.estimate import estimate
+    from dataset_factory.make.estimate import estimate
+    from dataset_factory.plan.disk import gigabytes, refuse_small_disk
+    from dataset_factory.schedule.workers import count_workers
 
     job, scene = job_of(args)
     if job.scheduler:
-        job.workers = threads(job.scheduler)
+        job.workers = count_workers(job.scheduler)
     found = estimate(job, scene.frames)
     measured = "a few frames made just now" if found.measured_now else "an earlier run"
     stages = ", ".join(f"{name} {_minutes(value)}" for name, value in found.seconds.items())

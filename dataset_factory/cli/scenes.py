@@ -14,7 +14,7 @@ class ScenesArgs:
 
 def run(_args: ScenesArgs) -> int:
     """Prints name, frames, description and file of each scene."""
-    from dataset_factory.scenes import catalogue
+    from dataset_factory.scene.catalogue import catalogue
 
     for scene in catalogue():
         sys.stdout.write(

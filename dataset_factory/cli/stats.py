@@ -26,7 +26,7 @@ class StatsArgs:
 
 def run(args: StatsArgs) -> int:
     """Prints the numbers."""
-    from dataset_factory.stats import stats
+    from dataset_factory.check.stats import stats
 
     found = stats(args.dataset, args.sequence)
     if args.json:

@@ -23,7 +23,7 @@ class ValidateArgs:
 
 def run(args: ValidateArgs) -> int:
     """Prints every fault and a verdict."""
-    from dataset_factory.validate import validate
+    from dataset_factory.check.validate import validate
 
     faults = validate(args.dataset)
     for fault in faults:

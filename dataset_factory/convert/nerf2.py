@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 from tqdm import tqdm
 
-from dataset_factory.bundle import sanitised
+from dataset_factory.scene.bundle import sanitised
 from rfgs_core.dataset import Sequence
 from rfgs_core.dataset.pictures import write_png
 from rfgs_core.errors import RfgsError

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from dataset_factory.bundle import Bundle, BundleFrame
+from dataset_factory.scene.bundle import Bundle, BundleFrame
 from dataset_factory.trace.base import BaseTracer
-from dataset_factory.trace.direct import PosedPoints, direct_channel, in_sight
 from dataset_factory.trace.environment import Environment, environment_channel
-from dataset_factory.trace.paths import PathSet
-from dataset_factory.trace.shadow import Shadow, transmission
+from dataset_factory.trace.people.direct import PosedPoints, direct_channel, in_sight
+from dataset_factory.trace.rays.paths import PathSet
+from dataset_factory.trace.shadow.kirchhoff import Shadow, transmission
 from rfgs_core.radio import Radio, devices_at, layout
 from rfgs_core.radio.layout import DevicePose
 

@@ -9,13 +9,13 @@ from contextlib import contextmanager
 
 import drjit as dr
 
-from dataset_factory.bundle import Bundle
-from dataset_factory.trace.bodies import Bodies
-from dataset_factory.trace.bounces import DEPTHS
+from dataset_factory.scene.bundle import Bundle
+from dataset_factory.trace.bounces.solver import DEPTHS
 from dataset_factory.trace.environment import node_frequencies
-from dataset_factory.trace.nodes import fine_grid
-from dataset_factory.trace.scene import check_materials
-from dataset_factory.trace.shadow import Shadow
+from dataset_factory.trace.people.bodies import Bodies
+from dataset_factory.trace.rays.scene import check_materials
+from dataset_factory.trace.shadow.frequencies import fine_grid
+from dataset_factory.trace.shadow.kirchhoff import Shadow
 from rfgs_core.errors import RfgsError
 from rfgs_core.radio import Radio
 from rfgs_core.radio.check import too_deep

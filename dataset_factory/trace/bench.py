@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import sionna.rt as rt
 
-from dataset_factory.bundle import read_bundle
-from dataset_factory.trace.scene import BODY, environment_scene, mesh, move_meshes
+from dataset_factory.scene.bundle import read_bundle
+from dataset_factory.trace.rays.scene import BODY, environment_scene, mesh, move_meshes
 from rfgs_core.radio import preset
 
 

@@ -10,11 +10,11 @@ from dataclasses import replace
 import numpy as np
 import sionna.rt as rt
 
-from dataset_factory.bundle import Bundle
-from dataset_factory.trace.fields import Fields, SceneMeshes
-from dataset_factory.trace.movers import Movers
-from dataset_factory.trace.paths import PathSet, joined, merged, path_set
-from dataset_factory.trace.scene import (
+from dataset_factory.scene.bundle import Bundle
+from dataset_factory.trace.rays.fields import Fields, SceneMeshes
+from dataset_factory.trace.rays.movers import Movers
+from dataset_factory.trace.rays.paths import PathSet, joined, merged, path_set
+from dataset_factory.trace.rays.scene import (
     Group,
     add_antennas,
     centres,
@@ -23,8 +23,8 @@ from dataset_factory.trace.scene import (
     owners,
     set_frequency,
 )
-from dataset_factory.trace.shadow import Passed
-from dataset_factory.trace.steering import resampled, steer
+from dataset_factory.trace.rays.steering import resampled, steer
+from dataset_factory.trace.shadow.kirchhoff import Passed
 from rfgs_core.radio import Layout, Radio
 from rfgs_core.radio.images import DIFFUSE
 from rfgs_core.radio.layout import DevicePose

@@ -7,21 +7,22 @@ import math
 
 import numpy as np
 
-from dataset_factory.bundle import Bundle, BundleFrame
-from dataset_factory.motion import read_motion, read_velocity
+from dataset_factory.scene.bundle import Bundle, BundleFrame
+from dataset_factory.scene.motion import read_motion, read_velocity
 from dataset_factory.trace.base import BaseTracer
-from dataset_factory.trace.bounces import Bounces, with_facets
-from dataset_factory.trace.direct import PosedPoints, direct_channel, in_sight
+from dataset_factory.trace.bounces.follow import follow
+from dataset_factory.trace.bounces.solver import Bounces, with_facets
 from dataset_factory.trace.environment import (
     Environment,
     environment_channel,
 )
-from dataset_factory.trace.held import Trace, follow, mixed
-from dataset_factory.trace.met import Met
-from dataset_factory.trace.paths import PathSet
-from dataset_factory.trace.shadow import Outline, Shadow, transmission
-from dataset_factory.trace.steering import steer
-from dataset_factory.trace.table import TableMaker
+from dataset_factory.trace.instant import Trace, mixed
+from dataset_factory.trace.people.direct import PosedPoints, direct_channel, in_sight
+from dataset_factory.trace.rays.paths import PathSet
+from dataset_factory.trace.rays.steering import steer
+from dataset_factory.trace.shadow.kirchhoff import Outline, Shadow, transmission
+from dataset_factory.trace.table.corners import CornerObjects
+from dataset_factory.trace.table.maker import TableMaker
 from rfgs_core.radio import Radio, frame_samples, layout, pose_span_s
 from rfgs_core.radio.layout import DevicePose
 from rfgs_core.radio.path_table import PathTable
@@ -59,13 +60,13 @@ class Tracer(BaseTracer):
         with self._timed("environment"):
             environment = Environment(bundle, radio, self._layout, devices, self._rays)
             self._static_paths = environment.paths()
-            self._static_met = Met(bundle, environment.scene, bodies.vehicles)
+            self._static_corners = CornerObjects(bundle, environment.scene, bodies.vehicles)
             if len(bodies.vehicles):
                 environment = Environment(
                     bundle, radio, self._layout, devices, self._rays, bodies.vehicles
                 )
         self._environment = environment
-        self._met = Met(bundle, environment.scene, bodies.vehicles)
+        self._corners = CornerObjects(bundle, environment.scene, bodies.vehicles)
         self._tables = TableMaker(radio, self._layout, devices, shadow)
         self._bounces: Bounces | None = None
         # Where there is nothing to bounce off, a second interaction has nowhere to be.
@@ -80,7 +81,7 @@ class Tracer(BaseTracer):
 
     def static_paths(self) -> PathTable:
         """Paths behind `static`."""
-        return self._tables.environment(self._static_paths, self._static_met, [])
+        return self._tables.environment(self._static_paths, self._static_corners, [])
 
     def paths(self, frame: BundleFrame, trace: Trace | None = None) -> PathTable:
         """Paths behind the channel at a frame's own time.
@@ -97,10 +98,10 @@ class Tracer(BaseTracer):
         vehicles = None
         if len(bodies.vehicles):
             vehicles = bodies.vehicles.posed(frame.vertices), bodies.vehicles.posed(velocity)
-        parts = [self._tables.environment(trace.paths, self._met, trace.outlines, vehicles)]
+        parts = [self._tables.environment(trace.paths, self._corners, trace.outlines, vehicles)]
         if trace.points is not None:
-            met = Met(self._bundle, bodies.scene, bodies.vehicles)
-            parts.append(self._tables.people(trace, bodies, met, velocity, vehicles))
+            corners = CornerObjects(self._bundle, bodies.scene, bodies.vehicles)
+            parts.append(self._tables.people(trace, bodies, corners, velocity, vehicles))
         return self._tables.joined(parts)
 
     def trace(self, frame: BundleFrame) -> Trace:

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from dataset_factory.bundle import Bundle
+from dataset_factory.scene.bundle import Bundle
 from dataset_factory.verify.card import Group, Row, within
 from dataset_factory.verify.closed_forms import error_db
 from dataset_factory.verify.reciprocity import FURNISHED

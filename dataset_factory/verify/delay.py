@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from dataset_factory.bundle import Bundle
+from dataset_factory.scene.bundle import Bundle
 from dataset_factory.verify.card import Curve, Group, Plot, within
 from dataset_factory.verify.closed_forms import sphere_path_m
 from dataset_factory.verify.description import Description, Device, Part, stepping

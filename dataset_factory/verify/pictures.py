@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from dataset_factory.blender import Blender
-from dataset_factory.encode import encode_frame
+from dataset_factory.make.encode import encode_frame
+from dataset_factory.scene.blender import Blender
 from dataset_factory.verify.card import Curve, Group, Plot, at_least, within
 from dataset_factory.verify.description import Camera, Description, Part, room, stepping
 from dataset_factory.verify.rasteriser import Raster, raster

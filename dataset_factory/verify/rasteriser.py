@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dataset_factory.bundle import Bundle
+from dataset_factory.scene.bundle import Bundle
 from dataset_factory.verify.description import Camera
 
 #: Rays per block, which bounds memory.

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import jinja2
 
-from dataset_factory.plan import versions
+from dataset_factory.plan.contents import versions
 from dataset_factory.verify.card import Card, Group, Row
 from dataset_factory.verify.plots import plot_uri
 from dataset_factory.verify.text import number

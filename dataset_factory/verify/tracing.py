@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dataset_factory.bundle import Bundle
+from dataset_factory.scene.bundle import Bundle
 from dataset_factory.verify.workshop import devices_of
 from rfgs_core.radio import DevicePose, Layout, Radio, layout
 

@@ -10,10 +10,10 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from dataset_factory.blender import Blender
-from dataset_factory.bundle import Bundle, read_bundle
 from dataset_factory.children import child_environment, end_with_parent
-from dataset_factory.devices import choose_devices
+from dataset_factory.scene.blender import Blender
+from dataset_factory.scene.bundle import Bundle, read_bundle
+from dataset_factory.scene.devices import choose_devices
 from dataset_factory.verify.description import Description
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import write_json

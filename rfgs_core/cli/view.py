@@ -49,7 +49,7 @@ def run(args: ViewArgs) -> int:
     """Serves the page until Ctrl-C; exit code 0."""
     from rfgs_core.errors import RfgsError
     from rfgs_core.run import open_run
-    from rfgs_core.view.chromium import find_chromium
+    from rfgs_core.view.browser import find_chromium
     from rfgs_core.view.server import running_server
     from rfgs_core.view.snapshot import take_picture
     from rfgs_core.view.viewer import Viewer

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import write_bytes
-from rfgs_core.view.chromium import open_page
+from rfgs_core.view.browser import open_page, settled_picture
 from rfgs_core.view.server import address
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def take_picture(server: ViserServer, file: Path) -> None:
         while not server.get_clients():
             if time.monotonic() > until:
                 raise RfgsError(f"the page did not connect within {LIMIT_S:.0f} s")
-            time.sleep(0.2)
-        page.settled_picture(LIMIT_S)
+            page.wait_for_timeout(200.0)
+        settled_picture(page, LIMIT_S)
         page.evaluate(_DISMISS)
-        write_bytes(file, page.settled_picture(LIMIT_S))
+        write_bytes(file, settled_picture(page, LIMIT_S))

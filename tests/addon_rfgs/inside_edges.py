@@ -12,7 +12,7 @@ from build_scenes import box
 
 from addon_rfgs.scene.edges import SHARP, SMOOTH, UNSAID, mesh_edges, said_edges
 from addon_rfgs.scene.survey import surface_of
-from dataset_factory import bundle
+from dataset_factory.scene import bundle
 
 pytestmark = pytest.mark.usefixtures("in_room")
 

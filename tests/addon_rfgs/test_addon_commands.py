@@ -12,7 +12,7 @@ from PIL import Image
 from plyfile import PlyData, PlyElement
 from scipy.ndimage import maximum_filter
 
-from dataset_factory.bundle import Bundle, read_bundle
+from dataset_factory.scene.bundle import Bundle, read_bundle
 
 OpenEXR = pytest.importorskip("OpenEXR")
 ROOT = Path(__file__).resolve().parents[2]

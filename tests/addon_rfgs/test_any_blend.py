@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dataset_factory.bundle import read_bundle
+from dataset_factory.scene.bundle import read_bundle
 
 #: Data of others that lie beside the repository.
 SHARED = Path(__file__).resolve().parents[3] / "shared"

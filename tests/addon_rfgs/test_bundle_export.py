@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dataset_factory.bundle import SHARP, SMOOTH, UNSAID, Bundle, read_bundle
+from dataset_factory.scene.bundle import SHARP, SMOOTH, UNSAID, Bundle, read_bundle
 from rfgs_core.skeleton import JOINTS
 
 

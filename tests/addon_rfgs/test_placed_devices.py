@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dataset_factory.bundle import read_bundle
-from dataset_factory.devices import choose_devices
+from dataset_factory.scene.bundle import read_bundle
+from dataset_factory.scene.devices import choose_devices
 from rfgs_core.radio import preset
 
 HERE = Path(__file__).parent

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dataset_factory.bundle import Bundle, read_bundle
-from dataset_factory.devices import choose_devices, scene_problems
-from dataset_factory.outline import left_out
+from dataset_factory.scene.bundle import Bundle, read_bundle
+from dataset_factory.scene.devices import choose_devices, scene_problems
+from dataset_factory.scene.outline import left_out
 from rfgs_core.radio import DevicePose, place_devices, preset
 
 HERE = Path(__file__).parent

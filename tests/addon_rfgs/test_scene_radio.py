@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dataset_factory.bundle import read_bundle
-from dataset_factory.radios import scene_radio
+from dataset_factory.scene.bundle import read_bundle
+from dataset_factory.scene.radios import scene_radio
 from rfgs_core.dataset import open_dataset
 from rfgs_core.radio import preset
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dataset_factory.bundle import Bundle, read_bundle
+from dataset_factory.scene.bundle import Bundle, read_bundle
 from rfgs_core.skeleton import JOINTS
 
 pytest.importorskip("anny")

@@ -16,13 +16,13 @@ from typing import Any
 import pytest
 
 from dataset_factory import cli
-from dataset_factory.blender import Blender
-from dataset_factory.disk import Space, space
-from dataset_factory.generate import generate
-from dataset_factory.job import Job
-from dataset_factory.plan import make_plan
-from dataset_factory.scenes import find_scene
-from dataset_factory.validate import validate
+from dataset_factory.check.validate import validate
+from dataset_factory.make.generate import generate
+from dataset_factory.plan.contents import make_plan
+from dataset_factory.plan.disk import Space, space
+from dataset_factory.plan.job import Job
+from dataset_factory.scene.blender import Blender
+from dataset_factory.scene.catalogue import find_scene
 from rfgs_core.dataset import open_dataset
 from rfgs_core.dataset.writer import finish_dataset
 
@@ -109,7 +109,7 @@ def watched_box(
         return estimates[-1]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("dataset_factory.generate.space", kept)
+        patch.setattr("dataset_factory.make.generate.space", kept)
         assert generate(make_job(out))
     return out, estimates
 

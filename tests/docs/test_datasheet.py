@@ -34,7 +34,7 @@ def code_words(text: str) -> set[str]:
 @pytest.fixture(scope="module")
 def impaired(tiny_dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The tiny dataset with impaired channels."""
-    from dataset_factory.impair import impair_dataset
+    from dataset_factory.make.impair import impair_dataset
     from rfgs_core.radio.impairments import IMPAIRMENT_PRESETS
 
     path = tmp_path_factory.mktemp("datasheet") / "my_dataset"

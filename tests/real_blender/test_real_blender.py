@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 from plyfile import PlyData, PlyElement
 
-from dataset_factory.bundle import read_bundle
+from dataset_factory.scene.bundle import read_bundle
 
 pytestmark = pytest.mark.blender
 

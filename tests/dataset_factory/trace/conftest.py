@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from dataset_factory.bundle import Bundle, read_bundle
+from dataset_factory.scene.bundle import Bundle, read_bundle
 from dataset_factory.trace.setup import prepare
 from rfgs_core.files import write_json
 from rfgs_core.radio import DevicePose, Radio, preset

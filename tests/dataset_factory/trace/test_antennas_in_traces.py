@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dataset_factory.bundle import Bundle
+from dataset_factory.scene.bundle import Bundle
 from rfgs_core.radio import DevicePose, Radio, layout
 from rfgs_core.radio.antennas import PATTERNS, POLARIZATIONS, field
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
@@ -105,8 +105,8 @@ def test_dipoles_have_their_closed_form_in_both_terms(
 
 def _direct(tracer, points) -> np.ndarray:
     """The direct term of some points between the two devices, without the body's own shadow."""
-    from dataset_factory.trace.direct import direct_channel, in_sight
-    from dataset_factory.trace.scene import environment_scene
+    from dataset_factory.trace.people.direct import direct_channel, in_sight
+    from dataset_factory.trace.rays.scene import environment_scene
 
     free = environment_scene(tracer._bundle, tracer._radio)
     gamma = tracer._bodies.gamma(tracer._radio.freq_hz)
@@ -161,11 +161,11 @@ def test_direct_term_of_any_antenna_matches_the_solver(
     polarization: str,
 ) -> None:
     from dataset_factory.trace import Tracer
-    from dataset_factory.trace.bounces import Bounces, with_facets
-    from dataset_factory.trace.direct import direct_channel, in_sight
-    from dataset_factory.trace.paths import path_set
-    from dataset_factory.trace.scene import centres
-    from dataset_factory.trace.steering import steer
+    from dataset_factory.trace.bounces.solver import Bounces, with_facets
+    from dataset_factory.trace.people.direct import direct_channel, in_sight
+    from dataset_factory.trace.rays.paths import path_set
+    from dataset_factory.trace.rays.scene import centres
+    from dataset_factory.trace.rays.steering import steer
 
     radio, devices = pair(replace(small_radio, pattern=pattern, polarization=polarization), 0.4)
     devices = [replace(devices[0], quat_wxyz=(0.95, 0.2, 0.1, 0.2)), devices[1]]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from dataset_factory.bundle import Bundle
+from dataset_factory.scene.bundle import Bundle
 from rfgs_core.encode.matched_filter import aperture_filter
 from rfgs_core.errors import RfgsError
 from rfgs_core.radio import Radio, devices_at, frame_samples, place_devices, preset

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dataset_factory.bundle import Bundle
+from dataset_factory.scene.bundle import Bundle
 from rfgs_core.errors import RfgsError
 from rfgs_core.radio import DevicePose, Radio, layout, preset
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
@@ -50,7 +50,7 @@ def test_elements_match_tracing_each_of_them(
     import sionna.rt as rt
 
     from dataset_factory.trace.environment import Environment, environment_channel
-    from dataset_factory.trace.scene import centres, environment_scene
+    from dataset_factory.trace.rays.scene import centres, environment_scene
 
     radio = replace(preset("wifi"), rx_rows=4, rx_cols=4, own_device_links="excluded")
     upright = [replace(device, quat_wxyz=(1.0, 0.0, 0.0, 0.0)) for device in two_devices]
@@ -95,7 +95,7 @@ def test_empty_room_is_reciprocal(
 
 
 def test_bounding_boxes_agree_with_sionna(person_bundle: Bundle, small_radio: Radio) -> None:
-    from dataset_factory.trace.scene import environment_scene
+    from dataset_factory.trace.rays.scene import environment_scene
 
     scene = environment_scene(person_bundle, small_radio)
     meshes = person_bundle.static_meshes()

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dataset_factory.bundle import Bundle
+from dataset_factory.scene.bundle import Bundle
 from rfgs_core.radio import PRESETS, layout, place_devices
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
@@ -23,7 +23,7 @@ STEEP = 0.999
 def test_free_space_is_friis_in_amplitude_and_phase(make_bundle: MakeBundle, name: str) -> None:
     """H = λ/(4πd) e^{−jkd} for every measured link and tone."""
     from dataset_factory.trace import Tracer
-    from dataset_factory.trace.scene import centres
+    from dataset_factory.trace.rays.scene import centres
 
     radio = replace(PRESETS[name], num_devices=2)
     devices = place_devices(radio, BOUNDS_M)

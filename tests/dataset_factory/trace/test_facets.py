@@ -6,9 +6,9 @@ import pytest
 import trimesh
 from scipy.spatial import KDTree
 
-from dataset_factory.trace.facets import facet_sum
-from dataset_factory.trace.lloyd import Cells
-from dataset_factory.trace.points import surface_points
+from dataset_factory.trace.people.facets import facet_sum
+from dataset_factory.trace.people.lloyd import Cells
+from dataset_factory.trace.people.points import surface_points
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
 FREQ_HZ = np.array([5.8e9])

@@ -12,9 +12,9 @@ import pytest
 import trimesh
 from box_meshes import mesh_of
 
-from dataset_factory.bundle import SHARP, SMOOTH, UNSAID, Bundle, read_bundle
-from dataset_factory.trace.facets import facet_sum
-from dataset_factory.trace.points import SurfacePoints, surface_points, triangle_areas
+from dataset_factory.scene.bundle import SHARP, SMOOTH, UNSAID, Bundle, read_bundle
+from dataset_factory.trace.people.facets import facet_sum
+from dataset_factory.trace.people.points import SurfacePoints, surface_points, triangle_areas
 from dataset_factory.verify.physical_optics import Cuboid as Box
 from dataset_factory.verify.physical_optics import cuboid as box
 from dataset_factory.verify.physical_optics import in_sight, scattered

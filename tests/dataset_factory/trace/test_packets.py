@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dataset_factory.bundle import Bundle, read_bundle
+from dataset_factory.scene.bundle import Bundle, read_bundle
 from dataset_factory.verify.closed_forms import error_db
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json, write_json
@@ -84,7 +84,7 @@ def test_moved_bounces_keep_the_law_of_reflection(
     person_bundle: Bundle, small_radio: Radio, two_devices: list[DevicePose]
 ) -> None:
     from dataset_factory.trace import Tracer
-    from dataset_factory.trace.held import follow
+    from dataset_factory.trace.bounces.follow import follow
     from rfgs_core.radio.images import SCATTERING
 
     tracer = Tracer(person_bundle, small_radio, two_devices, depth=3)
@@ -120,7 +120,7 @@ def test_packets_agree_with_tracing_each_of_them(
     two_devices: list[DevicePose],
     coarse_capsule: tuple[np.ndarray, np.ndarray],
 ) -> None:
-    from dataset_factory.motion import read_motion
+    from dataset_factory.scene.motion import read_motion
     from dataset_factory.trace import Tracer
 
     bundle = in_motion(make_bundle(mover=coarse_capsule), (0.9, -0.6, 0.0))
@@ -144,7 +144,7 @@ def test_packets_agree_with_tracing_each_of_them(
 def test_vehicles_are_traced_at_every_packet(
     make_bundle: MakeBundle, small_radio: Radio, two_devices: list[DevicePose]
 ) -> None:
-    from dataset_factory.motion import read_motion
+    from dataset_factory.scene.motion import read_motion
     from dataset_factory.trace import Tracer
 
     vertices, faces = plate(side=1.5, cells=1)

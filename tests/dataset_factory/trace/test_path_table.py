@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dataset_factory.bundle import Bundle
+from dataset_factory.scene.bundle import Bundle
 from dataset_factory.verify.closed_forms import error_db
 from rfgs_core.radio import DevicePose, Radio, layout, preset
 from rfgs_core.radio.constants import SPEED_OF_LIGHT

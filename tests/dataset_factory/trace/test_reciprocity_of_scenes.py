@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dataset_factory.blender import Blender
-from dataset_factory.bundle import Bundle, read_bundle
+from dataset_factory.scene.blender import Blender
+from dataset_factory.scene.bundle import Bundle, read_bundle
 from dataset_factory.trace.setup import prepare
 from rfgs_core.radio import DevicePose, Layout, layout, place_devices, preset
 from rfgs_core.radio.constants import SPEED_OF_LIGHT

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from dataset_factory.trace.paths import PathSet
-from dataset_factory.trace.shadow import Outline, coarse_mesh, transmission
+from dataset_factory.trace.rays.paths import PathSet
+from dataset_factory.trace.shadow.kirchhoff import Outline, coarse_mesh, transmission
 from rfgs_core.radio import Layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 

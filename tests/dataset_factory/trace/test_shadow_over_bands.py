@@ -11,10 +11,10 @@ import trimesh
 from PIL import Image, ImageDraw
 
 from dataset_factory.trace.environment import environment_channel, node_frequencies
-from dataset_factory.trace.nodes import COUNTS, fine_grid, nodes_for
-from dataset_factory.trace.paths import PathSet
-from dataset_factory.trace.shadow import Outline, transmission
-from dataset_factory.trace.silhouette import WINDOW
+from dataset_factory.trace.rays.paths import PathSet
+from dataset_factory.trace.shadow.frequencies import COUNTS, fine_grid, nodes_for
+from dataset_factory.trace.shadow.kirchhoff import Outline, transmission
+from dataset_factory.trace.shadow.silhouette import WINDOW
 from dataset_factory.verify.closed_forms import fresnel_integral
 from rfgs_core.radio import PRESETS, Layout, Radio, preset
 from rfgs_core.radio.constants import SPEED_OF_LIGHT

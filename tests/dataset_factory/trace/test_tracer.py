@@ -8,7 +8,7 @@ import numba
 import numpy as np
 import pytest
 
-from dataset_factory.bundle import Bundle
+from dataset_factory.scene.bundle import Bundle
 from dataset_factory.verify.closed_forms import error_db
 from rfgs_core.radio import DevicePose, Radio, layout
 
@@ -29,7 +29,7 @@ def posed_body(bundle: Bundle, radio: Radio, devices: list[DevicePose]) -> tuple
 
 def bounced(tracer, points) -> np.ndarray:
     """Channel of the points by way of walls."""
-    from dataset_factory.trace.held import Trace
+    from dataset_factory.trace.instant import Trace
 
     found = tracer._bounces.paths(points, tracer._environment.around)
     return tracer._bounced(points, Trace(np.zeros(0), None, [], points, None, found))
@@ -37,9 +37,9 @@ def bounced(tracer, points) -> np.ndarray:
 
 def straight_paths(tracer, points, elements, devices):
     """Sionna's own paths to points outside the skin and on, no wall involved."""
-    from dataset_factory.trace.bounces import Bounces
-    from dataset_factory.trace.paths import path_set
-    from dataset_factory.trace.scene import centres
+    from dataset_factory.trace.bounces.solver import Bounces
+    from dataset_factory.trace.rays.paths import path_set
+    from dataset_factory.trace.rays.scene import centres
 
     scene, meshes = tracer._bodies.scene, tracer._environment.meshes
     bounces = Bounces(scene, meshes, elements, devices, depth=2, seed=1)
@@ -56,9 +56,9 @@ def test_direct_term_matches_the_solver(
     coarse_capsule: tuple[np.ndarray, np.ndarray],
     quat: tuple[float, float, float, float],
 ) -> None:
-    from dataset_factory.trace.bounces import with_facets
-    from dataset_factory.trace.direct import direct_channel, in_sight
-    from dataset_factory.trace.steering import steer
+    from dataset_factory.trace.bounces.solver import with_facets
+    from dataset_factory.trace.people.direct import direct_channel, in_sight
+    from dataset_factory.trace.rays.steering import steer
 
     radio = replace(small_radio, rx_rows=1, rx_cols=1, num_subcarriers=4)
     devices = [replace(device, quat_wxyz=quat) for device in two_devices]
@@ -81,7 +81,7 @@ def test_chunked_bounces_match_one_call(
     two_devices: list[DevicePose],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    from dataset_factory.trace import bounces
+    from dataset_factory.trace.bounces import solver as bounces
 
     tracer, points = posed_body(person_bundle, small_radio, two_devices)
     whole = bounced(tracer, points)
@@ -95,11 +95,11 @@ def test_bounces_match_those_of_many_rays(
     """Sionna's own solver with rays, tables and buffers that lose nothing in an empty room."""
     from sionna.rt.rcs import RCSSolver
 
-    from dataset_factory.trace.bounces import with_facets
-    from dataset_factory.trace.held import follow
-    from dataset_factory.trace.paths import path_set
-    from dataset_factory.trace.scene import centres
-    from dataset_factory.trace.steering import steer
+    from dataset_factory.trace.bounces.follow import follow
+    from dataset_factory.trace.bounces.solver import with_facets
+    from dataset_factory.trace.rays.paths import path_set
+    from dataset_factory.trace.rays.scene import centres
+    from dataset_factory.trace.rays.steering import steer
 
     tracer, points = posed_body(person_bundle, small_radio, two_devices)
     fields = ("positions", "normals", "areas", "material")
@@ -130,7 +130,8 @@ def test_two_walls_lose_no_path_to_a_small_table(
     """Sionna looks the size up on its class, where it is small for this solver's time alone."""
     from sionna.rt.path_solvers.sb_candidate_generator import SBCandidateGenerator
 
-    from dataset_factory.trace import Tracer, bounces
+    from dataset_factory.trace import Tracer
+    from dataset_factory.trace.bounces import solver as bounces
 
     tracer = Tracer(person_bundle, small_radio, two_devices, depth=3)
     vertices = person_bundle.frame(1).vertices

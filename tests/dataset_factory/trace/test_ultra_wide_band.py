@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from dataset_factory.bundle import Bundle
+from dataset_factory.scene.bundle import Bundle
 from rfgs_core.radio import DevicePose, preset
 
 MakeBundle = Callable[..., Bundle]

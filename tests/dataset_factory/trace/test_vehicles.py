@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dataset_factory.bundle import Bundle
-from dataset_factory.trace.movers import split_movers
+from dataset_factory.scene.bundle import Bundle
+from dataset_factory.trace.rays.movers import split_movers
 from rfgs_core.radio import DevicePose, Radio, layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
@@ -24,7 +24,7 @@ from pathlib import Path
 from dataset_factory.trace.setup import prepare
 prepare()
 from dataclasses import replace
-from dataset_factory.bundle import read_bundle
+from dataset_factory.scene.bundle import read_bundle
 from dataset_factory.trace import Tracer
 from rfgs_core.radio import DevicePose, preset
 bundle = read_bundle(Path(sys.argv[1]))

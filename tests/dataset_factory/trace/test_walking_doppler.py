@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dataset_factory.blender import Blender
-from dataset_factory.bundle import Bundle, read_bundle
-from dataset_factory.devices import choose_devices
-from dataset_factory.motion import read_motion
-from dataset_factory.scenes import find_scene
+from dataset_factory.scene.blender import Blender
+from dataset_factory.scene.bundle import Bundle, read_bundle
+from dataset_factory.scene.catalogue import find_scene
+from dataset_factory.scene.devices import choose_devices
+from dataset_factory.scene.motion import read_motion
 from dataset_factory.verify.closed_forms import error_db
 from rfgs_core.encode.micro_doppler import micro_doppler
 from rfgs_core.radio import Layout, frame_samples, layout, preset

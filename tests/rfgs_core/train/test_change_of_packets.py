@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dataset_factory.impair import impair_dataset
+from dataset_factory.make.impair import impair_dataset
 from rfgs_core.cli import main
 from rfgs_core.dataset import Sequence, open_dataset
 from rfgs_core.dataset.csi_store import create_csi, write_csi

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dataset_factory.impair import impair_dataset
+from dataset_factory.make.impair import impair_dataset
 from rfgs_core.dataset import open_dataset
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.evaluate.metrics import evaluate_run

@@ -14,6 +14,7 @@ import time
 import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ from viser_client import Client, connected
 from rfgs_core.cli import main
 from rfgs_core.errors import MissingToolError, RfgsError
 from rfgs_core.run import Run, open_run
-from rfgs_core.view.chromium import find_chromium
+from rfgs_core.view.browser import find_chromium
 from rfgs_core.view.colors import TITLES
 from rfgs_core.view.server import address, running_server
 from rfgs_core.view.viewer import Viewer
@@ -243,8 +244,12 @@ def test_wrong_runs_are_one_line(
 
 
 def test_without_chromium_the_picture_names_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "playwright", ModuleType("playwright"))
     monkeypatch.setenv("PATH", "")
     with pytest.raises(MissingToolError, match="apt-get install -y chromium"):
+        find_chromium()
+    monkeypatch.setitem(sys.modules, "playwright", None)
+    with pytest.raises(MissingToolError, match=r"pip install 'rfgs\[picture\]'"):
         find_chromium()
 
 

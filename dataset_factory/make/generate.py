@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Makes a dataset stage by stage; a stopped run continues with what is missing."""
+
+from __future__ import annotations
+
+import logging
+import shutil
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+
+from dataset_factory.make.impair import impair_radio
+from dataset_factory.make.render import render
+from dataset_factory.make.sequence import describe_sequence, write_geometry
+from dataset_factory.plan.contents import versions
+from dataset_factory.plan.disk import refuse_small_disk, space
+from dataset_factory.plan.folder import locked, open_folder, sweep
+from dataset_factory.plan.job import Job
+from dataset_factory.plan.progress import progress_bar
+from dataset_factory.plan.speed_cache import remember
+from dataset_factory.scene.bundle import Bundle, read_bundle
+from dataset_factory.scene.devices import check_scene, choose_devices
+from dataset_factory.scene.radios import SCENE_RADIO, scene_radio
+from dataset_factory.scene.report import table
+from dataset_factory.schedule.channels import trace
+from dataset_factory.schedule.workers import count_workers
+from rfgs_core.dataset import Sequence
+from rfgs_core.dataset.csi_store import create_csi
+from rfgs_core.dataset.impaired_store import has_impaired, remove_impaired
+from rfgs_core.dataset.schema import DatasetInfo, SequenceInfo
+from rfgs_core.dataset.writer import (
+    finish_dataset,
+    write_dataset_info,
+    write_sequence_info,
+    write_transforms,
+)
+from rfgs_core.errors import RfgsError
+from rfgs_core.files import read_json, write_json
+from rfgs_core.radio import DevicePose, frame_samples, layout, pose_span_s
+from rfgs_core.radio.check import too_far
+from rfgs_core.radio.impairments import impairments_from_json
+
+logger = logging.getLogger(__name__)
+
+#: Radios that tell paths of this length apart need no look at the scene's size beforehand [m].
+_ANY_SCENE_M = 100.0
+
+
+def generate(job: Job) -> bool:
+    """Makes the dataset, or what is missing of it.
+
+    Returns:
+        False if everything had been there already.
+
+    Raises:
+        RfgsError: The folder holds something else, or the scene cannot be used.
+    """
+    if not open_folder(job):
+        return False
+    if job.scheduler:
+        # A cluster that is not there is known before the scene is exported for it.
+        count_workers(job.scheduler)
+    asked = job.plan
+    begun = (job.out / "dataset.json").exists()
+    logger.info("%s: %s", job.out, "continuing" if begun else "a new dataset")
+    with locked(job):
+        sweep(job.out)
+        info = DatasetInfo(versions(), asdict(job.plan), job.plan.seed, _contents(job), [job.name])
+        with job.stage("export"):
+            bundle = _export(job)
+        logger.info("%s", table(read_json(bundle.path / "check.json")))
+        if SCENE_RADIO in job.plan.radios:
+            job = replace(job, plan=job.plan.with_radio(scene_radio(bundle)))
+        _tell_depth(job)
+        devices, guesses = _choose(job, bundle)
+        # Only a usable scene claims the folder: who mends theirs may use the same --out again.
+        if not (job.out / "dataset.json").exists():
+            write_dataset_info(job.out, info)
+        sequence = _prepare(job, bundle, devices, guesses)
+        needed = space(job, bundle, sequence)
+        refuse_small_disk(job, needed.bytes(len(sequence.frames)))
+        with job.stage("trace"):
+            trace(job, bundle, sequence)
+        needed = space(job, bundle, sequence)
+        if job.plan.impairments:
+            with job.stage("impair"):
+                _impair(job)
+        if job.plan.images:
+            with job.stage("render"):
+                render(job, sequence)
+        with job.stage("finish"):
+            write_geometry(job.files, bundle)
+            if job.plan.images:
+                write_transforms(job.files, sequence)
+            made = {**info.versions, "blender": bundle.info["blender_version"]}
+            finish_dataset(
+                job.out,
+                DatasetInfo(made, info.config, info.root_seed, info.has, info.sequences),
+            )
+    shutil.rmtree(job.work)
+    # Later estimates ask before they know the scene's radio.
+    remember(replace(job, plan=asked), len(sequence.frames), len(sequence.cameras), needed)
+    return True
+
+
+def _tell_depth(job: Job) -> None:
+    for name in job.plan.radios:
+        radio = job.plan.radio(name)
+        if radio.deepest < job.plan.depth:
+            why = "its antennas move" if radio.antennas_move else "its band is ultra-wide"
+            logger.info("%s: traced at depth %d, as %s", name, radio.deepest, why)
+
+
+def _contents(job: Job) -> list[str]:
+    pictures = ["images", "depth", "normal", "mask"] if job.plan.images else []
+    impaired = ["csi_impaired"] if job.plan.impairments else []
+    paths = ["paths"] if job.plan.paths else []
+    return ["csi", "csi_static", *impaired, *paths, *pictures, "geometry"]
+
+
+def _impair(job: Job) -> None:
+    settings = impairments_from_json(job.plan.impairments)
+    sequence = Sequence(job.files.root, job.name)
+    for radio in sequence.radios:
+        if not has_impaired(job.files.csi(radio)):
+            remove_impaired(job.files.csi(radio))
+            impair_radio(sequence, radio, settings, job.plan.seed)
+
+
+def _export(job: Job) -> Bundle:
+    target, plan_file = job.work / "bundle", job.work / "plan.json"
+    plan = asdict(job.plan)
+    if not plan_file.is_file() or read_json(plan_file) != plan:
+        shutil.rmtree(target, ignore_errors=True)
+        write_json(plan_file, plan)
+    if not (target / "bundle.json").is_file():
+        _refuse_large_scene(job)
+        fresh = job.work / "bundle.new"
+        shutil.rmtree(fresh, ignore_errors=True)
+        logger.info("exporting the scene from Blender")
+        arguments = ["--out", str(fresh), *job.picture_size]
+        frames = ["--frames", job.plan.frames] if job.plan.frames else []
+        spans = {pose_span_s(job.plan.radio(name)) for name in job.plan.radios}
+        spans_s = sorted(span_s for span_s in spans if span_s is not None)
+        poses = [text for span_s in spans_s for text in ("--span", repr(span_s))]
+        more = [*frames, *poses, *(["--velocities"] if job.plan.paths else [])]
+        with progress_bar("export", "frame") as progress, job.clock("export") as clock:
+
+            def step(done: int, total: int) -> None:
+                progress(done, total)
+                clock.step()
+
+            job.run_blender("export", *arguments, *more, progress=step)
+        read_bundle(fresh)
+        fresh.rename(target)
+    return read_bundle(target)
+
+
+def _refuse_large_scene(job: Job) -> None:
+    """Refuses a scene too large for a radio before all of its frames are exported.
+
+    Raises:
+        RfgsError: A radio's tones are too far apart for the scene.
+    """
+    radios = [job.plan.radio(name) for name in job.plan.radios]
+    if all(radio.unambiguous_path_m > _ANY_SCENE_M for radio in radios):
+        return
+    file = job.work / "check.json"
+    asked = ["--frames", job.plan.frames] if job.plan.frames else []
+    job.run_blender("check", "--out", str(file), *asked)
+    bounds_m = read_json(file)["scene"]["bounds_m"]
+    if bounds_m is None:
+        # Nothing moves, or the like: the export says so.
+        return
+    problems = [text for radio in radios for text in too_far(radio, np.array(bounds_m))]
+    if problems:
+        raise RfgsError(f"{job.blender.blend.stem}: " + "; also: ".join(problems))
+
+
+def _choose(job: Job, bundle: Bundle) -> tuple[dict[str, list[DevicePose]], list[dict[str, Any]]]:
+    """Chooses each radio's devices and refuses what cannot be traced."""
+    radios = [job.plan.radio(name) for name in job.plan.radios]
+    devices, guesses = {}, []
+    for radio in radios:
+        devices[radio.name], guess = choose_devices(bundle, radio)
+        own = f"{len(devices[radio.name])} devices, the scene's own"
+        logger.info("%s: %s", radio.name, guess["value"] if guess else own)
+        guesses += [guess] if guess else []
+    check_scene(bundle, devices, radios)
+    if job.plan.images and not bundle.cameras:
+        raise RfgsError(f"{job.blender.blend}: no camera; add one or use --no-images")
+    return devices, guesses
+
+
+def _prepare(
+    job: Job,
+    bundle: Bundle,
+    devices: dict[str, list[DevicePose]],
+    guesses: list[dict[str, Any]],
+) -> SequenceInfo:
+    """Writes `sequence.json` and an empty store for each radio."""
+    sequence = describe_sequence(job.plan, bundle, devices, guesses)
+    write_sequence_info(job.files, sequence)
+    times = [(frame - sequence.frame_start) / sequence.fps for frame in sequence.frames]
+    for name, poses in devices.items():
+        radio = job.plan.radio(name)
+        samples = frame_samples(radio, sequence.fps, poses)
+        create_csi(
+            job.files.csi(name), radio, layout(radio, poses), sequence.frames, times, samples
+        )
+    return sequence

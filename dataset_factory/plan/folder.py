@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The folder of a dataset that is being made: whose it is, and what a killed run left there."""
+
+from __future__ import annotations
+
+import fcntl
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from dataset_factory.plan.contents import refuse_other_plan
+from dataset_factory.plan.job import Job
+from rfgs_core.dataset.schema import read_dataset_info
+from rfgs_core.errors import RfgsError
+
+
+def open_folder(job: Job) -> bool:
+    """Whether something is left to make; nothing is written.
+
+    Raises:
+        RfgsError: The folder holds something else, or a dataset with other settings.
+    """
+    file = job.out / "dataset.json"
+    if file.is_file():
+        stored = read_dataset_info(file)
+        made_with = {} if stored.manifest_sha256 else stored.versions
+        refuse_other_plan(job.out, job.plan, stored.config, made_with)
+        if stored.manifest_sha256:
+            # Killed while tidying up: nothing is missing.
+            shutil.rmtree(job.work, ignore_errors=True)
+            return False
+    elif job.out.is_dir() and any(
+        entry.name not in (".work", "log") and not entry.name.startswith(".tmp-")
+        for entry in job.out.iterdir()
+    ):
+        raise RfgsError(f"{job.out}: not empty and no dataset; choose another --out")
+    elif job.out.exists() and not job.out.is_dir():
+        raise RfgsError(f"{job.out}: a file of that name exists; choose another --out")
+    return True
+
+
+@contextmanager
+def locked(job: Job) -> Iterator[None]:
+    """Keeps other runs out of the folder.
+
+    Where the block refuses the scene before it claims the folder, nothing is left of it.
+
+    Raises:
+        RfgsError: One is at work there.
+    """
+    made = [place for place in (job.out, *job.out.absolute().parents) if not place.exists()]
+    job.work.mkdir(parents=True, exist_ok=True)
+    with (job.work / "lock").open("w") as stream:
+        try:
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise RfgsError(f"{job.out}: another rfgs-factory is working on it") from error
+        try:
+            yield
+        except RfgsError:
+            if not (job.out / "dataset.json").exists():
+                _take_back(job, made)
+            raise
+
+
+def _take_back(job: Job, made: list[Path]) -> None:
+    """Removes what a run wrote, and the folders that it made, the innermost first."""
+    shutil.rmtree(job.work, ignore_errors=True)
+    (job.out / "log" / "generate.json").unlink(missing_ok=True)
+    for place in (job.out / "log", *made):
+        # Where somebody else keeps something it stays.
+        with suppress(OSError):
+            place.rmdir()
+
+
+def sweep(out: Path) -> None:
+    """Removes half-written files that a killed run left behind."""
+    for entry in [*out.rglob(".tmp-*"), *out.rglob("*.partial")]:
+        if entry.is_dir():
+            shutil.rmtree(entry)
+        else:
+            entry.unlink(missing_ok=True)

@@ -1,0 +1,316 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reads scene bundles: what Blender knows about a scene, as plain files."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dataset_factory.scene.room import Room, read_room
+from rfgs_core.arrays import load_arrays
+from rfgs_core.dataset.mesh_ply import read_mesh
+from rfgs_core.errors import RfgsFormatError
+from rfgs_core.files import inside, read_json
+
+SCHEMA = "rfgs-bundle/1"
+NUM_JOINTS = 17
+#: What `Topology.edges` says of a triangle's side: nothing, that the surface is smooth across
+#: it, that the surface has an edge there.
+UNSAID, SMOOTH, SHARP = -1, 0, 1
+
+_FRAME_ARRAYS = ("vertices", "joints", "segment_velocity", "person_instance", "action")
+_FIELDS: dict[str, type | tuple[type, ...]] = {
+    "blend_name": str,
+    "blend_sha256": str,
+    "blender_version": str,
+    "fps": (int, float),
+    "frame_start": int,
+    "frame_end": int,
+    "frames": list,
+    "bounds_m": list,
+    "devices": list,
+    "cameras": list,
+    "materials": list,
+    "objects": list,
+    "instances": list,
+}
+_ROWS: dict[str, tuple[str, ...]] = {
+    "devices": ("name", "radio", "role", "position_m", "quat_wxyz"),
+    "cameras": ("name", "width", "height", "fl_x", "fl_y", "cx", "cy", "world_from_camera"),
+    "materials": ("name", "radio_material", "thickness_m", "scattering_coefficient"),
+    "objects": ("id", "name", "class", "instance", "moving", "files"),
+    "instances": ("id", "name", "class", "person"),
+}
+
+
+@dataclass(frozen=True)
+class Topology:
+    """What stays the same in every frame about everything that moves."""
+
+    faces: np.ndarray
+    """Vertex indices of each triangle, int32, shape (T, 3)."""
+    material: np.ndarray
+    """Index into the bundle's materials of each triangle, int32, shape (T,)."""
+    instance: np.ndarray
+    """Instance id of each triangle, int32, shape (T,)."""
+    segment: np.ndarray
+    """Joint of `rfgs_core.skeleton` that each triangle follows or -1, int32, shape (T,)."""
+    rest_vertices: np.ndarray
+    """Vertices in the rest pose [m], float32, shape (V, 3)."""
+    edges: np.ndarray
+    """Whether the side from each corner of a triangle to the next is an edge of the surface, as
+    far as the mesh says so: `SHARP`, `SMOOTH` or `UNSAID`, int8, shape (T, 3)."""
+
+
+@dataclass(frozen=True)
+class BundleFrame:
+    """Everything that moves, at one frame."""
+
+    frame: int
+    """Blender frame number."""
+    vertices: np.ndarray
+    """World positions [m], float32, shape (V, 3)."""
+    joints: np.ndarray
+    """Joint positions of each person [m], float32, shape (P, 17, 3); NaN where unknown."""
+    segment_velocity: np.ndarray
+    """Velocity of the centre of each body segment's skin [m/s], float32, shape (P, 17, 3); NaN
+    where joints are unknown."""
+    person_instance: np.ndarray
+    """Instance id of each person, int32, shape (P,)."""
+    action: np.ndarray
+    """Action label of each person, shape (P,), strings."""
+
+
+@dataclass(frozen=True)
+class StaticMesh:
+    """One (object, material) pair of the static scene."""
+
+    name: str
+    """File name without suffix, `<object>__<material>`."""
+    material_index: int
+    """Index into the bundle's materials."""
+    vertices: np.ndarray
+    """World positions [m], float32, shape (V, 3)."""
+    faces: np.ndarray
+    """Vertex indices of each triangle, int32, shape (T, 3)."""
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """A scene bundle on disk."""
+
+    path: Path
+    """Folder of the bundle."""
+    info: dict[str, Any]
+    """All of `bundle.json`."""
+    devices: list[dict[str, Any]]
+    """Radio devices the scene brings."""
+    cameras: list[dict[str, Any]]
+    """Cameras by name."""
+    materials: list[dict[str, Any]]
+    """Materials that faces refer to by index."""
+    objects: list[dict[str, Any]]
+    """Objects of the scene."""
+    instances: list[dict[str, Any]]
+    """Instances, ids from 1; 0 is everything static."""
+    topology: Topology
+    """Triangles of everything that moves."""
+    bounds_m: np.ndarray
+    """Minimum and maximum of the scene over its frames [m], shape (2, 3)."""
+    frames: list[int]
+    """Frames that were exported."""
+    fps: float
+    """Frames per second."""
+    room: Room | None = None
+    """The room around the people; None where nothing stands still."""
+
+    @property
+    def room_m(self) -> np.ndarray:
+        """Box of the room around the people, else the scene's bounds [m], shape (2, 3)."""
+        return self.bounds_m if self.room is None else self.room.box_m
+
+    def frame(self, frame: int) -> BundleFrame:
+        """Reads what moves at one frame.
+
+        Raises:
+            RfgsFormatError: The file is missing, damaged or does not fit the topology.
+        """
+        path = frame_file(self.path, frame)
+        arrays = read_arrays(path, _FRAME_ARRAYS)
+        vertices = arrays["vertices"]
+        _expect(path, "vertices", vertices, self.topology.rest_vertices.shape)
+        people = len(arrays["person_instance"])
+        labels = {name: arrays[name] for name in ("joints", "segment_velocity")}
+        for name, values in labels.items():
+            known = np.where(unknown_joints(values)[:, None, None], 0.0, values)
+            _expect(path, name, known, (people, NUM_JOINTS, 3))
+        joints, velocity = (values.astype(np.float32) for values in labels.values())
+        _expect(path, "action", arrays["action"], (people,))
+        return BundleFrame(
+            frame=frame,
+            vertices=vertices.astype(np.float32),
+            joints=joints,
+            segment_velocity=velocity,
+            person_instance=arrays["person_instance"].astype(np.int32),
+            action=arrays["action"].astype(str),
+        )
+
+    @property
+    def path_objects(self) -> list[dict[str, Any]]:
+        """What paths can meet: each static object, then each moving instance, ids from 1."""
+        still = [
+            {"name": row["name"], "class": "static", "instance": 0}
+            for row in self.objects
+            if row["files"]
+        ]
+        moving = [
+            {"name": row["name"], "class": row["class"], "instance": row["id"]}
+            for row in self.instances
+        ]
+        return [{"id": number, **row} for number, row in enumerate([*still, *moving], start=1)]
+
+    def static_meshes(self) -> list[StaticMesh]:
+        """Reads every static mesh, in the order of the object table.
+
+        Raises:
+            RfgsFormatError: A mesh is missing, damaged or of an unknown material.
+        """
+        by_name = {sanitised(row["name"]): index for index, row in enumerate(self.materials)}
+        meshes = []
+        for row in self.objects:
+            for name in row["files"]:
+                path = inside(self.path, name)
+                # Material names may hold the separator themselves: the longest fit is meant.
+                fits = [known for known in by_name if path.stem.endswith(f"__{known}")]
+                if not fits:
+                    raise RfgsFormatError(
+                        f"{path}: expected a name <object>__<material> with a material of "
+                        "bundle.json"
+                    )
+                material = max(fits, key=len)
+                vertices, faces = read_mesh(path)
+                meshes.append(StaticMesh(path.stem, by_name[material], vertices, faces))
+        return meshes
+
+
+def unknown_joints(joints: np.ndarray) -> np.ndarray:
+    """Which people have no joints: all NaN, as bundles write it; bool, shape (P,), P may be 0."""
+    return np.isnan(joints).all(axis=tuple(range(1, joints.ndim)))
+
+
+def sanitised(name: str) -> str:
+    """A name as bundles spell it in file names: only letters, digits, `_` and `-`."""
+    return "".join(
+        char if char.isascii() and (char.isalnum() or char in "_-") else "_" for char in name
+    )
+
+
+def frame_file(bundle: Path, frame: int) -> Path:
+    """Where a bundle keeps what moves at a frame."""
+    return bundle / "frames" / f"{frame:06d}.npz"
+
+
+def read_bundle(path: Path) -> Bundle:
+    """Opens a scene bundle and checks that it holds what its schema promises.
+
+    Args:
+        path: Folder with `bundle.json`.
+
+    Returns:
+        The bundle; frames and static meshes are read when asked for.
+
+    Raises:
+        RfgsError: There is no such bundle.
+        RfgsFormatError: A file is damaged, of another schema or contradicts another.
+    """
+    path = Path(path)
+    file = path / "bundle.json"
+    info = read_json(file)
+    _check_info(file, info)
+    bounds = np.asarray(info["bounds_m"], dtype=np.float64)
+    if bounds.shape != (2, 3) or not np.isfinite(bounds).all() or (bounds[1] < bounds[0]).any():
+        raise RfgsFormatError(f"{file}: bounds_m: expected [[min xyz], [max xyz]], got {bounds}")
+    topology = _read_topology(path / "topology.npz", info)
+    return Bundle(
+        path=path,
+        info=info,
+        devices=info["devices"],
+        cameras=info["cameras"],
+        materials=info["materials"],
+        objects=info["objects"],
+        instances=info["instances"],
+        topology=topology,
+        bounds_m=bounds,
+        frames=[int(frame) for frame in info["frames"]],
+        fps=float(info["fps"]),
+        room=read_room(file, info.get("room")),
+    )
+
+
+def read_arrays(
+    path: Path, names: tuple[str, ...], *, others: bool = False
+) -> dict[str, np.ndarray]:
+    """Reads named arrays of a bundle's `.npz` file, and no others unless asked to.
+
+    Raises:
+        RfgsError: There is no such file.
+        RfgsFormatError: The file is damaged or lacks an array.
+    """
+    return load_arrays(path, "export the scene again", dict.fromkeys(names), others=others)
+
+
+def _check_info(file: Path, info: Any) -> None:
+    schema = info.get("schema") if isinstance(info, dict) else None
+    if schema != SCHEMA:
+        raise RfgsFormatError(f"{file}: expected schema {SCHEMA!r}, got {schema!r}")
+    for name, kind in _FIELDS.items():
+        if not isinstance(info.get(name), kind):
+            raise RfgsFormatError(f"{file}: field {name!r} is missing or of the wrong type")
+    for table, columns in _ROWS.items():
+        for index, row in enumerate(info[table]):
+            missing = [column for column in columns if column not in row]
+            if missing:
+                raise RfgsFormatError(f"{file}: {table}[{index}] lacks {', '.join(missing)}")
+    if info["fps"] <= 0 or not info["frames"]:
+        raise RfgsFormatError(f"{file}: expected fps > 0 and at least one frame")
+
+
+def _read_topology(path: Path, info: dict[str, Any]) -> Topology:
+    names = ("faces", "material", "instance", "segment", "rest_vertices")
+    arrays = read_arrays(path, names, others=True)
+    faces, vertices = arrays["faces"], arrays["rest_vertices"]
+    # Bundles of earlier versions say nothing of edges.
+    edges = arrays.get("edges", np.full((len(faces), 3), UNSAID))
+    _expect(path, "edges", edges, (len(faces), 3))
+    if not np.isin(edges, (UNSAID, SMOOTH, SHARP)).all():
+        raise RfgsFormatError(f"{path}: edges: expected {UNSAID}, {SMOOTH} or {SHARP}")
+    _expect(path, "faces", faces, (len(faces), 3))
+    _expect(path, "rest_vertices", vertices, (len(vertices), 3))
+    for name in ("material", "instance", "segment"):
+        _expect(path, name, arrays[name], (len(faces),))
+    instances = {row["id"] for row in info["instances"]}
+    limits = {"faces": len(vertices), "material": len(info["materials"])}
+    for name, limit in limits.items():
+        values = arrays[name]
+        if values.size and not 0 <= values.min() <= values.max() < limit:
+            raise RfgsFormatError(f"{path}: {name}: expected indices below {limit}")
+    if not set(np.unique(arrays["instance"]).tolist()) <= instances:
+        raise RfgsFormatError(f"{path}: instance: expected ids of the table in bundle.json")
+    return Topology(
+        faces=faces.astype(np.int32),
+        material=arrays["material"].astype(np.int32),
+        instance=arrays["instance"].astype(np.int32),
+        segment=arrays["segment"].astype(np.int32),
+        rest_vertices=vertices.astype(np.float32),
+        edges=edges.astype(np.int8),
+    )
+
+
+def _expect(path: Path, name: str, array: np.ndarray, shape: tuple[int, ...]) -> None:
+    if array.shape != shape:
+        raise RfgsFormatError(f"{path}: {name}: expected shape {shape}, got {array.shape}")
+    if array.dtype.kind == "f" and not np.isfinite(array).all():
+        raise RfgsFormatError(f"{path}: {name}: expected finite numbers")

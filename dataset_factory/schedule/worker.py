@@ -1,0 +1,243 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What runs inside a worker: it keeps a scene loaded and traces one frame after the other.
+
+A worker is a process with one thread, since Dr.Jit and numba run best so. It shares nothing with
+the process that writes the dataset: scenes and moving meshes come along with the frames, channels
+go back.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import tarfile
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import psutil
+
+from dataset_factory.children import end_with_parent
+from dataset_factory.plan.contents import versions
+from dataset_factory.scene.bundle import BundleFrame, frame_file, read_bundle
+from rfgs_core.dataset.path_store import write_paths
+from rfgs_core.dataset.schema import device_pose, radio_from_json
+from rfgs_core.errors import RfgsError
+from rfgs_core.radio.path_table import PathTable
+
+if TYPE_CHECKING:
+    from dataset_factory.trace import ApertureTracer, Tracer
+
+#: Frames after which a worker asks for another process: a start costs seconds.
+FRESH_AFTER_FRAMES = 300
+#: Share of its memory limit beyond which it asks for one.
+FRESH_AFTER_SHARE = 0.8
+
+
+@dataclass(frozen=True)
+class Task:
+    """One frame of one radio."""
+
+    radio: str
+    """Preset name."""
+    frame: int | None
+    """Frame number; None is the static channel."""
+
+    def __str__(self) -> str:
+        return f"{self.radio}, " + ("static" if self.frame is None else f"frame {self.frame}")
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a worker has to say of a frame."""
+
+    value: np.ndarray
+    """The channel."""
+    paths: bytes
+    """Its table of paths as a file; empty if there is none."""
+    seconds: dict[str, float]
+    """Time spent on it per stage [s]."""
+    memory_bytes: int
+    """Memory of the process after it [B]."""
+    worker: str
+    """Address of the worker."""
+    wants_fresh_process: bool
+    """Whether the worker has traced, or holds, so much that another process should go on."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """What a run asks of every worker."""
+
+    key: str
+    """Tells this run from others that a worker may know."""
+    radios: dict[str, Any]
+    """Radios by name, as JSON holds them."""
+    devices: dict[str, list[dict[str, Any]]]
+    """Device poses by radio, as JSON holds them."""
+    depth: int
+    """Interactions of a path; radios that cannot go so deep go as deep as they can."""
+    shadow: Any
+    """How bodies shadow paths."""
+    seed: int
+    """Root seed."""
+    paths: bool
+    """Whether tables of paths are wanted too."""
+    versions: dict[str, str]
+    """Versions of the packages that make the data."""
+    log: str = ""
+    """Folder for what libraries print; empty leaves it where it goes."""
+
+
+class SceneTracer:
+    """Traces frames of one scene, with the tracer of the current radio loaded."""
+
+    def __init__(self, request: Request, bundle: Path) -> None:
+        """Opens the scene."""
+        from dataset_factory.trace.setup import prepare
+
+        prepare(threads=1)
+        self._request = request
+        self._bundle = read_bundle(bundle)
+        self._radio = ""
+        self._tracer: Tracer | ApertureTracer | None = None
+
+    def trace(self, task: Task) -> tuple[np.ndarray, PathTable | None, dict[str, float]]:
+        """Channel of a frame, the paths behind it if they are wanted, and seconds per stage."""
+        known = self._tracer if self._radio == task.radio else None
+        before = dict(known.timings) if known else {}
+        tracer = known or self._load(task.radio)
+        frame = None if task.frame is None else self._bundle.frame(task.frame)
+        value, table = self._traced(tracer, frame)
+        spent = {stage: s - before.get(stage, 0.0) for stage, s in tracer.timings.items()}
+        return value, table, spent
+
+    def _traced(
+        self, tracer: Tracer | ApertureTracer, frame: BundleFrame | None
+    ) -> tuple[np.ndarray, PathTable | None]:
+        from dataset_factory.trace import Tracer
+
+        if not (self._request.paths and isinstance(tracer, Tracer)):
+            return tracer.static() if frame is None else tracer.samples(frame), None
+        if frame is None:
+            return tracer.static(), tracer.static_paths()
+        trace = tracer.trace(frame)
+        return tracer.samples(frame, trace), tracer.paths(frame, trace)
+
+    def _load(self, radio: str) -> Tracer | ApertureTracer:
+        from dataset_factory.trace import ApertureTracer, Tracer
+
+        request = self._request
+        devices = [device_pose(row) for row in request.devices[radio]]
+        spec = radio_from_json(self._bundle.path, request.radios[radio])
+        kind = ApertureTracer if spec.antennas_move else Tracer
+        # The one before is dropped first: two scenes at once would take twice the memory.
+        self._tracer, self._radio = None, radio
+        self._tracer = kind(
+            self._bundle,
+            spec,
+            devices,
+            depth=min(request.depth, spec.deepest),
+            shadow=request.shadow,
+            seed=request.seed,
+        )
+        return self._tracer
+
+
+class _Place:
+    """Where this worker keeps the scene of a run."""
+
+    def __init__(self, request: Request, scene: bytes, worker: Any) -> None:
+        refuse_other_versions(request.versions)
+        if request.log:
+            _begin(Path(request.log) / f"worker{worker.name}.log")
+        self.key, self.frames = request.key, 0
+        self._folder = tempfile.TemporaryDirectory(prefix="rfgs-", dir=worker.local_directory)
+        self.path = Path(self._folder.name)
+        self.bundle = self.path / "bundle"
+        with tarfile.open(fileobj=io.BytesIO(scene), mode="r:gz") as archive:
+            archive.extractall(self.bundle, filter="data")
+        (self.bundle / "frames").mkdir()
+        self.tracer = SceneTracer(request, self.bundle)
+
+    def close(self) -> None:
+        """Removes the scene."""
+        self._folder.cleanup()
+
+
+_place: _Place | None = None
+
+
+def trace_frame(request: Request, scene: bytes, moving: bytes, task: Task) -> Answer:
+    """Traces one frame.
+
+    Args:
+        request: What the run asks of every worker.
+        scene: The scene without its frames, an archive.
+        moving: What moves at the frame, as the scene's file; empty for the static channel.
+        task: The frame.
+
+    Raises:
+        RfgsError: The scene cannot be traced, or other packages would trace it than elsewhere.
+    """
+    from distributed import get_worker
+
+    global _place
+    worker: Any = get_worker()
+    if _place is None or _place.key != request.key:
+        close_place()
+        _place = _Place(request, scene, worker)
+    if task.frame is not None:
+        frame_file(_place.bundle, task.frame).write_bytes(moving)
+    value, table, seconds = _place.tracer.trace(task)
+    start = time.perf_counter()
+    paths = b""
+    if table is not None:
+        file = _place.path / "paths.npz"
+        write_paths(file, table)
+        paths = file.read_bytes()
+    seconds["pack"] = time.perf_counter() - start
+    _place.frames += 1
+    memory_bytes = psutil.Process().memory_info().rss
+    limit_bytes = worker.memory_manager.memory_limit
+    fresh = wants_fresh_process(memory_bytes, limit_bytes, _place.frames)
+    return Answer(value, paths, seconds, memory_bytes, worker.address, fresh)
+
+
+def wants_fresh_process(memory_bytes: int, limit_bytes: int | None, frames: int) -> bool:
+    """Whether a worker that holds so much after so many frames should be replaced."""
+    full = bool(limit_bytes) and memory_bytes > FRESH_AFTER_SHARE * limit_bytes
+    return full or frames >= FRESH_AFTER_FRAMES
+
+
+def close_place() -> None:
+    """Drops what a run has left in this worker."""
+    global _place
+    if _place is not None:
+        _place.close()
+        _place = None
+
+
+def refuse_other_versions(wanted: dict[str, str]) -> None:
+    """Refuses to trace with other packages than those of the process that asks.
+
+    Raises:
+        RfgsError: Naming the first package that differs.
+    """
+    for name, version in versions().items():
+        if version != wanted[name]:
+            raise RfgsError(
+                f"a worker of the cluster has {name} {version}, this machine {wanted[name]}; "
+                "bytes would depend on who traced, so install the same everywhere"
+            )
+
+
+def _begin(log: Path) -> None:
+    """Makes this process a quiet child: libraries print to a file, and it ends with the factory."""
+    end_with_parent()
+    with log.open("a") as stream:
+        os.dup2(stream.fileno(), 1)
+        os.dup2(stream.fileno(), 2)

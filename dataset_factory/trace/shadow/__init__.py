@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What bodies take from paths: Fresnel integrals over silhouettes."""

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which paths a body stands beside, with no wall between the two.
+
+A shadow is what the wave at the body does not bring to the receiver. Behind a wall there is as
+good as no such wave: on its way to the body and back it would have to pass the wall twice. Paths
+that go through the wall themselves are segments on either side, and are shaded there.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dataset_factory.trace.rays.scene import visible
+
+#: Places on a body, at most, any of which may be in sight.
+PLACES = 24
+#: Points on a segment keep this distance from its ends, which lie on walls [m].
+_MARGIN_M = 0.01
+
+
+def segments_in_view(
+    mi_scene: Any, corners: np.ndarray, vertices: np.ndarray, faces: np.ndarray
+) -> np.ndarray:
+    """Whether any of a body is in sight from where segments of paths pass it.
+
+    Args:
+        mi_scene: Mitsuba scene of everything that hides, without the body.
+        corners: Corners of paths [m], shape (path, corner, 3).
+        vertices: Vertices of the body [m], shape (V, 3).
+        faces: Its triangles, shape (T, 3).
+
+    Returns:
+        One value per segment, bool, shape (path, corner - 1).
+    """
+    start, way = corners[:, :-1], np.diff(corners, axis=1)
+    if not start.size:
+        return np.zeros(start.shape[:2], dtype=bool)
+    length = np.maximum(np.linalg.norm(way, axis=2), 2 * _MARGIN_M)
+    share = ((vertices.mean(axis=0) - start) * way).sum(axis=2) / length**2
+    share = np.clip(share, _MARGIN_M / length, 1 - _MARGIN_M / length)
+    foot = (start + share[..., None] * way).reshape(-1, 3)
+    # Not vertices: those of a simple mesh are its corners, which may stick in floor and ceiling.
+    places = vertices[faces[:: -(-len(faces) // PLACES)]].mean(axis=1)
+    seen = visible(mi_scene, np.repeat(foot, len(places), axis=0), np.tile(places, (len(foot), 1)))
+    return seen.reshape(*share.shape, len(places)).any(axis=2)

@@ -1,0 +1,288 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What was converted is read back by readers of the other formats' own rules."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from PIL import Image
+from plyfile import PlyData
+from scipy.io import loadmat
+from scipy.spatial.transform import Rotation
+
+from dataset_factory.convert import FORMATS, convert
+from dataset_factory.make.impair import impair_dataset
+from rfgs_core.dataset import Sequence, open_dataset
+from rfgs_core.dataset.csi_store import write_csi
+from rfgs_core.dataset.mesh_ply import write_mesh
+from rfgs_core.dataset.writer import finish_dataset, write_sequence_info
+from rfgs_core.errors import RfgsError
+from rfgs_core.radio.impairments import IMPAIRMENT_PRESETS
+
+#: Middle of the tiny dataset's sphere: joint 8 of its only person.
+CENTRE = 8
+
+
+@pytest.fixture
+def sequence(tiny_dataset: Path) -> Sequence:
+    return open_dataset(tiny_dataset).sequence()
+
+
+def pixels(file: Path) -> np.ndarray:
+    with Image.open(file) as image:
+        return np.asarray(image)
+
+
+def on_mask(sequence: Sequence, name: str, frame: int, column: float, row: float) -> bool:
+    return bool(sequence.mask(name, frame)[int(row), int(column)] == 1)
+
+
+def opengl_pixel(matrix: Any, lens: dict[str, float], point: np.ndarray) -> tuple[float, float]:
+    """Projection by a camera-to-world matrix whose camera looks along its own −Z."""
+    x, y, z = (np.linalg.inv(np.asarray(matrix)) @ [*point, 1.0])[:3]
+    assert z < 0.0
+    return lens["cx"] - lens["fl_x"] * x / z, lens["cy"] + lens["fl_y"] * y / z
+
+
+def test_nerfstudio_cameras_depths_and_masks(
+    tiny_dataset: Path, sequence: Sequence, tmp_path: Path
+) -> None:
+    out = tmp_path / "ns"
+    convert(tiny_dataset, "nerfstudio", out)
+    value = json.loads((out / "transforms.json").read_text())
+    assert len(value["frames"]) == 8
+    assert sorted(value["train_filenames"] + value["test_filenames"]) == sorted(
+        row["file_path"] for row in value["frames"]
+    )
+    for row in value["frames"]:
+        camera, _, number = Path(row["file_path"]).stem.partition("_")
+        frame = int(number)
+        assert row["time"] == frame - 1
+        column, line = opengl_pixel(row["transform_matrix"], row, sequence.joints(frame)[0, CENTRE])
+        assert on_mask(sequence, camera, frame, column, line)
+        assert np.array_equal(pixels(out / row["file_path"]), sequence.image(camera, frame))
+        depth_m = pixels(out / row["depth_file_path"]) / 1000.0
+        assert np.abs(depth_m - sequence.depth(camera, frame)).max() <= 0.00051
+        still = pixels(out / row["mask_path"])
+        assert set(np.unique(still)) == {0, 255} and still[int(line), int(column)] == 0
+        held = camera in sequence.splits["images"]["test_cameras"] or (
+            frame in sequence.splits["images"]["test_frames"]
+        )
+        assert (row["file_path"] in value["test_filenames"]) == held
+    points = PlyData.read(str(out / value["ply_file_path"]))["vertex"].data
+    xyz = np.stack([points[axis] for axis in "xyz"], -1)
+    # Every point lies on a wall of the box, and walls were painted 90 or 150 per channel.
+    low, high = sequence.bounds_m
+    assert np.abs(np.concatenate([xyz - low, xyz - high], 1)).min(axis=1).max() < 1e-4
+    seen = points["red"] != 128
+    assert seen.mean() > 0.5 and set(np.unique(points["red"][seen])) <= set(range(90, 151))
+
+
+def test_d_nerf_splits_times_and_angle(
+    tiny_dataset: Path, sequence: Sequence, tmp_path: Path
+) -> None:
+    out = tmp_path / "dn"
+    convert(tiny_dataset, "d-nerf", out)
+    seen = []
+    for split in ("train", "test"):
+        value = json.loads((out / f"transforms_{split}.json").read_text())
+        focal = 0.5 * 24 / np.tan(0.5 * value["camera_angle_x"])
+        for row in value["frames"]:
+            image = pixels(out / (row["file_path"] + ".png"))
+            assert image.shape == (24, 24, 4)
+            lens = {"fl_x": focal, "fl_y": focal, "cx": 12.0, "cy": 12.0}
+            camera, _, number = Path(row["file_path"]).name.partition("_")
+            frame = int(number)
+            point = sequence.joints(frame)[0, CENTRE]
+            assert on_mask(
+                sequence, camera, frame, *opengl_pixel(row["transform_matrix"], lens, point)
+            )
+            assert row["time"] == {1: 0.0, 2: 1.0}[frame]
+            seen.append((camera, frame))
+    assert len(seen) == len(set(seen)) == 8
+    test = (out / "transforms_test.json").read_text()
+    assert (out / "transforms_val.json").read_text() == test
+
+
+def test_d_nerf_keeps_lenses_apart_and_refuses_what_it_cannot_say(
+    tiny_copy: Path, tmp_path: Path
+) -> None:
+    dataset = open_dataset(tiny_copy)
+    sequence = dataset.sequence()
+    sequence.cameras[1].update(fl_x=20.0, fl_y=20.0)
+    write_sequence_info(sequence.files, sequence.info)
+    finish_dataset(tiny_copy, dataset.info)
+    convert(tiny_copy, "d-nerf", tmp_path / "two")
+    angles = {
+        folder.name: json.loads((folder / "transforms_train.json").read_text())["camera_angle_x"]
+        for folder in (tmp_path / "two").iterdir()
+    }
+    assert np.isclose(angles["cam00"], 2 * np.arctan(12 / 16.0))
+    assert np.isclose(angles["cam01"], 2 * np.arctan(12 / 20.0))
+    sequence.cameras[1].update(cx=3.0)
+    write_sequence_info(sequence.files, sequence.info)
+    finish_dataset(tiny_copy, dataset.info)
+    with pytest.raises(RfgsError, match="cam01 is off-centre"):
+        convert(tiny_copy, "d-nerf", tmp_path / "three")
+    assert not (tmp_path / "three").exists()
+
+
+def read_colmap(model: Path) -> tuple[dict, dict, np.ndarray]:
+    """Cameras, images and points of a text model, by COLMAP's documentation of the format."""
+
+    def lines(name: str) -> list[list[str]]:
+        text = (model / f"{name}.txt").read_text().splitlines()
+        return [line.split() for line in text if not line.startswith("#")]
+
+    cameras = {}
+    for row in lines("cameras"):
+        assert row[1] == "PINHOLE"
+        cameras[int(row[0])] = [int(v) for v in row[2:4]] + [float(v) for v in row[4:8]]
+    images, rows = {}, lines("images")
+    for head, key_points in zip(rows[::2], rows[1::2], strict=True):
+        assert key_points == [] and len(head) == 10
+        images[head[9]] = ([float(v) for v in head[1:8]], int(head[8]))
+    points = np.array([[float(v) for v in row[:8]] for row in lines("points3D")])
+    return cameras, images, points
+
+
+def test_colmap_model_projects_the_person_onto_its_mask(
+    tiny_dataset: Path, sequence: Sequence, tmp_path: Path
+) -> None:
+    out = tmp_path / "colmap"
+    convert(tiny_dataset, "colmap", out)
+    cameras, images, points = read_colmap(out / "sparse" / "0")
+    assert len(cameras) == len(images) == 4
+    for name, ((w, x, y, z, *shift), number) in images.items():
+        width, height, fx, fy, cx, cy = cameras[number]
+        assert pixels(out / "images" / name).shape[:2] == (height, width)
+        view = Rotation.from_quat([x, y, z, w]).as_matrix()
+        a, b, depth_m = view @ sequence.joints(1)[0, CENTRE] + shift
+        assert depth_m > 0.0
+        camera = name.removesuffix(".png")
+        assert on_mask(sequence, camera, 1, fx * a / depth_m + cx, fy * b / depth_m + cy)
+        world = np.asarray(
+            next(r for r in sequence.cameras if r["name"] == camera)["world_from_camera"]
+        )
+        assert np.allclose(-view.T @ shift, world[:3, 3], atol=1e-9)
+    assert len(np.unique(points[:, 0])) == len(points) == 20_000
+    low, high = sequence.bounds_m
+    assert (points[:, 1:4] >= low - 1e-5).all() and (points[:, 1:4] <= high + 1e-5).all()
+
+
+def test_nerf2_spectra_point_at_the_transmitter(tiny_copy: Path, tmp_path: Path) -> None:
+    sequence = open_dataset(tiny_copy).sequence()
+    # Line of sight alone: the strongest direction is then known exactly.
+    write_csi(
+        sequence.files.csi("wifi"),
+        1,
+        sequence.csi_static("wifi"),
+        sequence.files.csi_done("wifi", 2),
+    )
+    out = tmp_path / "nerf2"
+    convert(tiny_copy, "nerf2", out)
+    gateways = sorted((out / "wifi").iterdir())
+    assert len(gateways) == 4
+    for gateway in gateways:
+        info = yaml.safe_load((gateway / "gateway_info.yml").read_text())["gateway1"]
+        turn = Rotation.from_quat(info["orientation"]).as_matrix()
+        tx = np.genfromtxt(gateway / "tx_pos.csv", delimiter=",", skip_header=1)
+        train = np.loadtxt(gateway / "train_index.txt", dtype=str, ndmin=1)
+        test = np.loadtxt(gateway / "test_index.txt", dtype=str, ndmin=1)
+        assert sorted([*train, *test]) == [f"{k:05d}" for k in range(1, len(tx) + 1)]
+        with (gateway / "samples.csv").open() as stream:
+            rows = list(csv.DictReader(stream))
+        for row, place in zip(rows, tx, strict=True):
+            spectrum = pixels(gateway / "spectrum" / f"{row['name']}.png")
+            assert spectrum.shape == (90, 360) and spectrum.max() == 255
+            away = turn.T @ (place - info["position"])
+            distance_m = np.linalg.norm(away)
+            own = distance_m < 0.5
+            if int(row["frame"]) != 2 or own or away[2] <= 0:
+                continue
+            elevation, azimuth = np.unravel_index(spectrum.argmax(), spectrum.shape)
+            up, around = np.deg2rad(elevation + 1), np.deg2rad(azimuth + 1)
+            peak = [np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)]
+            # 2 × 4 elements resolve some 25° and 50°; the peak itself is far better.
+            assert np.degrees(np.arccos(np.dot(peak, away / distance_m))) < 8.0, (gateway, row)
+            friis_db = 20 * np.log10(299_792_458.0 / 5.8e9 / (4 * np.pi * distance_m))
+            assert abs(float(row["strongest_db"]) - friis_db) < 0.3
+
+
+def test_matlab_files_hold_the_same_numbers(tiny_copy: Path, tmp_path: Path) -> None:
+    impair_dataset(tiny_copy, IMPAIRMENT_PRESETS["lab"])
+    convert(tiny_copy, "mat", tmp_path / "mat")
+    sequence = open_dataset(tiny_copy).sequence()
+    value = loadmat(tmp_path / "mat" / "wifi.mat")
+    for index, frame in enumerate(sequence.frames):
+        assert np.array_equal(value["csi"][index], sequence.csi("wifi", frame))
+        impaired = sequence.csi("wifi", frame, impaired=True)
+        assert np.array_equal(value["csi_impaired"][index], impaired, equal_nan=True)
+        assert np.array_equal(value["joints_m"][index], sequence.joints(frame))
+    assert np.array_equal(value["csi_static"][0], sequence.csi_static("wifi"))
+    assert np.array_equal(value["freq_hz"].ravel(), sequence.radio_spec("wifi").freq_hz)
+    assert np.array_equal(value["rx_xyz"], sequence.layout("wifi").rx_xyz)
+    assert value["measured"].astype(bool).all() and "gain_db" in value
+    assert value["action"][1, 0].item() == "stand"
+    assert value["csi"].dtype == np.complex64
+
+
+@pytest.mark.parametrize("target", sorted(set(FORMATS) - {"deepmimo"}))
+def test_the_same_dataset_gives_the_same_bytes(
+    target: str, tiny_dataset: Path, tmp_path: Path, data_of: Callable[[Path], dict[str, bytes]]
+) -> None:
+    convert(tiny_dataset, target, tmp_path / "a")
+    convert(tiny_dataset, target, tmp_path / "b")
+    assert data_of(tmp_path / "a") == data_of(tmp_path / "b")
+
+
+def test_wrong_requests_are_explained(tiny_copy: Path, tmp_path: Path) -> None:
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "mine.txt").write_text("keep me")
+    with pytest.raises(RfgsError, match="exists already"):
+        convert(tiny_copy, "mat", tmp_path / "full")
+    with pytest.raises(RfgsError, match="inside the dataset"):
+        convert(tiny_copy, "mat", tiny_copy / "mat")
+    (tiny_copy / "tiny/images/cam00/000001.png").unlink()
+    with pytest.raises(RfgsError, match=r"cam00/000001\.png: no such picture"):
+        convert(tiny_copy, "d-nerf", tmp_path / "d")
+    assert not (tmp_path / "d").exists()
+    assert not list(tmp_path.glob(".tmp-*"))
+
+
+def test_device_names_are_no_paths(tiny_copy: Path, tmp_path: Path) -> None:
+    file = open_dataset(tiny_copy).sequence().files.info
+    info = json.loads(file.read_text())
+    for row, name in zip(info["devices"]["wifi"], ("../../a", "AP 1", "AP_1", ""), strict=True):
+        row["name"] = name
+    file.write_text(json.dumps(info))
+    out = tmp_path / "below" / "nerf2"
+    convert(tiny_copy, "nerf2", out)
+    assert sorted(path.name for path in (out / "wifi").iterdir()) == [
+        "AP_1",
+        "AP_1_2",
+        "_3",
+        "______a",
+    ]
+    assert [path.name for path in out.iterdir()] == ["wifi"]
+
+
+@pytest.mark.parametrize("target", ["colmap", "nerfstudio"])
+def test_scenes_without_a_room_start_without_points(
+    tiny_copy: Path, tmp_path: Path, target: str
+) -> None:
+    files = open_dataset(tiny_copy).sequence().files
+    write_mesh(files.static_mesh, np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32))
+    convert(tiny_copy, target, tmp_path / "out")
+    if target == "colmap":
+        text = (tmp_path / "out" / "sparse" / "0" / "points3D.txt").read_text()
+        assert text.count("\n") == 1
+    else:
+        assert len(PlyData.read(str(tmp_path / "out" / "points.ply"))["vertex"].data) == 0

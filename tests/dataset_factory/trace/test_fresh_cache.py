@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Compiled kernels give the same bytes in the run that compiles them and in every later one.
+
+Otherwise a dataset resumed on the next day would differ from an undisturbed one.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+_DIGESTS = """
+import hashlib, os, sys
+os.environ["NUMBA_CACHE_DIR"] = sys.argv[1]
+import numpy as np, torch
+from dataset_factory.trace.shadow import silhouette
+from dataset_factory.trace.people.facets import facet_sum
+from dataset_factory.trace.shadow.frequencies import nodes_for
+from dataset_factory.trace.shadow.kirchhoff import _shade
+from dataset_factory.trace.rays.steering import _steer
+from rfgs_core.propagation import EnvironmentPaths, Links, Tones, scatter, shadow
+from rfgs_core.radio.constants import SPEED_OF_LIGHT
+
+def show(name, arrays):
+    data = b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)
+    print(name, hashlib.sha256(data).hexdigest())
+
+rng = np.random.default_rng(0)
+n, links = 700, 6
+points = rng.normal(size=(n, 3)) * 0.3 + [2.0, 2.0, 1.0]
+normals = rng.normal(size=(n, 3))
+normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+tx_xyz = rng.normal(size=(links, 3)) * 0.1
+rx_xyz = rng.normal(size=(links, 3)) * 0.1 + [4.0, 4.0, 1.0]
+freq_hz = 5.72e9 + 2.5e6 * np.arange(33)
+area, weight = np.full(n, 1e-3), np.ones(n)
+show("facets", [facet_sum(points, normals, area, tx_xyz, rx_xyz, weight, freq_hz)])
+
+count, nodes = 300, 5
+complex_ones = rng.normal(size=(count, nodes)) + 1j * rng.normal(size=(count, nodes))
+steered = _steer(
+    (complex_ones, np.ones((0, 0, 0, 0), dtype=np.complex128)),
+    rng.uniform(size=count) < 0.5,
+    (points[:count], points[-count:], rng.uniform(size=count)),
+    rng.normal(size=(count, links, 3)), np.stack([tx_xyz[0], rx_xyz[0]]), tx_xyz, rx_xyz,
+    (np.arange(33) // 9, np.linspace(0.0, 1.0, 33), 120.0, 0.05),
+)
+show("steering", [steered])
+
+# A cloud of triangles around the middle of twenty straight paths of 32 links each.
+corners = np.stack([rng.normal(size=(20, 3)) * 0.4, rng.normal(size=(20, 3)) * 0.4 + [4, 4, 2]], 1)
+body = np.concatenate([points[:200] + 0.1 * rng.normal(size=(200, 3)) for _ in range(3)])
+still, turn = np.zeros((20, 1)), np.broadcast_to(np.eye(3), (20, 1, 3, 3)).copy()
+past = np.ones((20, 4, 8, 5), dtype=np.complex128)
+_shade(
+    corners, np.ones((20, 1), dtype=bool),
+    (still, still, turn, turn, np.ones(20)),
+    (rng.normal(size=(20, 4, 3)) * 0.1, rng.normal(size=(20, 8, 3)) * 0.1),
+    body, np.arange(600).reshape(3, 200).T.copy(), nodes_for(np.linspace(5.7e9, 5.9e9, 5)),
+    silhouette.FRESNEL, False, past,
+)
+assert np.abs(past - 1).max() > 0.1, "expected a shadow"
+show("silhouettes", [past])
+
+def leaf(values):
+    return torch.tensor(values, dtype=torch.float32, requires_grad=True)
+
+means, quats, alpha = leaf(points), leaf(rng.normal(size=(n, 4))), leaf(0.3 * np.ones(n))
+scales, scales_rf = leaf(0.04 * np.ones((n, 3))), leaf(0.003 * np.ones((n, 3)))
+gamma = torch.complex(leaf(rng.normal(size=(n, 1))), leaf(rng.normal(size=(n, 1))))
+ends = Links(torch.tensor(tx_xyz), torch.tensor(rx_xyz))
+length_m = torch.linalg.vector_norm(ends.rx_xyz - ends.tx_xyz, dim=1)
+paths = EnvironmentPaths(
+    torch.arange(links), torch.ones(links, dtype=torch.complex64), length_m / SPEED_OF_LIGHT,
+    ends.tx_xyz, ends.rx_xyz, torch.zeros(links), torch.zeros(links), 0.05,
+)
+csi = scatter(means, quats, scales_rf, gamma, ends, Tones(5.72e9, 2.5e6, 33))
+through = shadow(means, quats, scales, alpha, paths)
+(csi.abs().sum() + through.abs().sum()).backward()
+show("channel", [csi.detach(), through.detach()])
+show("gradients", [leaf.grad for leaf in (means, quats, alpha, scales, scales_rf)])
+"""
+
+
+@pytest.mark.slow
+def test_the_run_that_compiles_and_later_ones_give_the_same_bytes(python, tmp_path: Path) -> None:
+    compiling, loading = (
+        python("-c", _DIGESTS, tmp_path / "cache", must_work=True).stdout for _ in range(2)
+    )
+    assert list((tmp_path / "cache").rglob("*.nbi")), "expected the first run to fill the cache"
+    assert compiling.count("\n") == 5
+    assert loading == compiling

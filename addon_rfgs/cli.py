@@ -14,45 +14,18 @@ from typing import NoReturn, TextIO
 
 import bpy
 
-from .channels.commands import add_csi
-from .check.commands import add_check, add_fix, add_outline
-from .devices.commands import add_devices
+from .arguments import add_command
+from .check.commands import FIX, OUTLINE
+from .command import Command
+from .devices.commands import LIST as LIST_DEVICES
 from .errors import AddonError, disk_message
-from .export.commands import add_export
-from .gaussians.commands import add_export_gaussians, add_import
-from .jobs.commands import (
-    add_environment,
-    add_evaluate,
-    add_forget,
-    add_generate,
-    add_resume,
-    add_stop,
-    add_train,
-)
-from .materials.commands import add_materials
-from .paths.commands import add_paths
-from .removal.commands import add_remove_data
+from .materials.commands import LIST as LIST_MATERIALS
+from .registration import CLASSES
 
-_COMMANDS = (
-    add_check,
-    add_outline,
-    add_fix,
-    add_devices,
-    add_materials,
-    add_export,
-    add_import,
-    add_export_gaussians,
-    add_csi,
-    add_environment,
-    add_generate,
-    add_train,
-    add_evaluate,
-    add_resume,
-    add_stop,
-    add_forget,
-    add_paths,
-    add_remove_data,
-)
+_GROUPS = {
+    "devices": "list, add, place, copy, mirror and remove radio devices",
+    "materials": "list, guess, set and show radio materials",
+}
 
 #: Exit code of every mistake a user can repair.
 USER_ERROR = 2
@@ -65,12 +38,24 @@ class _Parser(argparse.ArgumentParser):
         raise AddonError(f"{message} (see: {self.prog} --help)")
 
 
+def commands() -> list[tuple[Command, type | None]]:
+    """Every command with its operator; None for those that only look."""
+    alone = [(command, None) for command in (LIST_DEVICES, LIST_MATERIALS, OUTLINE, FIX)]
+    return [*alone, *((kind.command, kind) for kind in CLASSES if "command" in vars(kind))]
+
+
 def parser(program: str) -> argparse.ArgumentParser:
     """The parser of all commands."""
     main = _Parser(prog=program, description="RF-GS inside Blender")
-    commands = main.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for add in _COMMANDS:
-        add(commands)
+    top = main.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    groups = {
+        name: top.add_parser(name, help=text, description=f"{text.capitalize()}.").add_subparsers(
+            dest="task", required=True, metavar="TASK"
+        )
+        for name, text in _GROUPS.items()
+    }
+    for command, kind in commands():
+        add_command(groups.get(command.name.split()[0], top), command, kind)
     return main
 
 

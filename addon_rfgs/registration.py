@@ -1,27 +1,32 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Adds the classes of every folder to Blender and takes them away again."""
+"""Adds the operators and panels of every folder to Blender and takes them away again."""
 
 import inspect
+from importlib import import_module
 
 import bpy
 
-from .channels.interface import CLASSES as CHANNELS
-from .check.interface import CLASSES as CHECK
-from .devices.interface import CLASSES as DEVICES
-from .export.interface import CLASSES as EXPORT
-from .gaussians.interface import CLASSES as GAUSSIANS
-from .jobs.interface import CLASSES as JOBS
-from .materials.interface import CLASSES as MATERIALS
-from .paths.interface import CLASSES as PATHS
-from .removal.interface import CLASSES as REMOVAL
+#: Modules that hold classes for Blender; panels appear in this order.
+_MODULES = (
+    *("devices.operators", "devices.panel", "materials.operators", "materials.panel"),
+    *("check.operators", "check.panel", "export.operators", "export.panel"),
+    *("jobs.preferences", "jobs.operators", "jobs.panel"),
+    *("gaussians.operators", "gaussians.file_menu", "gaussians.view_operators", "gaussians.panel"),
+    *("channels.operators", "channels.panel", "paths.operators", "paths.panel"),
+    *("removal.operators", "removal.panel"),
+)
 
-#: Panels appear in this order.
-_CLASSES = (*DEVICES, *MATERIALS, *CHECK, *EXPORT, *JOBS, *GAUSSIANS, *CHANNELS, *PATHS, *REMOVAL)
+CLASSES = [
+    item
+    for module in (import_module(f"{__package__}.{name}") for name in _MODULES)
+    for name, item in vars(module).items()
+    if name.startswith("RFGS_") and item.__module__ == module.__name__
+]
 
 
 def register() -> None:
     """Adds the operators and panels."""
-    for cls in _CLASSES:
+    for cls in CLASSES:
         if issubclass(cls, bpy.types.Operator) and "bl_description" not in vars(cls):
             cls.bl_description = tooltip(cls.__doc__ or "")
         bpy.utils.register_class(cls)
@@ -29,7 +34,7 @@ def register() -> None:
 
 def unregister() -> None:
     """Removes the operators and panels."""
-    for cls in reversed(_CLASSES):
+    for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
 
 

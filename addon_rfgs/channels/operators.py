@@ -7,16 +7,16 @@ from typing import Any
 
 import bpy
 
+from ..command import Command
 from ..errors import AddonError
-from ..jobs.environment import interpreter
-from ..jobs.preferences import environment_path
-from ..reporting import Progress, Reporting
+from ..jobs.in_environment import InEnvironment
+from ..reporting import Progress, chosen_path
 from .drawing import Drawing, begin
 from .image import load_image, show_image
 from .waiting import begin_waiting, end_waiting, waits
 
 
-class RFGS_OT_show_csi(Reporting, bpy.types.Operator):
+class RFGS_OT_show_csi(InEnvironment, bpy.types.Operator):
     """Draw what was measured and what a run predicts of a link, and show it in an Image Editor.
 
     Blender goes on meanwhile; Esc gives it up
@@ -26,10 +26,22 @@ class RFGS_OT_show_csi(Reporting, bpy.types.Operator):
     bl_label = "Show CSI"
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
 
+    command = Command(
+        "csi",
+        reads={"channels": ("run_folder", "tx_device", "rx_device")},
+        words={"run_folder": "--run", "filepath": "--out"},
+    )
+
+    filepath: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="File",
+        description="PNG to write; empty: link_TX_RX.png in the predictions of the run",
+        subtype="FILE_PATH",
+        options={"SKIP_SAVE"},
+    )
     _drawing: Drawing | None = None
 
     @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
+    def ready(cls, _context: bpy.types.Context) -> bool:
         """One at a time."""
         if waits():
             cls.poll_message_set("A picture is being drawn already")
@@ -38,7 +50,7 @@ class RFGS_OT_show_csi(Reporting, bpy.types.Operator):
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[Any]:
         """Begins to draw in the background."""
         try:
-            self._drawing = begin(context.scene, interpreter(environment_path()))
+            self._drawing = self._begin(context)
         except AddonError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -66,10 +78,14 @@ class RFGS_OT_show_csi(Reporting, bpy.types.Operator):
 
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
         """Shows the picture; called from a script, it is drawn first."""
-        drawing = self._drawing or begin(context.scene, interpreter(environment_path()))
+        drawing = self._drawing or self._begin(context)
         drawing.question.wait()
         told = drawing.outcome()
         image = load_image(drawing.out)
-        if show_image(context, image):
-            return f"{image.name}: {told}"
-        return f"{image.name} is loaded, open an Image Editor to see it: {told}"
+        shown = bpy.app.background or show_image(context, image)
+        hint = "" if shown else "; open an Image Editor to see it"
+        return f"{drawing.out}: {told}{hint}"
+
+    def _begin(self, context: bpy.types.Context) -> Drawing:
+        out = chosen_path(self.filepath) if self.filepath else None
+        return begin(context.scene, self.interpreter(), out)

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The commands `check`, `outline` and `fix`."""
+"""What the commands `check`, `outline` and `fix` do beside the buttons of the scene check."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import bpy
 
-from ..command_options import add_scene_options
+from ..command import Command
 from ..errors import AddonError
 from ..files import write_json
 from ..saving import save_copy
@@ -20,77 +20,67 @@ from ..scene.override_file import read_overrides
 from .repairs import REPAIRABLE, findings, repair, repairable, select_meant
 
 
-def add_check(commands: Any) -> None:
-    """Adds `check` to the commands."""
-    check = commands.add_parser(
-        "check",
-        help="say what the scene holds and what is guessed",
-        description="Lists what would go wrong with the scene, the worst first.",
-    )
-    check.add_argument("--out", type=Path, help="JSON file of the report; default: print findings")
-    check.add_argument(
+def add_check(parser: Any) -> None:
+    """Options of `check` beside those of its button."""
+    parser.add_argument("--out", type=Path, help="JSON file of the report; default: print findings")
+    parser.add_argument(
         "--select", type=int, metavar="N", help="select what the N-th finding is about, from 1"
     )
-    check.add_argument("--save", type=Path, metavar="BLEND", help=".blend to save with --select")
-    add_scene_options(check)
-    check.set_defaults(run=_check)
+    parser.add_argument("--save", type=Path, metavar="BLEND", help=".blend to save with --select")
 
 
-def _check(options: argparse.Namespace, _out: TextIO) -> str:
+def check(options: argparse.Namespace) -> str:
+    """Prints findings, writes the report, or selects what one is about."""
     if (options.select is None) != (options.save is None):
         raise AddonError("check: --select N and --save FILE.blend belong together")
-    overrides = read_overrides(options.overrides)
-    report = check_scene(bpy.context.scene, options.frames, overrides)
+    report = check_scene(bpy.context.scene, options.frames, _overrides(options))
     rows = [Finding(**row) for row in report["findings"]]
     if options.select is not None:
-        return _save_selected(rows, options.select, options.save)
+        if not 1 <= options.select <= len(rows):
+            there = f"there are {len(rows)} findings, counted from 1"
+            raise AddonError(f"--select {options.select}: {there}")
+        item = select_meant(bpy.context, rows[options.select - 1])
+        save_copy(options.save)
+        return f"selected {item.name}; wrote {options.save}"
     if options.out is None:
         return "\n".join(f"{row.severity}: {row.sentence}" for row in rows) or "nothing to say"
     write_json(options.out, report)
     return f"wrote {options.out}: {len(rows)} findings"
 
 
-def _save_selected(rows: list[Finding], number: int, path: Path) -> str:
-    if not 1 <= number <= len(rows):
-        raise AddonError(f"--select {number}: there are {len(rows)} findings, counted from 1")
-    item = select_meant(bpy.context, rows[number - 1])
-    save_copy(path)
-    return f"selected {item.name}; wrote {path}"
+def _overrides(options: argparse.Namespace) -> Any:
+    return read_overrides(Path(options.overrides) if options.overrides else None)
 
 
-def add_outline(commands: Any) -> None:
-    """Adds `outline` to the commands."""
-    command = commands.add_parser(
-        "outline", help="write which frames and devices the file has, without a look at meshes"
-    )
-    command.add_argument("--out", type=Path, required=True, help="JSON file")
-    command.add_argument("--between", action="store_true", help="poses between frames are wanted")
-    add_scene_options(command)
-    command.set_defaults(run=_outline)
+def _add_outline(parser: Any) -> None:
+    parser.add_argument("--out", type=Path, required=True, help="JSON file")
+    parser.add_argument("--between", action="store_true", help="poses between frames are wanted")
 
 
-def _outline(options: argparse.Namespace, _out: TextIO) -> str:
-    overrides = read_overrides(options.overrides)
-    found = outline(bpy.context.scene, options.frames, overrides, between=options.between)
+def _outline(options: argparse.Namespace) -> str:
+    scene, overrides = bpy.context.scene, _overrides(options)
+    found = outline(scene, options.frames, overrides, between=options.between)
     write_json(options.out, found)
     return f"wrote {options.out}: {len(found['frames'])} frames, {len(found['devices'])} devices"
 
 
-def add_fix(commands: Any) -> None:
-    """Adds `fix` to the commands."""
-    fix = commands.add_parser(
-        "fix",
-        help="repair what the scene check finds, as far as that is safe",
-        description="Repairs findings one after the other; what is left is printed at the end.",
-    )
-    fix.add_argument(
+OUTLINE = Command(
+    "outline",
+    "Write which frames and devices the file has, without a look at meshes",
+    reads={"export": ("frames", "overrides")},
+    anew=True,
+    add=_add_outline,
+    work=_outline,
+)
+
+
+def _add_fix(parser: Any) -> None:
+    parser.add_argument(
         "kind", nargs="*", metavar="KIND", help=f"only these of {', '.join(REPAIRABLE)}"
     )
-    fix.add_argument("--out", type=Path, required=True, help=".blend to save")
-    fix.set_defaults(run=_fix)
 
 
-def _fix(options: argparse.Namespace, _out: TextIO) -> str:
+def _fix(options: argparse.Namespace) -> str:
     scene = bpy.context.scene
     wanted = options.kind or list(REPAIRABLE)
     unknown = sorted(set(wanted) - set(REPAIRABLE))
@@ -111,6 +101,14 @@ def _fix(options: argparse.Namespace, _out: TextIO) -> str:
         except AddonError as error:
             lines.append(f"not fixed: {error}")
         bpy.context.view_layer.update()
-    save_copy(options.out)
     lines += [f"left: {row.severity}: {row.sentence}" for row in left]
-    return "\n".join([*lines, f"wrote {options.out}"])
+    return "\n".join(lines or ["nothing to fix"])
+
+
+FIX = Command(
+    "fix",
+    "Repair what the scene check finds, as far as that is safe; what is left is printed",
+    saves=True,
+    add=_add_fix,
+    work=_fix,
+)

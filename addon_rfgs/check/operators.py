@@ -5,17 +5,18 @@ from __future__ import annotations
 
 import bpy
 
+from ..command import Command
 from ..errors import AddonError
 from ..reporting import Progress, Reporting
-from ..scene.findings import SEVERITIES
-from . import repairs, scene_repairs
+from ..scene.findings import SEVERITIES, Finding
+from ..scene_choice import SceneChoice, chosen_overrides
+from . import commands, repairs, scene_repairs
 from .settings import RFGS_PG_finding
 
 
-def fill(context: bpy.types.Context) -> str:
-    """Checks the scene into the list of the window; returns what it comes to."""
+def fill(context: bpy.types.Context, found: list[Finding]) -> str:
+    """Puts findings into the list of the window; returns what they come to."""
     check = context.window_manager.rfgs.check
-    found = repairs.findings(context.scene)
     check.rows.clear()
     check.outdated = False
     for finding in found:
@@ -57,20 +58,22 @@ class _OnFinding(Reporting):
     )
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def ready(cls, context: bpy.types.Context) -> bool:
         """There is a list."""
         return len(context.window_manager.rfgs.check.rows) > 0
 
 
-class RFGS_OT_check_scene(Reporting, bpy.types.Operator):
+class RFGS_OT_check_scene(SceneChoice, Reporting, bpy.types.Operator):
     """List what would go wrong with this scene: units, walls, people, materials, devices."""
 
     bl_idname = "rfgs.check_scene"
     bl_label = "Check Scene"
+    command = Command("check", add=commands.add_check, work=commands.check)
 
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
         """Fills the list."""
-        return fill(context)
+        overrides = chosen_overrides(self)
+        return fill(context, repairs.findings(context.scene, self.frames, overrides))
 
 
 class RFGS_OT_select_finding(_OnFinding, bpy.types.Operator):
@@ -95,12 +98,12 @@ class RFGS_OT_repair_finding(_OnFinding, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def ready(cls, context: bpy.types.Context) -> bool:
         """There is a list, and it is about the scene as it is."""
         outdated = context.window_manager.rfgs.check.outdated
         if outdated:
             cls.poll_message_set("Undo or Redo changed the scene; check it again")
-        return not outdated and super().poll(context)
+        return not outdated and super().ready(context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Asks before everything changes its size."""
@@ -124,7 +127,9 @@ class RFGS_OT_repair_finding(_OnFinding, bpy.types.Operator):
         """Repairs."""
         done = repairs.repair(context.scene, _row(context, self.index).finding())
         context.view_layer.update()
-        return f"{done[0].upper()}{done[1:]}; left: {fill(context)}"
+        return (
+            f"{done[0].upper()}{done[1:]}; left: {fill(context, repairs.findings(context.scene))}"
+        )
 
 
 def _frame(context: bpy.types.Context) -> None:

@@ -12,6 +12,7 @@ from ..ownership import need_own
 from ..scene.check import check_scene
 from ..scene.findings import Finding
 from ..scene.frames import file_label, unit_scale
+from ..scene.overrides import Overrides
 from . import mesh_repairs, scene_repairs
 
 _MESHES: dict[str, Callable[[bpy.types.Object, float], str]] = {
@@ -26,13 +27,15 @@ REPAIRABLE = ("unit_scale", "material_band", "devices_differ", *_DEVICES, *_MESH
 ASK_FIRST = ("unit_scale",)
 
 
-def findings(scene: bpy.types.Scene) -> list[Finding]:
+def findings(
+    scene: bpy.types.Scene, frames: str = "", overrides: Overrides | None = None
+) -> list[Finding]:
     """Everything the scene check finds, the worst first.
 
     What keeps the check from looking at all is an error in the list.
     """
     try:
-        return [Finding(**row) for row in check_scene(scene)["findings"]]
+        return [Finding(**row) for row in check_scene(scene, frames or None, overrides)["findings"]]
     except AddonError as error:
         said = str(error).removeprefix(f"{file_label()}: ")
         message, _, remedy = said.partition("; ")

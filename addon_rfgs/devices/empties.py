@@ -11,9 +11,8 @@ import mathutils
 import numpy as np
 
 from ..errors import AddonError
-from ..naming import closest
 from ..ownership import drop_empty, need_own, own_collection
-from ..scene.frames import file_label, unit_scale
+from ..scene.frames import named, unit_scale
 from ..tables import RADIO_FIELDS, RADIOS
 
 #: Where new devices are kept.
@@ -40,10 +39,7 @@ def named_device(scene: bpy.types.Scene, name: str) -> bpy.types.Object:
     Raises:
         AddonError: There is none; the message says which ones look like it.
     """
-    found = {item.name: item for item in devices(scene)}
-    if name not in found:
-        raise AddonError(f"{file_label()}: no radio device {name!r}{closest(name, found)}")
-    return found[name]
+    return named({item.name: item for item in devices(scene)}, name, "radio device")
 
 
 def radio_fields(item: bpy.types.Object) -> Mapping[str, Any]:

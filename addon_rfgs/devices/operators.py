@@ -3,18 +3,22 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 import mathutils
 import numpy as np
 
+from ..command import Command
 from ..errors import AddonError
 from ..reporting import Progress, Reporting
 from ..scene.bounds import MARGIN_M
-from ..scene.frames import unit_scale
+from ..scene.frames import named, unit_scale
 from ..scene.override_file import boresight
-from ..tables import RADIOS
+from ..tables import MOST_ELEMENTS, RADIO_DEFAULTS, RADIOS
 from . import authoring, empties
 from .fields import draw_fields
+from .layout import wavelength_m
 from .properties import RadioFields, search_radios
 
 ROLES = [
@@ -47,6 +51,28 @@ def _chosen(context: bpy.types.Context, name: str) -> list[bpy.types.Object]:
     return found
 
 
+def _refuse_senseless(values: dict[str, Any]) -> None:
+    """Refuses bands and arrays that make no sense, and turns wavelengths into metres.
+
+    Raises:
+        AddonError: They make none.
+    """
+    band = {**RADIO_DEFAULTS, **(empties.alike(bpy.context.scene) or {})}
+    if "freq_min_ghz" in values:
+        low, high = values["freq_min_ghz"], values["freq_max_ghz"]
+        if low >= high:
+            raise AddonError(f"--band-ghz: expected FROM < TO, got {low:g} {high:g}")
+        band |= {"freq_min_hz": low * 1e9, "freq_max_hz": high * 1e9}
+    for array in ("tx", "rx"):
+        rows, cols = (values.get(f"{array}_{name}", 1) for name in ("rows", "cols"))
+        if rows * cols > MOST_ELEMENTS:
+            raise AddonError(f"--{array}: {rows}x{cols} is more than {MOST_ELEMENTS} elements")
+        # Scripts cannot call the setter of an operator's property.
+        wavelengths = values.pop(f"{array}_spacing_wavelengths", None)
+        if wavelengths is not None:
+            values[f"{array}_spacing_m"] = wavelengths * wavelength_m(band)
+
+
 def _show(context: bpy.types.Context, items: list[bpy.types.Object]) -> None:
     """Selects devices, and nothing else; the first becomes active."""
     context.view_layer.update()
@@ -66,7 +92,27 @@ class RFGS_OT_add_device(RadioFields, Reporting, bpy.types.Operator):
     bl_idname = "rfgs.add_device"
     bl_label = "Add Radio Device"
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+    command = Command(
+        "devices add",
+        words={
+            "role": "role",
+            "location": "--at",
+            "device": "--name",
+            "num_subcarriers": "--subcarriers",
+        },
+        needs=("location",),
+        together={
+            "--band-ghz FROM TO": ("freq_min_ghz", "freq_max_ghz"),
+            "--tx ROWSxCOLS": ("tx_rows", "tx_cols"),
+            "--rx ROWSxCOLS": ("rx_rows", "rx_cols"),
+        },
+        prepare=_refuse_senseless,
+        saves=True,
+    )
 
+    device: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Name", description="Name of the device; empty: its role", options={"SKIP_SAVE"}
+    )
     role: bpy.props.EnumProperty(  # type: ignore[valid-type]
         name="Role", description="What the device does", items=ROLES, default="ACCESS_POINT"
     )
@@ -84,6 +130,13 @@ class RFGS_OT_add_device(RadioFields, Reporting, bpy.types.Operator):
         description="How the device is turned; unturned it looks along X",
         subtype="EULER",
         size=3,
+    )
+    look_at: bpy.props.FloatVectorProperty(  # type: ignore[valid-type]
+        name="Look At",
+        description="Point that the device looks at, in place of a rotation",
+        subtype="TRANSLATION",
+        size=3,
+        options={"SKIP_SAVE"},
     )
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
@@ -115,15 +168,17 @@ class RFGS_OT_add_device(RadioFields, Reporting, bpy.types.Operator):
 
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
         """Adds the Empty."""
-        turn = mathutils.Euler(self.rotation).to_matrix().to_4x4()
+        turn = mathutils.Euler(self.rotation).to_quaternion()
+        if self.properties.is_property_set("look_at"):
+            turn = mathutils.Quaternion(boresight(tuple(self.location), tuple(self.look_at)))
         place = mathutils.Matrix.Translation(
             mathutils.Vector(self.location) * unit_scale(context.scene)
         )
         fields = dict(empties.alike(context.scene) or {})
         fields.update(self._said())
         item = empties.add_device(
-            *(context.scene, self.role.lower(), self.role, self.radio, np.array(place @ turn)),
-            fields,
+            *(context.scene, self.device or self.role.lower(), self.role, self.radio),
+            *(np.array(place @ turn.to_matrix().to_4x4()), fields),
         )
         _show(context, [item])
         return f"Added {item.name}"
@@ -132,13 +187,7 @@ class RFGS_OT_add_device(RadioFields, Reporting, bpy.types.Operator):
         """Fields of the radio that somebody set."""
         row = self.row()
         spelt = {name: name.replace("_hz", "_ghz") for name in row}
-        said = {name for name in row if self.properties.is_property_set(spelt[name])}
-        said |= {
-            f"{array}_spacing_m"
-            for array in ("tx", "rx")
-            if self.properties.is_property_set(f"{array}_spacing_wavelengths")
-        }
-        return {name: row[name] for name in said}
+        return {name: row[name] for name in row if self.properties.is_property_set(spelt[name])}
 
 
 class RFGS_OT_place_radio(Reporting, bpy.types.Operator):
@@ -150,6 +199,12 @@ class RFGS_OT_place_radio(Reporting, bpy.types.Operator):
     bl_idname = "rfgs.place_radio"
     bl_label = "Place Radio"
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+    command = Command(
+        "devices preset",
+        words={"radio": "radio", "objects": "--around"},
+        means={"--around": {"around": "SELECTION"}},
+        saves=True,
+    )
 
     radio: bpy.props.EnumProperty(  # type: ignore[valid-type]
         name="Radio",
@@ -163,6 +218,12 @@ class RFGS_OT_place_radio(Reporting, bpy.types.Operator):
             ("SCENE", "Scene", "The bounds of what radio sees"),
             ("SELECTION", "Selection", "A box around what is selected, wider by the margin"),
         ],
+    )
+    objects: bpy.props.CollectionProperty(  # type: ignore[valid-type]
+        type=bpy.types.OperatorFileListElement,
+        name="Objects",
+        description="Names of objects to surround, in place of the selection",
+        options={"SKIP_SAVE"},
     )
     margin_m: bpy.props.FloatProperty(  # type: ignore[valid-type]
         name="Margin",
@@ -180,10 +241,11 @@ class RFGS_OT_place_radio(Reporting, bpy.types.Operator):
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
         """Places the devices."""
         scene = context.scene
-        selected = list(context.selected_objects)
+        chosen = [named(scene.objects, row.name, "object") for row in self.objects]
+        chosen = chosen or list(context.selected_objects)
         bounds, meshes, room = authoring.scene_space(scene)
         if self.around == "SELECTION":
-            bounds = authoring.around(scene, selected, self.margin_m)
+            bounds = authoring.around(scene, chosen, self.margin_m)
         placed = authoring.place_radio(scene, self.radio, (bounds, meshes, room), keep=self.keep)
         _show(context, placed)
         more = authoring.others_of(scene, self.radio)
@@ -196,6 +258,7 @@ class RFGS_OT_duplicate_device(Reporting, bpy.types.Operator):
     bl_idname = "rfgs.duplicate_device"
     bl_label = "Duplicate Device"
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+    command = Command("devices duplicate", words={"device": "device"}, saves=True)
 
     device: _device_name()  # type: ignore[valid-type]
     offset: bpy.props.FloatVectorProperty(  # type: ignore[valid-type]
@@ -224,6 +287,13 @@ class RFGS_OT_mirror_device(Reporting, bpy.types.Operator):
     bl_idname = "rfgs.mirror_device"
     bl_label = "Mirror Device"
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+    command = Command(
+        "devices mirror",
+        words={"device": "device"},
+        needs=("axis",),
+        means={"--move": {"copy": False}},
+        saves=True,
+    )
 
     device: _device_name()  # type: ignore[valid-type]
     axis: bpy.props.EnumProperty(  # type: ignore[valid-type]
@@ -249,6 +319,7 @@ class RFGS_OT_remove_device(Reporting, bpy.types.Operator):
     bl_idname = "rfgs.remove_device"
     bl_label = "Remove Device"
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+    command = Command("devices remove", words={"device": "device"}, saves=True)
 
     device: _device_name()  # type: ignore[valid-type]
 
@@ -266,6 +337,7 @@ class RFGS_OT_match_devices(Reporting, bpy.types.Operator):
     bl_idname = "rfgs.match_devices"
     bl_label = "Copy Radio to All"
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+    command = Command("devices match", words={"device": "device"}, saves=True)
 
     device: _device_name()  # type: ignore[valid-type]
 

@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Buttons that write what the commands `export` and `groundtruth` write."""
+"""Buttons that write bundles and ground truth."""
 
 import bpy
 
+from ..command import Command
+from ..errors import AddonError
 from ..reporting import Progress, Reporting, chosen_path
+from ..scene_choice import chosen_overrides
 from .bundle import export_bundle
 from .groundtruth import render_groundtruth
+
+_BOTH = ("frames", "overrides", "cameras", "resolution")
 
 
 class RFGS_OT_export_bundle(Reporting, bpy.types.Operator):
@@ -13,6 +18,14 @@ class RFGS_OT_export_bundle(Reporting, bpy.types.Operator):
 
     bl_idname = "rfgs.export_bundle"
     bl_label = "Export Bundle"
+    command = Command(
+        "export",
+        reads={"export": ("bundle_folder", *_BOTH, "spans", "velocities")},
+        anew=True,
+        words={"bundle_folder": "--out", "spans": "--span SECONDS"},
+        needs=("bundle_folder",),
+        repeated=("spans",),
+    )
 
     def work(self, context: bpy.types.Context, progress: Progress) -> str:
         """Exports with the panel's settings."""
@@ -25,8 +38,12 @@ class RFGS_OT_export_bundle(Reporting, bpy.types.Operator):
             settings.cameras or None,
             settings.resolution or None,
             progress,
+            _seconds(settings.spans),
+            chosen_overrides(settings),
+            settings.velocities,
         )
-        return f"Wrote {len(info['frames'])} frames to {folder}"
+        names = ("frames", "objects", "instances", "devices", "cameras")
+        return f"Wrote {folder}: {', '.join(f'{len(info[name])} {name}' for name in names)}"
 
 
 class RFGS_OT_render_groundtruth(Reporting, bpy.types.Operator):
@@ -34,6 +51,14 @@ class RFGS_OT_render_groundtruth(Reporting, bpy.types.Operator):
 
     bl_idname = "rfgs.render_groundtruth"
     bl_label = "Render Ground Truth"
+    command = Command(
+        "groundtruth",
+        reads={"export": ("pictures_folder", *_BOTH, "samples", "passes", "empty")},
+        anew=True,
+        words={"pictures_folder": "--out"},
+        needs=("pictures_folder",),
+        unsaid={"passes": False},
+    )
 
     def work(self, context: bpy.types.Context, progress: Progress) -> str:
         """Renders with the panel's settings."""
@@ -47,6 +72,20 @@ class RFGS_OT_render_groundtruth(Reporting, bpy.types.Operator):
             settings.resolution or None,
             settings.samples,
             settings.passes,
-            progress=progress,
+            settings.empty,
+            progress,
+            chosen_overrides(settings),
         )
-        return f"Wrote {count} pictures to {folder}"
+        return f"Wrote {folder}: {count} pictures"
+
+
+def _seconds(text: str) -> list[float]:
+    """Times with commas between [s].
+
+    Raises:
+        AddonError: One is no number.
+    """
+    try:
+        return [float(part) for part in text.split(",") if part.strip()]
+    except ValueError as error:
+        raise AddonError(f"spans: expected seconds with commas between, got {text!r}") from error

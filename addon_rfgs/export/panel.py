@@ -18,12 +18,11 @@ class RFGS_PT_dataset(Tab, bpy.types.Panel):
         layout, settings = self.layout, context.scene.rfgs.export
         layout.use_property_split = True
         layout.use_property_decorate = False
-        layout.prop(settings, "frames")
-        layout.prop(settings, "cameras")
-        layout.prop(settings, "resolution")
-        layout.prop(settings, "bundle_folder")
+        for name in ("frames", "overrides", "cameras", "resolution"):
+            layout.prop(settings, name)
+        for name in ("bundle_folder", "spans", "velocities"):
+            layout.prop(settings, name)
         layout.operator("rfgs.export_bundle", icon="EXPORT")
-        layout.prop(settings, "pictures_folder")
-        layout.prop(settings, "samples")
-        layout.prop(settings, "passes")
+        for name in ("pictures_folder", "samples", "passes", "empty"):
+            layout.prop(settings, name)
         layout.operator("rfgs.render_groundtruth", icon="RENDER_STILL")

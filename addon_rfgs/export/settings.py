@@ -4,16 +4,12 @@
 import bpy
 
 from ..path_options import RELATIVE_PATH
+from ..scene_choice import SceneChoice
 
 
-class RFGS_PG_export(bpy.types.PropertyGroup):
+class RFGS_PG_export(SceneChoice, bpy.types.PropertyGroup):
     """What is exported and rendered, and where to."""
 
-    frames: bpy.props.StringProperty(  # type: ignore[valid-type]
-        name="Frames",
-        description="First:last or first:last:step, both ends included; empty: the whole range",
-        default="",
-    )
     cameras: bpy.props.IntProperty(  # type: ignore[valid-type]
         name="Cameras", description="First N cameras by name; 0: all", default=0, min=0
     )
@@ -31,6 +27,15 @@ class RFGS_PG_export(bpy.types.PropertyGroup):
         subtype="DIR_PATH",
         options=RELATIVE_PATH,
     )
+    spans: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Spans",
+        description="Also write poses over so long after each frame [s], several with commas "
+        "between; 0: until the next",
+        default="",
+    )
+    velocities: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Velocities", description="Also write that of every vertex", default=False
+    )
     pictures_folder: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Pictures",
         description="Folder the ground truth is written to",
@@ -45,4 +50,9 @@ class RFGS_PG_export(bpy.types.PropertyGroup):
         name="Depth, normals, masks",
         description="Also write a multilayer EXR per picture",
         default=True,
+    )
+    empty: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Empty",
+        description="Hide all that moves, and render once per camera",
+        default=False,
     )

@@ -114,10 +114,10 @@ def clouds_here(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     return [item for item in items if item.type == "MESH" and GROUP in item.modifiers]
 
 
-def chosen_clouds(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The selected clouds, else all that are seen at this frame."""
+def chosen_clouds(context: bpy.types.Context, *, selected: bool = True) -> list[bpy.types.Object]:
+    """The selected clouds if they are wanted, else all that are seen at this frame."""
     items = clouds_of(context.scene)
-    chosen = [item for item in items if item in context.selected_objects]
+    chosen = [item for item in items if selected and item in context.selected_objects]
     return chosen or [item for item in items if not item.hide_viewport]
 
 

@@ -7,7 +7,10 @@ from typing import Any
 
 import bpy
 
+from ..command import Command
 from ..reporting import Progress, Reporting, chosen_path
+from ..scene.frames import named
+from . import commands
 from .clouds import chosen_clouds, clouds_of, import_gaussians
 from .compare import compare_with_mesh
 from .export_ply import export_gaussians
@@ -20,6 +23,31 @@ class RFGS_OT_import_gaussians(Reporting, bpy.types.Operator):
     bl_idname = "rfgs.import_gaussians"
     bl_label = "Import Gaussians"
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+    command = Command(
+        "import",
+        "Bring Gaussians back beside the scene\n\nBrings the Gaussians of a run, a folder of "
+        "000001.ply and so on, or one 3DGS PLY (text or binary) into the file, keyed on its "
+        "timeline; writes a .blend that needs no add-on to play, a picture beside the true scene, "
+        "or both.",
+        reads={
+            "gaussians": (
+                *("path", "display_mode", "size", "opacity_threshold", "power_threshold_db"),
+                *("solid_view", "use_crop", "crop_box", "color_by", "color_attribute"),
+                *("use_range", "range_low", "range_high", "frame_offset", "interpolation"),
+            )
+        },
+        anew=True,
+        words={
+            "path": "path",
+            "display_mode": "--mode",
+            "power_threshold_db": "--power-threshold",
+            "color_attribute": "--attribute",
+        },
+        together={"--range LOW HIGH": ("range_low", "range_high")},
+        means={"--range": {"use_range": True}, "--crop-box": {"use_crop": True}},
+        add=commands.add_import,
+        work=commands.import_,
+    )
 
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
         """Imports with the panel's settings."""
@@ -44,12 +72,30 @@ class RFGS_OT_export_gaussians(WithClouds, bpy.types.Operator):
     bl_idname = "rfgs.export_gaussians"
     bl_label = "Export Gaussians"
     bl_options = {"REGISTER"}  # noqa: RUF012
+    command = Command(
+        "export-gaussians",
+        words={"filepath": "out", "objects": "--object"},
+        unsaid={"prefer_selected": False},
+        frame=True,
+    )
 
     filepath: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="File", description="PLY to write", subtype="FILE_PATH"
     )
     filter_glob: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Filter", description="Which files are listed", default="*.ply", options={"HIDDEN"}
+    )
+
+    objects: bpy.props.CollectionProperty(  # type: ignore[valid-type]
+        type=bpy.types.OperatorFileListElement,
+        name="Objects",
+        description="Names of the clouds, in place of those that are selected or seen",
+        options={"SKIP_SAVE"},
+    )
+    prefer_selected: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Selected",
+        description="Only the clouds that are selected, if any is",
+        default=True,
     )
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[Any]:
@@ -62,8 +108,10 @@ class RFGS_OT_export_gaussians(WithClouds, bpy.types.Operator):
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
         """Writes the file."""
         path = chosen_path(self.filepath)
-        count = export_gaussians(context.scene, chosen_clouds(context), path)
-        return f"Wrote {count} Gaussians to {path}"
+        known = {item.name: item for item in clouds_of(context.scene)}
+        chosen = [named(known, row.name, "cloud") for row in self.objects]
+        chosen = chosen or chosen_clouds(context, selected=self.prefer_selected)
+        return f"Wrote {path}: {export_gaussians(context.scene, chosen, path)} Gaussians"
 
 
 class RFGS_OT_compare_gaussians(WithClouds, bpy.types.Operator):

@@ -121,13 +121,3 @@ class RFGS_PT_gaussians_compare(_Part, bpy.types.Panel):
         row = self.layout.row(align=True)
         row.operator("rfgs.compare_gaussians", text="This Frame", icon="SNAP_NORMAL")
         row.operator("rfgs.compare_gaussians", text="All Frames").every_frame = True
-
-
-CLASSES = (
-    RFGS_PT_gaussians,
-    RFGS_PT_gaussians_display,
-    RFGS_PT_gaussians_color,
-    RFGS_PT_gaussians_crop,
-    RFGS_PT_gaussians_timing,
-    RFGS_PT_gaussians_compare,
-)

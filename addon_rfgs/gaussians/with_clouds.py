@@ -11,7 +11,7 @@ class WithClouds(Reporting):
     """Mixed into operators that need imported Gaussians."""
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def ready(cls, context: bpy.types.Context) -> bool:
         """Whether any were imported into this scene."""
         found = bool(clouds_here(context.scene))
         if not found:

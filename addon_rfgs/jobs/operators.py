@@ -1,84 +1,141 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Buttons around jobs."""
 
+from __future__ import annotations
+
+import time
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
 
+from ..command import Command
 from ..errors import AddonError
 from ..gaussians.operators import import_shown
-from ..reporting import Progress, Reporting
+from ..reporting import Progress, Reporting, chosen_path
 from . import following
 from .checking import CHECK
-from .environment import interpreter
-from .plans import TrainPlan
-from .preferences import blender_program, environment_path
+from .in_environment import InEnvironment
+from .plans import KINDS, TrainPlan
+from .preferences import blender_program
 from .queue import ACTIVE, DONE, RUNNING, WAITING, Job
-from .starting import doing_without, evaluate_plan, generate_plan, start, train_plan
+from .record import read_record
+from .starting import (
+    doing_without,
+    evaluate_plan,
+    generate_plan,
+    start,
+    stop_and_wait,
+    train_plan,
+)
 
 
-class RFGS_OT_test_environment(Reporting, bpy.types.Operator):
+class RFGS_OT_test_environment(InEnvironment, bpy.types.Operator):
     """Ask the Python environment for its versions and for what is wrong with it."""
 
     bl_idname = "rfgs.test_environment"
     bl_label = "Test Environment"
+    command = Command("environment")
 
     def work(self, _context: bpy.types.Context, _progress: Progress) -> str:
         """Asks in the background; without a window it waits for the answer."""
-        CHECK.start(interpreter(environment_path()), blender_program())
+        CHECK.start(self.interpreter(), blender_program())
         if not bpy.app.background:
             following.follow()
             return "Asking the environment"
-        return await_check()
+        return _await_check()
 
 
-class RFGS_OT_generate_dataset(Reporting, bpy.types.Operator):
-    """Make a dataset of the saved file with the panel's settings, in the background."""
+class RFGS_OT_generate_dataset(InEnvironment, bpy.types.Operator):
+    """Make a dataset of the saved file with rfgs-factory.
+
+    Blender goes on meanwhile; the same settings continue what was stopped
+    """
 
     bl_idname = "rfgs.generate_dataset"
     bl_label = "Generate Dataset"
+    command = Command(
+        "generate",
+        reads={
+            "jobs": (
+                *("dataset_folder", "radios", "frames", "depth", "workers", "cameras"),
+                *("resolution", "samples", "seed", "images", "paths"),
+            )
+        },
+        words={"dataset_folder": "--out", "radios": "--radio"},
+    )
 
-    def work(self, context: bpy.types.Context, _progress: Progress) -> str:
+    blender: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Blender",
+        description="Blender that opens the file; empty: that of the preferences, else this one",
+        subtype="FILE_PATH",
+        options={"SKIP_SAVE"},
+    )
+
+    def work(self, context: bpy.types.Context, progress: Progress) -> str:
         """Saves the file if that is wanted, and begins."""
         plan = generate_plan(context.scene)
+        if self.blender:
+            plan = replace(plan, blender=str(chosen_path(self.blender)))
         if context.scene.rfgs.jobs.save_first and bpy.data.is_dirty and not bpy.app.background:
             try:
                 bpy.ops.wm.save_mainfile()
             except RuntimeError as error:
                 raise AddonError(f"{plan.blend}: cannot be saved; save it elsewhere") from error
         missing = doing_without(context.scene)
-        return start(plan) + (f"; {missing}" if missing else "")
+        if missing:
+            self.say(missing)
+        return start(plan, self.interpreter(), progress)
 
 
-class RFGS_OT_train_gaussians(Reporting, bpy.types.Operator):
-    """Fit Gaussians to the dataset with the panel's settings, in the background."""
+class RFGS_OT_train_gaussians(InEnvironment, bpy.types.Operator):
+    """Fit Gaussians to the dataset with rfgs.
+
+    Blender goes on meanwhile; the same settings continue what was stopped
+    """
 
     bl_idname = "rfgs.train_gaussians"
     bl_label = "Train"
+    command = Command(
+        "train",
+        reads={
+            "jobs": (
+                *("run_folder", "dataset_folder", "train_radio", "train_frames"),
+                *("iterations", "gaussians", "seed"),
+            )
+        },
+        words={
+            "run_folder": "--out",
+            "dataset_folder": "--dataset",
+            "train_radio": "--radio",
+            "train_frames": "--frames",
+        },
+    )
 
-    def work(self, context: bpy.types.Context, _progress: Progress) -> str:
+    def work(self, context: bpy.types.Context, progress: Progress) -> str:
         """Begins."""
-        return start(train_plan(context.scene))
+        return start(train_plan(context.scene), self.interpreter(), progress)
 
 
-class RFGS_OT_evaluate_run(Reporting, bpy.types.Operator):
+class RFGS_OT_evaluate_run(InEnvironment, bpy.types.Operator):
     """Measure the training beside its controls, in the background; writes metrics.json."""
 
     bl_idname = "rfgs.evaluate_run"
     bl_label = "Evaluate"
+    command = Command("evaluate", reads={"jobs": ("run_folder",)}, words={"run_folder": "--run"})
 
-    def work(self, context: bpy.types.Context, _progress: Progress) -> str:
+    def work(self, context: bpy.types.Context, progress: Progress) -> str:
         """Begins."""
-        return start(evaluate_plan(context.scene))
+        return start(evaluate_plan(context.scene), self.interpreter(), progress)
 
 
-class _OnChosenJob:
+class _OnChosenJob(Reporting):
     """Mixed into operators on the list's active row."""
 
     states: tuple[str, ...] = ()
 
     @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
+    def ready(cls, _context: bpy.types.Context) -> bool:
         """The chosen job is in a state that the operator is for."""
         job = following.chosen_job()
         return job is not None and cls.suits(job)
@@ -89,42 +146,84 @@ class _OnChosenJob:
         return job.state in cls.states
 
 
-class RFGS_OT_stop_job(_OnChosenJob, Reporting, bpy.types.Operator):
-    """Stop the chosen job; finished work is kept, and Resume continues."""
+class _OnJob(_OnChosenJob):
+    """Mixed into operators on a job that may also be one of another Blender."""
+
+    folder: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Folder",
+        description="Folder of the job's dataset or run; empty: of the one chosen in the list",
+        subtype="DIR_PATH",
+        options={"SKIP_SAVE"},
+    )
+    kind: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Kind",
+        description="Which job of that folder, needed if there are several",
+        items=[("ANY", "Any", "The only one"), *((k.upper(), k.capitalize(), "") for k in KINDS)],
+        options={"SKIP_SAVE"},
+    )
+
+    def job(self) -> Job:
+        """The job that is meant.
+
+        Raises:
+            AddonError: There is none, or there are several.
+        """
+        if not self.folder:
+            return following.chosen_job()
+        folder = chosen_path(self.folder)
+        kinds = KINDS if self.kind == "ANY" else (self.kind.lower(),)
+        files = (folder / "log" / f"job_{kind}.json" for kind in kinds)
+        found = [file for file in files if file.is_file()]
+        if len(found) != 1:
+            what = "several jobs; say which kind" if found else "no job of this add-on"
+            raise AddonError(f"{folder}: holds {what}")
+        return following.QUEUE.restore(read_record(found[0]))
+
+
+class RFGS_OT_stop_job(_OnJob, bpy.types.Operator):
+    """Stop a job; finished work is kept, and Resume continues."""
 
     bl_idname = "rfgs.stop_job"
     bl_label = "Stop"
+    command = Command("stop", words={"folder": "folder"})
     states = (WAITING, RUNNING)
 
     def work(self, _context: bpy.types.Context, _progress: Progress) -> str:
         """Asks it to stop; it is killed if it does not within some seconds."""
-        job = following.chosen_job()
+        job = self.job()
+        if not self.suits(job):
+            raise AddonError(f"{job.plan.out}: no job is running there")
+        if bpy.app.background:
+            stop_and_wait(job)
+            return f"Stopped; finished work is kept, continue with: resume {job.plan.out}"
         following.QUEUE.stop(job)
         following.show()
         return f"{job.title} stops"
 
 
-class RFGS_OT_resume_job(_OnChosenJob, Reporting, bpy.types.Operator):
-    """Continue the chosen job where it stopped."""
+class RFGS_OT_resume_job(_OnJob, InEnvironment, bpy.types.Operator):
+    """Continue a job where it stopped."""
 
     bl_idname = "rfgs.resume_job"
     bl_label = "Resume"
+    command = Command("resume", words={"folder": "folder"})
 
     @classmethod
     def suits(cls, job: Job) -> bool:
         """Jobs that ended before they were done."""
         return job.state not in {*ACTIVE, DONE}
 
-    def work(self, _context: bpy.types.Context, _progress: Progress) -> str:
+    def work(self, _context: bpy.types.Context, progress: Progress) -> str:
         """Puts the same job at the end of the list."""
-        return start(following.chosen_job().plan)
+        return start(self.job().plan, self.interpreter(), progress)
 
 
-class RFGS_OT_forget_job(_OnChosenJob, Reporting, bpy.types.Operator):
-    """Take the chosen job off the list; its files stay."""
+class RFGS_OT_forget_job(_OnJob, bpy.types.Operator):
+    """Take a job that is over off the list; its files stay."""
 
     bl_idname = "rfgs.forget_job"
     bl_label = "Remove from List"
+    command = Command("forget", words={"folder": "folder"})
 
     @classmethod
     def suits(cls, job: Job) -> bool:
@@ -133,13 +232,13 @@ class RFGS_OT_forget_job(_OnChosenJob, Reporting, bpy.types.Operator):
 
     def work(self, _context: bpy.types.Context, _progress: Progress) -> str:
         """Removes the row."""
-        job = following.chosen_job()
+        job = self.job()
         following.QUEUE.forget(job)
         following.show()
         return f"{job.title} is off the list; its files stay"
 
 
-class RFGS_OT_import_result(_OnChosenJob, Reporting, bpy.types.Operator):
+class RFGS_OT_import_result(_OnChosenJob, bpy.types.Operator):
     """Bring the Gaussians of the chosen training into the scene."""
 
     bl_idname = "rfgs.import_result"
@@ -159,7 +258,7 @@ class RFGS_OT_import_result(_OnChosenJob, Reporting, bpy.types.Operator):
         return told
 
 
-def await_check() -> str:
+def _await_check() -> str:
     """Waits for the environment's answer.
 
     Returns:
@@ -168,8 +267,6 @@ def await_check() -> str:
     Raises:
         AddonError: Something is wrong with it.
     """
-    import time
-
     while CHECK.step():
         time.sleep(0.1)
     if CHECK.problems:

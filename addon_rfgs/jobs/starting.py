@@ -6,7 +6,7 @@ from __future__ import annotations
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -14,12 +14,11 @@ import bpy
 
 from ..devices.empties import devices
 from ..errors import AddonError
-from ..reporting import chosen_path
+from ..reporting import Progress, chosen_path
 from ..scene.taking_part import left_out, radio_of, wanted_radios
-from .environment import interpreter
-from .following import QUEUE, follow
+from . import following
 from .plans import EvaluatePlan, GeneratePlan, Plan, TrainPlan
-from .preferences import blender_program, environment_path
+from .preferences import blender_program
 from .queue import ACTIVE, DONE, RUNNING, STOPPING, Job
 from .record import log_file
 
@@ -83,28 +82,37 @@ def evaluate_plan(scene: bpy.types.Scene) -> EvaluatePlan:
     return EvaluatePlan(out=_absolute(scene.rfgs.jobs.run_folder))
 
 
-def start(plan: Plan) -> str:
+def start(plan: Plan, python: Path, progress: Progress) -> str:
     """Begins a job, or puts it behind those that run; without a window it is carried out at once.
+
+    Args:
+        plan: What it does.
+        python: The environment's Python.
+        progress: Called with done and total of the present stage while it is carried out.
 
     Returns:
         What happened, in one line.
 
     Raises:
-        AddonError: No environment is set, the folder is taken, or the job fails at once.
+        AddonError: The folder is taken, or the job fails at once.
     """
-    job = QUEUE.add(plan, interpreter(environment_path()))
+    job = following.QUEUE.add(plan, python)
     if bpy.app.background:
-        return carry_out(job)
-    follow()
+        return _carry_out(job, progress)
+    following.follow()
     return f"{job.title} is in the list of jobs"
 
 
-def carry_out(job: Job, report: Callable[[int, int], None] | None = None) -> str:
-    """Runs a job to its end.
+def stop_and_wait(job: Job) -> None:
+    """Asks a job to stop and waits until it has."""
+    following.QUEUE.stop(job)
+    while job.state in (RUNNING, STOPPING):
+        following.QUEUE.step()
+        time.sleep(_EVERY_S)
 
-    Args:
-        job: One of the queue.
-        report: Called with done and total of the present stage.
+
+def _carry_out(job: Job, progress: Progress) -> str:
+    """Runs a job of the queue to its end.
 
     Raises:
         AddonError: The job failed; the message is the program's own.
@@ -113,15 +121,15 @@ def carry_out(job: Job, report: Callable[[int, int], None] | None = None) -> str
     try:
         with _ctrl_c():
             while job.state in ACTIVE:
-                QUEUE.step()
-                if report and job.progress and job.progress != seen:
+                following.QUEUE.step()
+                if job.progress and job.progress != seen:
                     seen = job.progress
-                    report(int(seen.done), int(seen.total))
+                    progress(int(seen.done), int(seen.total))
                 time.sleep(_EVERY_S)
     except KeyboardInterrupt:
-        _stop(job)
+        stop_and_wait(job)
     except BaseException:
-        _stop(job)
+        stop_and_wait(job)
         raise
     if job.state != DONE:
         reason = job.message.removeprefix("error: ")
@@ -131,14 +139,6 @@ def carry_out(job: Job, report: Callable[[int, int], None] | None = None) -> str
 
 def _absolute(folder: str) -> str:
     return str(Path(chosen_path(folder)).absolute())
-
-
-def _stop(job: Job) -> None:
-    """Asks a job to stop and waits until it has."""
-    QUEUE.stop(job)
-    while job.state in (RUNNING, STOPPING):
-        QUEUE.step()
-        time.sleep(_EVERY_S)
 
 
 @contextmanager

@@ -9,10 +9,8 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ..errors import AddonError
-from ..naming import closest
 from ..ownership import need_own
-from ..scene.frames import file_label
+from ..scene.frames import named
 from ..scene.materials import guess
 from ..scene.state import kept, show_what_renders
 from ..scene.survey import Surface, surfaces_now
@@ -60,10 +58,7 @@ def named_material(name: str) -> bpy.types.Material:
     Raises:
         AddonError: There is none, or it is linked from another file.
     """
-    material = bpy.data.materials.get(name)
-    if material is None:
-        known = bpy.data.materials.keys()
-        raise AddonError(f"{file_label()}: no material {name!r}{closest(name, known)}")
+    material = named(bpy.data.materials, name, "material")
     need_own(material)
     return material
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 
 import bpy
 
+from ..command import Command
 from ..errors import AddonError
 from ..reporting import Progress, Reporting
-from . import coloring
+from . import coloring, commands
 from .guesses import assign, guesses, materials_in_use, named_material, settable
 from .properties import material_items
 
@@ -18,6 +19,14 @@ class RFGS_OT_assign_material(Reporting, bpy.types.Operator):
     bl_idname = "rfgs.assign_material"
     bl_label = "Assign Radio Material"
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+    command = Command(
+        "materials apply",
+        reads={"materials": ("carrier_ghz",)},
+        words={"radio_material": "radio_material", "materials": "material"},
+        means={"material": {"to": "NAMED"}},
+        prepare=commands.refuse_out_of_band,
+        saves=True,
+    )
 
     radio_material: bpy.props.EnumProperty(  # type: ignore[valid-type]
         name="Radio Material",
@@ -30,13 +39,21 @@ class RFGS_OT_assign_material(Reporting, bpy.types.Operator):
         items=[
             ("ACTIVE", "Active Material", "The active material of the active object"),
             ("SELECTED", "Selected Objects", "All materials of the selected objects"),
+            ("NAMED", "Named", "Those that are named"),
         ],
+    )
+    materials: bpy.props.CollectionProperty(  # type: ignore[valid-type]
+        type=bpy.types.OperatorFileListElement,
+        name="Materials",
+        description="Names of materials in the file",
+        options={"SKIP_SAVE"},
     )
     thickness_m: bpy.props.FloatProperty(  # type: ignore[valid-type]
         name="Thickness",
         description="Of the slab behind the surface [m]; 0 takes the material's own",
         default=0.0,
         min=0.0,
+        max=10.0,
         soft_max=1.0,
         precision=4,
     )
@@ -50,8 +67,18 @@ class RFGS_OT_assign_material(Reporting, bpy.types.Operator):
 
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
         """Sets the materials."""
-        chosen = _targets(context, self.to)
-        count = assign(chosen, self.radio_material, self.thickness_m, self.scattering)
+        if self.to == "NAMED":
+            chosen = [named_material(row.name) for row in self.materials]
+        else:
+            chosen = _targets(context, self.to)
+        # A command that is not told of the two leaves them as they are.
+        told = [
+            getattr(self, name)
+            if self.to != "NAMED" or self.properties.is_property_set(name)
+            else None
+            for name in ("thickness_m", "scattering")
+        ]
+        count = assign(chosen, self.radio_material, *told)
         return f"Set {count} materials to {self.radio_material}"
 
 
@@ -60,6 +87,7 @@ class RFGS_OT_guess_materials(Reporting, bpy.types.Operator):
 
     bl_idname = "rfgs.guess_materials"
     bl_label = "Guess from Names"
+    command = Command("materials guess", add=commands.add_guess, work=commands.guess)
 
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
         """Fills the table."""
@@ -85,7 +113,7 @@ class RFGS_OT_apply_guesses(Reporting, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def ready(cls, context: bpy.types.Context) -> bool:
         """There is a table."""
         return len(context.window_manager.rfgs.guesses.rows) > 0
 
@@ -109,6 +137,12 @@ class RFGS_OT_color_materials(Reporting, bpy.types.Operator):
     bl_idname = "rfgs.color_materials"
     bl_label = "Colour by Radio Material"
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+    command = Command(
+        "materials color",
+        unsaid={"action": "COLOR"},
+        means={"--restore": {"action": "RESTORE"}},
+        saves=True,
+    )
 
     action: bpy.props.EnumProperty(  # type: ignore[valid-type]
         name="Action",

@@ -6,6 +6,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from ..command import Command
 from ..errors import AddonError
 from ..ownership import collections_of
 from ..reporting import Progress, Reporting, chosen_path
@@ -19,6 +20,20 @@ class RFGS_OT_show_paths(Reporting, bpy.types.Operator):
     bl_idname = "rfgs.show_paths"
     bl_label = "Show Paths"
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+    command = Command(
+        "paths",
+        reads={
+            "paths": (
+                *("dataset", "radio", "static", "follow", "tx_device", "rx_device"),
+                *("count", "range_db", "radius_m"),
+            )
+        },
+        words={"tx_device": "--tx", "rx_device": "--rx"},
+        means={"--frame": {"follow": False}},
+        instead={"--clear": "clear_paths"},
+        frame=True,
+        saves=True,
+    )
 
     def work(self, context: bpy.types.Context, progress: Progress) -> str:
         """Reads the path tables with the panel's settings."""
@@ -33,7 +48,7 @@ class RFGS_OT_clear_paths(Reporting, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
 
     @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
+    def ready(cls, _context: bpy.types.Context) -> bool:
         """There are paths."""
         return bool(collections_of(COLLECTION))
 

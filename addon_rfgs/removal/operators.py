@@ -3,6 +3,7 @@
 
 import bpy
 
+from ..command import Command
 from ..reporting import Progress, Reporting
 from .contents import remove_data
 
@@ -13,6 +14,7 @@ class RFGS_OT_remove_data(Reporting, bpy.types.Operator):
     bl_idname = "rfgs.remove_data"
     bl_label = "Remove RF-GS Data from File"
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+    command = Command("remove-data", saves=True)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Asks first."""

@@ -5,11 +5,14 @@ from __future__ import annotations
 
 import hashlib
 import re
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import bpy
 
 from ..errors import AddonError
+from ..naming import closest
 
 _PATTERN = re.compile(r"\s*(-?\d+)\s*:\s*(-?\d+)\s*(?::\s*(\d+)\s*)?")
 
@@ -56,6 +59,17 @@ def unit_scale(scene: bpy.types.Scene) -> float:
 def file_label() -> str:
     """Name of the open file for messages."""
     return bpy.data.filepath or "the unsaved scene"
+
+
+def named(known: Mapping[str, Any], name: str, what: str) -> Any:
+    """What has a name.
+
+    Raises:
+        AddonError: Nothing has it; the message says which names look like it.
+    """
+    if name not in known:
+        raise AddonError(f"{file_label()}: no {what} {name!r}{closest(name, known.keys())}")
+    return known[name]
 
 
 def file_sha256() -> str:

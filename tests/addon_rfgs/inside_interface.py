@@ -11,7 +11,7 @@ import bpy
 import pytest
 
 import addon_rfgs
-from addon_rfgs.cli import parser, run
+from addon_rfgs.cli import commands, parser, run
 from addon_rfgs.path_options import RELATIVE_PATH
 
 #: Operator → the command that does the same.
@@ -51,6 +51,12 @@ COMMANDS = {
     "train_gaussians": "train",
     "update_display": "import",
 }
+#: Properties of operators without a command of their own → the option that does the same.
+OPTIONS = {"compare_gaussians.every_frame": "--compare", "import_ply.filepath": "path"}
+#: Settings of panels that no command reads: of the view, and of a window that asks to be saved.
+OF_THE_WINDOW = {"devices.overlay", "devices.names", "devices.active", "jobs.save_first"}
+#: A comparison by command takes what moves: a file without a window has no selection to speak of.
+OF_THE_WINDOW |= {"gaussians.compare_with"}
 #: Operators that leave the file as it is; all others can be undone.
 LEAVE_THE_FILE = {
     *("evaluate_run", "export_bundle", "export_gaussians", "forget_job", "generate_dataset"),
@@ -93,6 +99,48 @@ def test_every_operator_has_a_command() -> None:
     assert sorted(operators()) == sorted(COMMANDS)
     assert not set(COMMANDS.values()) - set(known)
     assert all(known.values()), "every command says what it does"
+
+
+def options(command: str) -> set[str]:
+    """Properties that a command sets, and the words for them."""
+    tree = parser("rfgs")
+    for word in command.split():
+        (below,) = [row for row in tree._actions if isinstance(row, argparse._SubParsersAction)]
+        tree = below.choices[word]
+    words = {word for action in tree._actions for word in (*action.option_strings, action.dest)}
+    return words | {name for word in words for name in word.split("+")}
+
+
+def test_every_property_of_an_operator_is_an_option() -> None:
+    own = {kind: command for command, kind in commands() if kind is not None}
+    lacking = []
+    for name, kind in operators().items():
+        there = options(COMMANDS[name])
+        if kind in own:
+            assert own[kind].name == COMMANDS[name]
+            there |= {row for meant in own[kind].means.values() for row in meant}
+        for spec in getattr(bpy.ops.rfgs, name).get_rna_type().properties:
+            if spec.identifier != "rna_type" and not spec.is_hidden:
+                said = OPTIONS.get(f"{name}.{spec.identifier}", spec.identifier)
+                lacking += [f"{name}.{spec.identifier}"] if said not in there else []
+    assert not lacking
+
+
+def test_every_setting_of_a_panel_is_an_option() -> None:
+    read = {
+        f"{group}.{name}"
+        for row, _ in commands()
+        for group in row.reads
+        for name in row.reads[group]
+    }
+    lacking = {
+        f"{group.identifier}.{spec.identifier}"
+        for group in bpy.context.scene.rfgs.bl_rna.properties
+        if group.identifier not in ("rna_type", "name")
+        for spec in group.fixed_type.properties
+        if spec.identifier not in ("rna_type", "name")
+    }
+    assert lacking - read == OF_THE_WINDOW
 
 
 def test_every_command_teaches_and_refuses(capfd: pytest.CaptureFixture[str]) -> None:

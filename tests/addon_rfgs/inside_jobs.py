@@ -16,7 +16,7 @@ import pytest
 import addon_rfgs
 from addon_rfgs.cli import run
 from addon_rfgs.errors import AddonError
-from addon_rfgs.jobs import commands, environment, following, queue, starting
+from addon_rfgs.jobs import environment, following, queue, starting
 from addon_rfgs.jobs.plans import EvaluatePlan, GeneratePlan, TrainPlan, plan_of_json, plan_to_json
 from addon_rfgs.jobs.process import Process, birth
 from addon_rfgs.jobs.progress import Progress, read_log
@@ -315,7 +315,7 @@ def test_a_job_is_forgotten_by_command(
     registered: None, tmp_path: Path, capfd: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     listed = tmp_path / "jobs.json"
-    monkeypatch.setattr(commands, "QUEUE", queue.Queue(lambda: listed))
+    monkeypatch.setattr(following, "QUEUE", queue.Queue(lambda: listed))
     running, over = plan(tmp_path, "running"), plan(tmp_path, "over")
     write_record(Record(running, os.getpid(), birth(os.getpid())))
     write_record(Record(over, 0, ""))
@@ -361,9 +361,7 @@ def test_the_command_names_what_is_left_out_before_the_job_begins(
     bpy.context.object.name, bpy.context.object.rfgs.radio = "ap", "wifi"
     bpy.ops.rfgs.add_device(role="TRANSMITTER")
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "room.blend"))
-    jobs = queue.Queue(lambda: tmp_path / "jobs.json")
-    for module in (commands, starting):
-        monkeypatch.setattr(module, "QUEUE", jobs)
+    monkeypatch.setattr(following, "QUEUE", queue.Queue(lambda: tmp_path / "jobs.json"))
     out, python = str(tmp_path / "data"), str(program("failing"))
     asked = ["--radio", "wifi"] if named else []
     assert run(["generate", "--out", out, "--python", python, *asked]) == 2

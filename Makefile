@@ -37,7 +37,7 @@ test-wheel:
 
 # The site below site/. A link or a name of the API that leads nowhere ends it.
 docs: $(READY)
-	$(VENV)/mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(VENV)/mkdocs build --strict --quiet
 
 lint: $(READY)
 	$(VENV)/ruff check .

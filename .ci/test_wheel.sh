@@ -19,6 +19,8 @@ echo "$("$python" --version): $(basename "$wheel"), $(du -k "$wheel" | cut -f1) 
 grep -v '^numpy==' constraints.txt >"$work/constraints.txt"
 echo 'numpy>=2' >>"$work/constraints.txt"
 "$venv/bin/python" -m pip install --quiet --constraint "$work/constraints.txt" "$wheel"
+# Once more, as a kept environment may hold an older build of the same version.
+"$venv/bin/python" -m pip install --quiet --force-reinstall --no-deps "$wheel"
 "$venv/bin/python" -m pip check
 
 # From another folder, so that the wheel is what is imported, and not this clone.

@@ -14,7 +14,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 # that neighbours, which share what is costly to set up, stay together.
 WORKERS ?= 2
 
-.PHONY: demo test test-slow test-blender test-bpy lint format sync system clean
+.PHONY: demo test test-slow test-blender test-bpy test-wheel docs lint format sync system clean
 
 demo: $(READY) system
 	$(VENV)/rfgs demo --out demo
@@ -30,6 +30,14 @@ test-blender: $(READY) system
 
 test-bpy: $(READY) system
 	bash .ci/test_bpy.sh
+
+# An environment of its own: the wheel without extras, and so without Blender and Sionna RT.
+test-wheel:
+	PYTHON=$(PYTHON_FOUND) bash .ci/test_wheel.sh
+
+# The site below site/. A link or a name of the API that leads nowhere ends it.
+docs: $(READY)
+	NO_MKDOCS_2_WARNING=1 $(VENV)/mkdocs build --strict --quiet
 
 lint: $(READY)
 	$(VENV)/ruff check .
@@ -52,8 +60,8 @@ $(READY): pyproject.toml constraints.txt
 	$(PYTHON_FOUND) -m venv .venv
 	$(VENV)/python -m pip install --quiet --upgrade pip
 	@echo "Installing the pinned packages (about 4 GB on disk, several minutes) ..."
-	$(VENV)/python -m pip install --quiet --constraint constraints.txt --editable ".[dev,scenes]"
+	$(VENV)/python -m pip install --quiet --constraint constraints.txt --editable ".[dev]"
 	@touch $(READY)
 
 clean:
-	rm -rf .venv .blender demo
+	rm -rf .venv .blender demo site

@@ -31,7 +31,7 @@ from rfgs_core.radio.levels import decibels
 from rfgs_core.render.cameras import Camera
 from rfgs_core.skeleton import PARENTS
 
-#: Delay bins per tone; the band's resolution stays, the curve gets smooth.
+#: Delay bins per subcarrier; the band's resolution stays, the curve gets smooth.
 OVERSAMPLING = 8
 
 
@@ -50,7 +50,7 @@ def print_contents(dataset: Dataset, sequence: Sequence, radio: str) -> None:
 def delay_profile(
     sequence: Sequence, radio: str, links: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Step 2: from tones to path lengths.
+    """Step 2: from subcarriers to path lengths.
 
     Args:
         sequence: Gives the band.

@@ -35,8 +35,8 @@ def run_cli(command: Callable[[], int | None]) -> int:
         command: The command; its return value is the exit code, None meaning 0.
 
     Returns:
-        Exit code: 2 for an `RfgsError`, a full disk or a place that cannot be written or read,
-        130 after Ctrl-C.
+        Exit code: 2 for an `RfgsError`, a package of an extra that is not installed, a full disk
+        or a place that cannot be written or read, 130 after Ctrl-C.
     """
     try:
         return command() or 0
@@ -46,6 +46,14 @@ def run_cli(command: Callable[[], int | None]) -> int:
     except KeyboardInterrupt:
         sys.stderr.write(MESSAGE)
         return STOPPED
+    except ModuleNotFoundError as error:
+        from rfgs_core.extras import how_to_install
+
+        remedy = how_to_install(error.name or "")
+        if remedy is None:
+            raise
+        sys.stderr.write(f"error: {remedy}\n")
+        return 2
     except OSError as error:
         place = error.filename2 or error.filename
         if error.errno in _WRONG_PLACE and place:

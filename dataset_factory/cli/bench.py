@@ -33,8 +33,10 @@ def run(args: BenchArgs) -> int:
     from dataset_factory.make.bench import FactoryBench, bench
     from dataset_factory.scene.catalogue import find_scene
     from dataset_factory.trace.setup import prepare
+    from rfgs_core.extras import require
     from rfgs_core.files import write_json
 
+    require("sionna")
     prepare(threads=1)
     config = FactoryBench(find_scene(args.scene), args.frames)
     with tempfile.TemporaryDirectory(prefix="rfgs-bench-") as folder:

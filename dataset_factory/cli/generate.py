@@ -86,7 +86,10 @@ class GenerateArgs:
 def run(args: GenerateArgs) -> int:
     """Makes the dataset, or what is missing of it."""
     from dataset_factory.make.generate import generate
+    from rfgs_core.extras import require
 
+    if not args.scheduler:
+        require("sionna")  # Else it would be missed only once the scene has been exported.
     made = generate(job_of(args)[0])
     what = "finished" if made else "already complete"
     sys.stdout.write(f"{args.out}: {what}; look at it with: rfgs-factory preview {args.out}\n")

@@ -37,8 +37,10 @@ def run(args: VerifyArgs) -> int:
     from dataset_factory.trace.setup import prepare
     from dataset_factory.verify import GROUPS, verify
     from dataset_factory.verify.report import as_markdown, as_text, facts, summary, write_card
+    from rfgs_core.extras import require
     from rfgs_core.files import refuse_place, write_text
 
+    require("sionna", "bpy")
     if args.markdown is not None:
         refuse_place(args.markdown)
     prepare()

@@ -98,7 +98,10 @@ def _failure(name: str, code: int, lines: list[str]) -> RfgsError:
             "addon_rfgs in it, or leave --blender and $BLENDER away to use pip's bpy"
         )
     if any("No module named 'bpy'" in line for line in text):
-        return MissingToolError("bpy is missing; install it with pip, or give --blender PROGRAM")
+        return MissingToolError(
+            "bpy is not installed; run: pip install 'rfgs[blender]' (Python 3.11), or give "
+            "--blender PROGRAM"
+        )
     errors = [line for line in text if line.lower().startswith("error:")]
     reason = errors[-1][6:].strip() if errors else (text[-1] if text else "it said nothing")
     if "No space left" in reason or "disk is full" in reason:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import platform
 import shutil
@@ -12,11 +13,10 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
-PACKAGES = (
-    *("rfgs", "torch", "numba", "sionna-rt", "mitsuba", "drjit", "bpy", "xarray", "zarr"),
-    "viser",
-)
+PACKAGES = ("rfgs", "numpy", "torch", "numba", "xarray", "zarr", "viser")
 OPTIONAL = {
+    "sionna-rt": "traces channels: pip install 'rfgs[factory]'",
+    "bpy": "Blender as a module, for Python 3.11: pip install 'rfgs[blender]'",
     "anny": "builds the people of the scenes: pip install 'rfgs[scenes]'",
     "triton": "compiles the kernels of --device cuda: pip install 'rfgs[gpu]'",
     "lpips": "the LPIPS picture metric: pip install lpips",
@@ -50,7 +50,9 @@ def _llvm_row() -> tuple[str, str, str]:
     try:
         path, version = use_llvm()
     except MissingToolError as error:
-        return ("LLVM", "PROBLEM", str(error))
+        # Only Sionna RT needs it.
+        wanted = importlib.util.find_spec("sionna") is not None
+        return ("LLVM", "PROBLEM" if wanted else "none (optional)", str(error))
     return ("LLVM", f"{version} ({path.name})", "")
 
 

@@ -40,7 +40,7 @@ def start_on_surface(
     rng = np.random.default_rng(sub_seed(config.seed, "oracle", frame))
     points, normals = surface_samples(vertices, faces, config.num_gaussians, rng)
     gaussians = gaussians_at(points, normals)
-    power = fit_power(observations, gaussians, config)
+    power = fit_power(observations, gaussians)
     head = new_head(observations, config, power)
     features = head.without_readings(encode(observations, points, encoder).features)
     return FrameState(

@@ -8,8 +8,6 @@ are fitted together, those of all but one are taken off, and that one is sought 
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import torch
 from jaxtyping import Complex64, Float64
@@ -132,7 +130,7 @@ def _echoes(
     density = StartDensity.of(maps, bodies, observations.bounds_m)
     points = density.draw(GAUSSIANS_PER_BODY * len(axes_xy), rng)
     gaussians = gaussians_at(points, outward_normals(points, bodies))
-    power = fit_power(observations, gaussians, replace(config, power_trust=0.0))
+    power = fit_power(observations, gaussians)
     head = new_head(observations, config, power)
     channel = Channel.of(observations, observations.links, observations.tones)
     target = comparison_of(observations).measured()

@@ -13,7 +13,7 @@ Three comparisons of channels with what they should be, all by `offsets.estimate
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -84,7 +84,7 @@ def fitted_change(
     observations: Observations, config: TrainConfig, seed: int
 ) -> Complex64[np.ndarray, "tx rx subcarrier"]:
     """What Gaussians fitted to the observations predict at the visible entries."""
-    state = start_frame(observations, replace(config, power_trust=0.0), seed, None)
+    state = start_frame(observations, config, seed, None)
     state = solve_reflectivity(observations, state, config)
     channel = Channel.of(observations, observations.links, observations.tones)
     with torch.no_grad():

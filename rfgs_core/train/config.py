@@ -55,20 +55,14 @@ class TrainConfig:
     """Moving bodies in the scene; taken from the dataset's instances."""
     posture: Posture = "told"
     """How bodies are taken to hold themselves; without phases they stand."""
-    power_trust: float = 0.0
-    """Exponent of the phase-free fit of reflected powers against equal powers; 0: no such fit."""
     solver_steps: int = 8
     """Conjugate-gradient steps for the reflectivities."""
     iterations: int = 80
     """Adam steps per frame (the paper: 10,000)."""
-    coarse_share: float = 0.0
-    """Share of the steps in which the channel loss widens from a quarter of the band to all."""
     without: tuple[Part, ...] = ()
     """Parts of the paper's recipe that are left out."""
     temporal: float = 0.0
     """Weight of the pull of each Gaussian to its place on the body in the frame before."""
-    settle_share: float = 0.0
-    """Share of the steps, at the end, in which the rates fall to nothing."""
     density: Density | None = None
     """How Gaussians come and go while they are refined; None: as the objective does, the
     paper's rule with the paper's losses and none without."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Phase-free fit: reflected power of Gaussians from delay–angle power maps.
+"""Delay–angle power maps, and what they are expected to be of Gaussians, without any phases.
 
 For a device pair the channel is turned into power over delay and arrival direction. The
 expected map is a sum over Gaussians, whose phases are independent and uniform,
@@ -7,11 +7,8 @@ expected map is a sum over Gaussians, whose phases are independent and uniform,
     E[m(τ, s)] = Σ_i p_i v_i g_i |r(τ − τ_i)|² |b(s, u_i)|²,
 
 with the pulse r of the windowed band, the beam b of the array, the two-leg spreading
-g = (λ / ((4π)^{3/2} d_t d_r))², and the visibility v_i of a Gaussian that faces away. Speckle
-makes each map value exponentially distributed around its mean, so the likelihood is the
-Itakura–Saito divergence; the multiplicative update below never increases it (Févotte & Idier,
-Neural Computation 23, 2011). No carrier phase enters, hence clocks and millimetre errors of
-position do not matter.
+g = (λ / ((4π)^{3/2} d_t d_r))², and the visibility v_i of a Gaussian that faces away. No carrier
+phase enters, hence clocks and millimetre errors of position do not matter.
 """
 
 from __future__ import annotations
@@ -27,8 +24,6 @@ from rfgs_core.train.phase_free import band_window
 
 #: Delay samples and beams per resolution cell.
 OVERSAMPLING = 2
-#: Floor added to map and model, relative to the mean: keeps empty cells from ruling the fit.
-FLOOR = 0.1
 #: Beams point up to this sine away from broadside.
 WIDEST_SINE = 0.95
 
@@ -170,20 +165,6 @@ class DelayPowerModel:
         """Expected map `part` for the reflected powers seen by that pair."""
         delay_part, beam, _ = self.parts[part]
         return (delay_part * power) @ beam
-
-    def update(
-        self, power: Float32[np.ndarray, "M"], visibility: Float32[np.ndarray, "map M"]
-    ) -> Float32[np.ndarray, "M"]:
-        """One multiplicative step towards the maximum-likelihood powers."""
-        rise = np.zeros_like(power)
-        fall = np.full_like(power, 1e-30)
-        for part, (delay_part, beam, data) in enumerate(self.parts):
-            model = self.expected(part, power * visibility[part])
-            floor = FLOOR * model.mean()
-            model, seen = model + floor, data + floor
-            rise += visibility[part] * np.sum((delay_part.T @ (seen / model**2)) * beam, axis=1)
-            fall += visibility[part] * np.sum((delay_part.T @ (1.0 / model)) * beam, axis=1)
-        return power * np.sqrt(rise / fall)
 
     def scaled(
         self, power: Float32[np.ndarray, "M"], visibility: Float32[np.ndarray, "map M"]

@@ -17,9 +17,6 @@ from rfgs_core.train.head import SHARPNESS, RadioHead
 from rfgs_core.train.observations import Observations
 from rfgs_core.train.start import START_SCALES_M
 
-#: Multiplicative steps of the phase-free fit of reflected powers.
-POWER_STEPS = 20
-
 
 def visibility(
     points: Float[np.ndarray, "M 3"], normals: Float[np.ndarray, "M 3"], model: DelayPowerModel
@@ -37,13 +34,11 @@ def visibility(
     return np.array(rows, dtype=np.float32)
 
 
-def fit_power(
-    observations: Observations, gaussians: Gaussians, config: TrainConfig
-) -> Float[Tensor, "M"]:
-    """Reflected powers from delay–angle maps: equal ones, unless the phase-free fit is trusted.
+def fit_power(observations: Observations, gaussians: Gaussians) -> Float[Tensor, "M"]:
+    """Reflected powers from delay–angle maps: equal ones, at the level of the typical map.
 
-    The gain of each map against the model is fitted first: wall bounces and the neighbours of
-    an antenna lift or lower whole device pairs.
+    Each map has a gain of its own against the model: wall bounces and the neighbours of an
+    antenna lift or lower whole device pairs.
     """
     points = gaussians.means.numpy().astype(np.float64)
     model = DelayPowerModel(observations, points)
@@ -53,13 +48,8 @@ def fit_power(
         data.sum() / max(float(model.expected(k, start * seen[k]).sum()), 1e-30)
         for k, (_, _, data) in enumerate(model.parts)
     ]
-    seen = seen * np.array(gain, dtype=np.float32)[:, None]
-    power = start
-    for _ in range(POWER_STEPS if config.power_trust > 0 else 0):
-        power = model.update(power, seen)
-    ratio = np.maximum(power / start, 1e-6) ** config.power_trust
     # The level that suits the typical pair: the median keeps shadowed pairs out of it.
-    return torch.from_numpy((start * ratio * np.median(gain)).astype(np.float32))
+    return torch.from_numpy((start * np.median(gain)).astype(np.float32))
 
 
 def noise_per_link(

@@ -120,7 +120,7 @@ def start_frame(
             )
         goes_on, next_track = np.isin(track_id, before.track_id), before.unused_track
     gaussians = gaussians_at(points, outward_normals(points, bodies))
-    power = fit_power(observations, gaussians, config)
+    power = fit_power(observations, gaussians)
     head = before.head if before is not None else new_head(observations, config, power)
     features = head.without_readings(encode(observations, points, encoder).features)
     gaussians = replace(gaussians, features=features)

@@ -61,7 +61,7 @@ class TrainableGaussians:
         self.leaves = {name: value.requires_grad_(True) for name, value in values.items()}
         self.optimiser = torch.optim.Adam(
             [
-                {"params": [leaf], "lr": getattr(self.rates, name), "name": name}
+                {"params": [leaf], "lr": getattr(self.rates, name)}
                 for name, leaf in self.leaves.items()
             ]
         )
@@ -75,11 +75,6 @@ class TrainableGaussians:
     def gaussians(self) -> Gaussians:
         """The Gaussians; gradients flow into the leaves."""
         return Gaussians(**self.leaves)
-
-    def slow_to(self, factor: float) -> None:
-        """Takes the rates times `factor` from here on."""
-        for group in self.optimiser.param_groups:
-            group["lr"] = factor * getattr(self.rates, group["name"])
 
     def edit_rows(
         self,

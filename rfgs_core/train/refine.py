@@ -102,35 +102,12 @@ def _batch(task: Task, config: TrainConfig, seed: int, step: int) -> tuple[np.nd
     return links, torch.as_tensor(np.asarray(points, dtype=np.int64))
 
 
-def band_of_step(step: int, config: TrainConfig, entries: int) -> slice:
-    """Entries of the channel loss at a step: the middle of the band, growing to all of it.
-
-    Coarse to fine: a narrow band blurs ranges, so that a Gaussian too far off is still drawn.
-    """
-    coarse = config.coarse_share * config.iterations
-    share = 1.0 if step > coarse else 0.25 + 0.75 * (step - 1) / coarse
-    count = max(1, round(share * entries))
-    start = (entries - count) // 2
-    return slice(start, start + count)
-
-
-def rate_of_step(step: int, config: TrainConfig) -> float:
-    """Factor on the learning rates at a step: one, and at the end a straight line to nothing.
-
-    Adam's steps do not shrink by themselves: at a constant rate parameters keep trembling.
-    """
-    settling = config.settle_share * config.iterations
-    left = config.iterations - step + 1
-    return min(1.0, left / settling) if settling > 0 else 1.0
-
-
 def _loss(
     task: Task,
     state: FrameState,
     gaussians: Gaussians,
     links: np.ndarray,
     points: SamplePoints | None,
-    band: slice,
 ) -> Float[Tensor, ""]:
     loss = gaussians.means.new_zeros(())
     if points is not None:
@@ -138,8 +115,7 @@ def _loss(
     if len(links):
         part = task.channel.rows(links)
         predicted = task.comparison.predicted(part.change(state.head, gaussians), links)
-        target = task.target[links][:, band]
-        loss = loss + channel_loss(predicted[:, band], target, task.noise[links])
+        loss = loss + channel_loss(predicted, task.target[links], task.noise[links])
     return loss
 
 
@@ -179,14 +155,12 @@ def refine(
         links, chosen = _batch(task, config, seed, step)
         links = links if config.objective != "paper" else links[:0]
         points = None if task.points is None else task.points.rows(chosen)
-        band = band_of_step(step, config, task.target.shape[1])
-        loss = _loss(task, state, trained.gaussians, links, points, band)
+        loss = _loss(task, state, trained.gaussians, links, points)
         if continuity is not None:
             loss = loss + continuity.loss(trained.gaussians, trained.origin)
         if not torch.isfinite(loss):
             last_good.stop(step, loss, task.target, trained)
         last_good.remember(partial(_arrays, step - 1, trained, density))
-        trained.slow_to(rate_of_step(step, config))
         trained.optimiser.zero_grad()
         loss.backward()
         trained.optimiser.step()

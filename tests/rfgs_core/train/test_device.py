@@ -81,16 +81,14 @@ def test_a_step_meets_no_tensor_of_another_device(
     there, moved = task.on("meta"), on_device(state, "meta")  # pyright: ignore[reportArgumentType]
     assert there.points is not None
     trained = TrainableGaussians(moved.gaussians, LearningRates())
-    band = slice(0, 20)
-    loss = refine_module._loss(
-        *(there, moved, trained.gaussians, links, there.points.rows(chosen), band)
-    )
+    points = there.points.rows(chosen)
+    loss = refine_module._loss(there, moved, trained.gaussians, links, points)
     loss.backward()
     ends = [loss, moved.power, moved.head.directions, *(x.grad for x in trained.leaves.values())]
     assert {end.device.type for end in ends if end is not None} == {"meta"}
     # What is forgotten on the way is told: here all that the frame is compared with.
     with pytest.raises(RuntimeError, match=r"not on the expected device|same device"):
-        refine_module._loss(task, moved, moved.gaussians, links, None, band)
+        refine_module._loss(task, moved, moved.gaussians, links, None)
 
 
 needs_gpu = pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a CUDA device")

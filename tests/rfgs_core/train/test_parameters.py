@@ -34,7 +34,8 @@ def copied(trained: TrainableGaussians) -> dict[str, np.ndarray]:
 
 def test_default_rates_are_the_papers(make_gaussians) -> None:
     trained = TrainableGaussians(make_gaussians(2), LearningRates())
-    rates = {group["name"]: group["lr"] for group in trained.optimiser.param_groups}
+    groups = trained.optimiser.param_groups
+    rates = {name: group["lr"] for name, group in zip(trained.leaves, groups, strict=True)}
     assert rates == {
         "means": 0.005,
         "quats": 0.0005,

@@ -111,8 +111,7 @@ def test_a_resumed_descent_ends_where_an_undisturbed_one_does(
     tmp_path: Path, monkeypatch, observations, state, quick_config, objective
 ) -> None:
     monkeypatch.setattr(refine_module, "CHECKPOINT_EVERY", 5)
-    # Step 5, where it goes on, lies within the widening of the band.
-    config = replace(quick_config, iterations=12, objective=objective, coarse_share=0.8)
+    config = replace(quick_config, iterations=12, objective=objective)
     undisturbed = refine(observations, state, config, 0)
     checkpoint = tmp_path / "frame.npz"
     steps = []
@@ -188,12 +187,12 @@ def test_the_last_good_state_is_kept_when_the_loss_breaks(
     checkpoint, finite = tmp_path / "frame.npz", refine_module._loss
     calls = []
 
-    def breaks(task, state, gaussians, links, points, band):
+    def breaks(task, state, gaussians, links, points):
         calls.append(1)
         if len(calls) == 15:
             with torch.no_grad():
                 gaussians.features[3] = torch.inf
-        return finite(task, state, gaussians, links, points, band)
+        return finite(task, state, gaussians, links, points)
 
     config = replace(quick_config, iterations=20)
     good = refine(observations, state, replace(config, iterations=10), 0)
@@ -209,17 +208,6 @@ def test_the_last_good_state_is_kept_when_the_loss_breaks(
     again = refine(observations, state, config, 0, checkpoint)
     monkeypatch.undo()
     assert same(again, refine(observations, state, config, 0))
-
-
-def test_the_band_widens_around_its_middle(observations, state, quick_config) -> None:
-    config = replace(quick_config, iterations=8, coarse_share=0.5)
-    bands = [refine_module.band_of_step(step, config, 32) for step in range(1, 9)]
-    # 1/4, 7/16, 5/8 and 13/16 of 32 tones, then all.
-    assert [band.stop - band.start for band in bands] == [8, 14, 20, 26, 32, 32, 32, 32]
-    assert all(band.start == 32 - band.stop for band in bands)
-    plain = replace(config, coarse_share=0.0)
-    assert refine_module.band_of_step(1, plain, 32) == slice(0, 32)
-    assert not same(refine(observations, state, config, 0), refine(observations, state, plain, 0))
 
 
 def test_a_damaged_checkpoint_says_what_to_do(

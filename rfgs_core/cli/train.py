@@ -12,7 +12,7 @@ import tyro
 
 from rfgs_core.dataset.observed import Observed
 from rfgs_core.device import Device
-from rfgs_core.train.config import (
+from rfgs_core.settings import (
     Background,
     Calibrate,
     Density,
@@ -107,13 +107,13 @@ def run(args: TrainArgs) -> int:
     from rfgs_core.dataset import open_dataset
     from rfgs_core.errors import RfgsError
     from rfgs_core.frames import chosen_frames
+    from rfgs_core.measure.observations import packets_to_read
     from rfgs_core.render.shader import ShaderConfig
     from rfgs_core.render.view import fit_run_shader
     from rfgs_core.run.calibration import calibration_text
     from rfgs_core.run.encoders import with_encoder
     from rfgs_core.run.training import train_sequence
     from rfgs_core.seeds import sub_seed
-    from rfgs_core.train.observations import packets_to_read
 
     config = TrainConfig.of_recipe(args.recipe, args.objective, args.seed)
     config = replace(

@@ -15,20 +15,20 @@ import numpy as np
 from jaxtyping import Complex, Float
 from scipy.spatial import KDTree
 
+from rfgs_core.background.static_set import StaticSet
 from rfgs_core.dataset.sequence import Sequence
-from rfgs_core.evaluate.controls.gaussian_process import krige, krige_level
-from rfgs_core.evaluate.controls.interpolation import completed, fill
-from rfgs_core.evaluate.controls.linear import inverse_distance, linear
-from rfgs_core.evaluate.controls.spectrum import spectral
+from rfgs_core.evaluate.baselines.gaussian_process import krige, krige_level
+from rfgs_core.evaluate.baselines.interpolation import completed, fill
+from rfgs_core.evaluate.baselines.linear import inverse_distance, linear
+from rfgs_core.evaluate.baselines.spectrum import spectral
 from rfgs_core.evaluate.evidence import Evidence
 from rfgs_core.evaluate.geometry import reference_points
 from rfgs_core.evaluate.rf import RF_KEYS, frame_rf, pool_rf, snr_db
 from rfgs_core.evaluate.scene import Scene
+from rfgs_core.measure.direct_path import direct_background
 from rfgs_core.run.calibration import read_calibration
 from rfgs_core.run.static import has_static_set, read_static_set
 from rfgs_core.seeds import sub_seed
-from rfgs_core.train.background import direct_background
-from rfgs_core.train.static_set import StaticSet
 
 #: Metrics of a background; the first two are added here.
 BACKGROUND_KEYS = ("visible_snr_db", "pair_snr_db", *RF_KEYS)

@@ -14,7 +14,7 @@ from jaxtyping import Float
 from tqdm import tqdm
 
 from rfgs_core.evaluate.background import Backgrounds, background_metrics
-from rfgs_core.evaluate.controls import CONTROLS, ControlResult, phase_free
+from rfgs_core.evaluate.baselines import CONTROLS, ControlResult, phase_free
 from rfgs_core.evaluate.geometry import GEOMETRY_KEYS, geometry_metrics
 from rfgs_core.evaluate.image import IMAGE_KEYS
 from rfgs_core.evaluate.oracle import oracle_scores
@@ -26,8 +26,8 @@ from rfgs_core.evaluate.rf import RF_KEYS, frame_rf, pool_rf, rf_values
 from rfgs_core.evaluate.scene import EvaluatedRun, Scene
 from rfgs_core.evaluate.verdicts import verdicts
 from rfgs_core.files import write_json
+from rfgs_core.measure.observations import Kept
 from rfgs_core.render.view import pictures_of
-from rfgs_core.train.observations import Kept
 
 SCHEMA = "rfgs-metrics/1"
 #: Name of the evaluated method among the controls while they are computed alike.

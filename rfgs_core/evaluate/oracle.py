@@ -10,22 +10,22 @@ import torch
 from jaxtyping import Float32
 from tqdm import tqdm
 
+from rfgs_core.bodies.tracks import Tracks
 from rfgs_core.encode import Encoder
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.evaluate.geometry import surface_samples
 from rfgs_core.evaluate.grid import splat_gaussians
 from rfgs_core.evaluate.scene import EvaluatedRun, Scene
+from rfgs_core.fit.frame import FrameState, solve_reflectivity
+from rfgs_core.fit.refine import refine
+from rfgs_core.fit.sampling import encode
+from rfgs_core.measure.observations import Observations
+from rfgs_core.model.first_gaussians import gaussians_at
+from rfgs_core.model.first_powers import fit_power, new_head
 from rfgs_core.run.encoders import run_encoder
 from rfgs_core.seeds import sub_seed
+from rfgs_core.settings import TrainConfig
 from rfgs_core.threads import one_torch_thread
-from rfgs_core.train.config import TrainConfig
-from rfgs_core.train.first_powers import fit_power, new_head
-from rfgs_core.train.frame import FrameState, solve_reflectivity
-from rfgs_core.train.observations import Observations
-from rfgs_core.train.refine import refine
-from rfgs_core.train.sampling import encode
-from rfgs_core.train.start import gaussians_at
-from rfgs_core.train.tracks import Tracks
 
 
 def start_on_surface(

@@ -11,24 +11,24 @@ from typing import Any, Protocol
 import numpy as np
 from jaxtyping import Complex, Float, Float32, Float64
 
+from rfgs_core.bodies.body_prior import Bodies
 from rfgs_core.dataset.observed import Observed, observed_csi
 from rfgs_core.dataset.sequence import Sequence
 from rfgs_core.errors import RfgsError
-from rfgs_core.evaluate.controls.gaussian_process import krige, krige_level
-from rfgs_core.evaluate.controls.interpolation import fill
+from rfgs_core.evaluate.baselines.gaussian_process import krige, krige_level
+from rfgs_core.evaluate.baselines.interpolation import fill
 from rfgs_core.evaluate.evidence import Evidence
 from rfgs_core.evaluate.geometry import best_voxels, reference_points, voxel_budget
 from rfgs_core.evaluate.grid import Grid, splat_gaussians
 from rfgs_core.evaluate.people import FramePeople, match_people, surface_centroids
 from rfgs_core.evaluate.rf import HeldOut
 from rfgs_core.gaussians.model import Gaussians
+from rfgs_core.measure.delay_maps import delay_power_map
+from rfgs_core.measure.observations import Kept, Observations
 from rfgs_core.radio import Layout, Radio
 from rfgs_core.render.view import moving_gaussians
 from rfgs_core.seeds import sub_seed
-from rfgs_core.train.body_prior import Bodies
-from rfgs_core.train.config import Background, Observe, Packets
-from rfgs_core.train.delay_maps import delay_power_map
-from rfgs_core.train.observations import Kept, Observations
+from rfgs_core.settings import Background, Observe, Packets
 
 
 class EvaluatedRun(Protocol):

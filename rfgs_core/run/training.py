@@ -13,12 +13,26 @@ import torch
 from tqdm import tqdm
 
 from rfgs_core.arrays import Shape, load_arrays, save_arrays
+from rfgs_core.background.learned import (
+    learned_background,
+    need_enough_frames,
+    without_movers,
+)
+from rfgs_core.background.static_set import fit_static_set
+from rfgs_core.bodies.tracks import Tracks
 from rfgs_core.dataset import Dataset, Sequence
 from rfgs_core.device import need_device
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json, write_json
+from rfgs_core.fit.calibrate import calibrate
+from rfgs_core.fit.frame import FrameState, solve_reflectivity, start_frame
+from rfgs_core.fit.parameters import GAUSSIAN_SHAPES
+from rfgs_core.fit.refine import need_sample_points, refine
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.gaussians.ply import GaussianCloud, cloud_of, read_ply, write_ply
+from rfgs_core.measure.observations import need_still_antennas
+from rfgs_core.measure.offsets import Offsets
+from rfgs_core.model.head import HEAD_SHAPES, RadioHead
 from rfgs_core.run.calibration import (
     calibration_path,
     need_shared_links,
@@ -48,22 +62,8 @@ from rfgs_core.run.static import (
     write_static_set,
 )
 from rfgs_core.seeds import sub_seed
+from rfgs_core.settings import TrainConfig
 from rfgs_core.threads import one_torch_thread
-from rfgs_core.train.calibrate import calibrate
-from rfgs_core.train.config import TrainConfig
-from rfgs_core.train.frame import FrameState, solve_reflectivity, start_frame
-from rfgs_core.train.head import HEAD_SHAPES, RadioHead
-from rfgs_core.train.learned_background import (
-    learned_background,
-    need_enough_frames,
-    without_movers,
-)
-from rfgs_core.train.observations import need_still_antennas
-from rfgs_core.train.offsets import Offsets
-from rfgs_core.train.parameters import GAUSSIAN_SHAPES
-from rfgs_core.train.refine import need_sample_points, refine
-from rfgs_core.train.static_set import fit_static_set
-from rfgs_core.train.tracks import Tracks
 
 _CHECKPOINT: dict[str, Shape] = {
     **GAUSSIAN_SHAPES,

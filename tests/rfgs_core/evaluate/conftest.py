@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import torch
 
+from rfgs_core.bodies.body_prior import Bodies
 from rfgs_core.dataset import Sequence, open_dataset
 from rfgs_core.dataset.observed import Observed
 from rfgs_core.dataset.splits import radio_split
@@ -21,10 +22,9 @@ from rfgs_core.evaluate.grid import Grid
 from rfgs_core.evaluate.metrics import evaluate_run
 from rfgs_core.evaluate.rf import HeldOut
 from rfgs_core.gaussians.model import FEATURE_DIM, Gaussians
+from rfgs_core.measure.observations import Kept, Observations, observe
 from rfgs_core.radio import Radio, layout, place_devices
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
-from rfgs_core.train.body_prior import Bodies
-from rfgs_core.train.observations import Kept, Observations, observe
 
 BOUNDS_M = np.array([[0.0, 0.0, 0.0], [4.0, 3.5, 2.5]])
 

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 import torch
 
+from rfgs_core.measure.observations import observe
+from rfgs_core.model.channel import Channel
 from rfgs_core.predict.antennas import receiving_array
 from rfgs_core.predict.echoes import echoes_at, reflectors
 from rfgs_core.predict.prediction import predict_channel
@@ -19,8 +21,6 @@ from rfgs_core.predict.spectra import (
 from rfgs_core.radio import preset
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.run import Run
-from rfgs_core.train.channel import Channel
-from rfgs_core.train.observations import observe
 
 FREQ_HZ = preset("wifi").freq_hz
 TX = np.array([0.0, 0.0, 1.0])

@@ -63,8 +63,15 @@ class Backgrounds:
             # As devices with the offsets of the capture hear it, like `Run.predict`.
             turn = read_calibration(run.path, run.frames[0]).capture.turn(layout, freq_hz)
         visible = np.where(seen.links[..., None] & seen.tones, seen.static * turn, np.nan)
-        grid = (scene.grid, scene.voxels)
-        evidence = Evidence.hide(visible, visible, scene.held_out, layout, freq_hz, *grid)
+        evidence = Evidence.hide(
+            visible,
+            visible,
+            scene.held_out,
+            layout,
+            freq_hz,
+            grid=scene.grid,
+            voxels=scene.voxels,
+        )
         straight, whole = direct_background(seen), static.background(seen)
         parts = ((part * turn).astype(np.complex64) for part in (straight, whole))
         return Backgrounds(static, evidence, *parts)
@@ -97,8 +104,7 @@ def background_metrics(scene: Scene, own: Backgrounds) -> dict[str, Any]:
 
 def _metrics(scene: Scene, predicted: Channel) -> dict[str, float | None]:
     true, held_out = scene.csi_static, scene.held_out
-    layout = scene.layout
-    values = pool_rf([frame_rf(true, predicted, held_out, layout.tx_device, layout.rx_device)])
+    values = pool_rf([frame_rf(true, predicted, held_out, scene.layout)])
     pairs = held_out.pair_links[..., None] & np.ones(true.shape, dtype=bool)
     for name, where in (("visible_snr_db", held_out.visible), ("pair_snr_db", pairs)):
         error = float(np.sum(np.abs(true - predicted)[where].astype(np.float64) ** 2))

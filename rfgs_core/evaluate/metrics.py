@@ -214,11 +214,10 @@ def _add(
         table.add(name, frame, "geometry", geometry)
     if result.delta is None:
         return
-    devices = scene.layout.tx_device, scene.layout.rx_device
     static = scene.environment if result.static is None else result.static
-    rf = frame_rf(csi - scene.csi_static, result.delta, scene.held_out, *devices)
+    rf = frame_rf(csi - scene.csi_static, result.delta, scene.held_out, scene.layout)
     table.add(name, frame, "rf", rf)
-    both = frame_rf(csi, result.delta + static, scene.held_out, *devices)
+    both = frame_rf(csi, result.delta + static, scene.held_out, scene.layout)
     table.add(name, frame, "rf_csi", both)
 
 

@@ -14,6 +14,7 @@ from jaxtyping import Complex, Float, Float32, Float64
 from rfgs_core.bodies.body_prior import Bodies
 from rfgs_core.dataset.observed import Observed, observed_csi
 from rfgs_core.dataset.sequence import Sequence
+from rfgs_core.dataset.splits import HeldOut
 from rfgs_core.errors import RfgsError
 from rfgs_core.evaluate.baselines.gaussian_process import krige, krige_level
 from rfgs_core.evaluate.baselines.interpolation import fill
@@ -21,7 +22,6 @@ from rfgs_core.evaluate.evidence import Evidence
 from rfgs_core.evaluate.geometry import best_voxels, reference_points, voxel_budget
 from rfgs_core.evaluate.grid import Grid, splat_gaussians
 from rfgs_core.evaluate.people import FramePeople, match_people, surface_centroids
-from rfgs_core.evaluate.rf import HeldOut
 from rfgs_core.gaussians.model import Gaussians
 from rfgs_core.measure.delay_maps import delay_power_map
 from rfgs_core.measure.observations import Kept, Observations
@@ -124,13 +124,7 @@ class Scene:
         if not isinstance(name, str):
             raise RfgsError(f"{run.path / 'config.json'}: expected the name of a radio, got {name}")
         radio, layout = sequence.radio_spec(name), sequence.layout(name)
-        held_out = HeldOut.of(
-            sequence.splits["rf"][name],
-            layout.tx_device,
-            layout.rx_device,
-            layout.measured,
-            radio.num_subcarriers,
-        )
+        held_out = HeldOut.of(sequence.splits["rf"][name], layout, radio.num_subcarriers)
         grid = Grid.over(sequence.bounds_m)
         voxels = voxel_budget(sequence.instances)
         static = sequence.csi_static(name)

@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Bool, Complex, Complex64, Float32, Float64, Int64
 
 from rfgs_core.dataset.observed import Observed, observed_packets
+from rfgs_core.dataset.splits import HeldOut
 from rfgs_core.encode.matched_filter import device_pairs
 from rfgs_core.errors import RfgsError
 from rfgs_core.measure.packets import change_of_packets
@@ -97,20 +98,6 @@ class Observations:
         return self.with_delta(delta)
 
 
-def _visible(
-    split: dict[str, Any], elements: Layout, num_subcarriers: int
-) -> tuple[Bool[np.ndarray, "tx rx"], Bool[np.ndarray, "subcarrier"]]:
-    """Links and tones that training may see."""
-    links = elements.measured.copy()
-    links[:, split["rx_elements"]] = False
-    for a, b in split["device_pairs"]:
-        for first, second in ((a, b), (b, a)):
-            links[(elements.tx_device[:, None] == first) & (elements.rx_device == second)] = False
-    tones = np.ones(num_subcarriers, dtype=bool)
-    tones[split["subcarriers"]] = False
-    return links, tones
-
-
 def need_still_antennas(sequence: Sequence, radio: str) -> None:
     """Refuses radios that training cannot use.
 
@@ -180,7 +167,8 @@ def visible_channel(
     data = sequence.coordinates(radio)
     # The links that exist are those the channels were stored with.
     elements = replace(sequence.layout(radio), measured=data["measured"].values.copy())
-    links, tones = _visible(sequence.splits["rf"][radio], elements, data.sizes["subcarrier"])
+    split = HeldOut.of(sequence.splits["rf"][radio], elements, data.sizes["subcarrier"])
+    links, tones = split.links, split.tones
     count = 1 if packets == "first" else None
     csi = observed_packets(sequence, radio, frame, channel, count)
     received = np.broadcast_to(links, csi.shape[:3])

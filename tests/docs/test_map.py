@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rooms of `rfgs_core` import what stands above them in the map of DEVELOPMENT.md, nothing below."""
+"""Rooms of `rfgs_core` import what stands above them in the map of DEVELOPMENT.md."""
 
 from __future__ import annotations
 

@@ -26,9 +26,7 @@ TWO = np.array([[1.4, 1.3, 1.0], [2.6, 2.2, 1.4]])
 def rf_of(made, name: str) -> dict:
     result = CONTROLS[name](made.evidence)
     elements = made.evidence.layout
-    return rf_values(
-        frame_rf(made.delta, result.delta, made.held_out, elements.tx_device, elements.rx_device)
-    )
+    return rf_values(frame_rf(made.delta, result.delta, made.held_out, elements))
 
 
 def test_held_out_entries_are_hidden(scatterers) -> None:

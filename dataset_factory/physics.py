@@ -12,6 +12,7 @@ from rfgs_core.dataset import Sequence
 from rfgs_core.radio import DevicePose, Layout, Radio, devices_at, layout
 from rfgs_core.radio.antennas import field
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.radio.delay import delay_profile, hann_to_zero
 from rfgs_core.radio.layout import rotation
 
 #: Median amplitude of clear direct paths relative to free space; one path alone may add to a
@@ -155,7 +156,7 @@ def _early_power(sequence: Sequence, radio: str, links: np.ndarray, nearest_m: f
     """Strongest arrival earlier than light allows, relative to the strongest of all."""
     spec = sequence.radio_spec(radio)
     tones = spec.num_subcarriers
-    profile = np.fft.ifft(links * np.hanning(tones), axis=-1)
+    profile = delay_profile(links, hann_to_zero(tones))
     power = (np.abs(profile) ** 2).mean(axis=(0, 1))
     cell_m = SPEED_OF_LIGHT / spec.bandwidth_hz
     length_m = np.arange(tones) * cell_m

@@ -14,6 +14,7 @@ from tqdm import tqdm
 from rfgs_core.dataset import Dataset, Sequence, open_dataset
 from rfgs_core.dataset.impaired_store import has_impaired
 from rfgs_core.radio import devices_at
+from rfgs_core.radio.delay import delay_profile, hann_to_zero
 from rfgs_core.radio.images import SCATTERING
 from rfgs_core.radio.levels import decibels
 
@@ -114,7 +115,7 @@ def delay_spread_s(links: np.ndarray, spacing_hz: float) -> np.ndarray:
         (link,); a single path gives the width of the band's own window, below 1/bandwidth.
     """
     tones = links.shape[-1]
-    profile = np.abs(np.fft.ifft(links * np.hanning(tones), axis=-1)) ** 2
+    profile = np.abs(delay_profile(links, hann_to_zero(tones))) ** 2
     peak = profile.argmax(axis=-1)
     # A profile is periodic; a quarter of it before the strongest arrival counts as before.
     order = (np.arange(tones) + peak[:, None] - tones // 4) % tones

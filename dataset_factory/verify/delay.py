@@ -15,6 +15,7 @@ from dataset_factory.verify.description import Description, Device, Part, steppi
 from dataset_factory.verify.tracing import Links, joined, links
 from dataset_factory.verify.workshop import Workshop, devices_of
 from rfgs_core.radio import PRESETS, Radio, layout
+from rfgs_core.radio.delay import delay_profile, hann_between
 
 #: Points per delay cell that a profile is interpolated to.
 _FINER = 32
@@ -72,10 +73,9 @@ def verify(workshop: Workshop) -> Group:
 def profile(channel: np.ndarray, radio: Radio) -> tuple[np.ndarray, np.ndarray]:
     """Path lengths [m], shape (n,), and amplitudes of delay profiles, shape (link, n)."""
     number = radio.num_subcarriers
-    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * (np.arange(number) + 0.5) / number)
     count = _FINER * number
     length_m = np.arange(count) * (radio.unambiguous_path_m / count)
-    return length_m, np.abs(np.fft.ifft(channel * window, count, axis=-1))
+    return length_m, np.abs(delay_profile(channel, hann_between(number), _FINER))
 
 
 def peaks_m(channel: np.ndarray, radio: Radio) -> np.ndarray:

@@ -11,6 +11,7 @@ from jaxtyping import Complex, Float
 
 from rfgs_core.dataset.splits import HeldOut
 from rfgs_core.radio import Layout
+from rfgs_core.radio.delay import delay_profile, hann
 
 #: Metrics of the RF group and, where it exists, the median over frames beside the pooled value.
 RF_KEYS = ("element_snr_db", "subcarrier_snr_db", "device_gain_mae_db", "delay_profile_corr")
@@ -23,13 +24,6 @@ def snr_db(error_power: float, power: float) -> float | None:
     if power <= 0.0:
         return None
     return float(10.0 * np.log10(power / max(error_power, NEGLIGIBLE * power)))
-
-
-def delay_profiles(
-    csi: Complex[np.ndarray, "link subcarrier"],
-) -> Float[np.ndarray, "link delay"]:
-    """Magnitude of the delay profile of each link, Hann-windowed against side lobes."""
-    return np.abs(np.fft.ifft(csi * np.hanning(csi.shape[1] + 2)[1:-1], axis=1))
 
 
 def _correlation(
@@ -72,7 +66,7 @@ def frame_rf(
     result["gain_db"] = _gain_errors_db(true, predicted, held_out, layout)
     links = held_out.pair_links | held_out.element_links
     result["delay_profile_corr"] = _correlation(
-        delay_profiles(true[links]), delay_profiles(predicted[links])
+        *(np.abs(delay_profile(csi[links], hann(csi.shape[2]))) for csi in (true, predicted))
     )
     return result
 

@@ -25,6 +25,7 @@ from jaxtyping import Bool, Complex64, Float, Float32, Float64
 
 from rfgs_core.radio import Layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.radio.delay import band_window, delay_profile
 
 #: Samples of a delay profile per resolution cell 1/B of the whole band.
 DELAY_SAMPLES = 4
@@ -70,12 +71,6 @@ def hologram(
     return (wave * change).astype(np.complex64)
 
 
-def band_window(tones: Bool[np.ndarray, "subcarrier"]) -> Float64[np.ndarray, "subcarrier"]:
-    """Hamming window over the band, zero at hidden tones, sum 1."""
-    window = np.hamming(len(tones)) * tones
-    return window / window.sum()
-
-
 def delay_amplitude(
     csi: Complex64[np.ndarray, "*link subcarrier"], tones: Bool[np.ndarray, "subcarrier"]
 ) -> Float32[np.ndarray, "*link delay"]:
@@ -83,9 +78,9 @@ def delay_amplitude(
 
     The samples cover one period 1/Δf of delay, `DELAY_SAMPLES` per resolution cell.
     """
-    size = DELAY_SAMPLES * len(tones)
-    spectrum = np.where(tones, csi, 0) * band_window(tones)
-    return np.abs(np.fft.ifft(spectrum, n=size, axis=-1) * size).astype(np.float32)
+    visible = np.where(tones, csi, 0)
+    profile = delay_profile(visible, band_window(tones), DELAY_SAMPLES, peak=True)
+    return np.abs(profile).astype(np.float32)
 
 
 def direct_amplitude(

@@ -16,7 +16,8 @@ from jaxtyping import Complex, Float, Float32, Int64
 from torch import Tensor
 
 from rfgs_core.measure.observations import Observations
-from rfgs_core.measure.phase_free import band_window, direct_wave, reference_level
+from rfgs_core.measure.phase_free import direct_wave, reference_level
+from rfgs_core.radio.delay import band_window
 
 
 class Comparison(Protocol):

@@ -19,8 +19,8 @@ import numpy as np
 from jaxtyping import Float, Float32, Float64
 
 from rfgs_core.measure.observations import Observations
-from rfgs_core.measure.phase_free import band_window
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.radio.delay import band_window, delay_profile
 
 #: Delay samples and beams per resolution cell.
 OVERSAMPLING = 2
@@ -82,8 +82,7 @@ def power_maps(observations: Observations) -> list[PowerMap]:
             tx_xyz, rx_xyz = observations.layout.tx_xyz[t], observations.layout.rx_xyz[r]
             virtual = (rx_xyz - rx_xyz.mean(axis=0)) + (tx_xyz - tx_xyz.mean(axis=0))
             beams = _beams(virtual, wavelength_m)
-            size = OVERSAMPLING * len(window)
-            profile = np.fft.ifft(observations.delta[t, r] * window, n=size, axis=1) * size
+            profile = delay_profile(observations.delta[t, r], window, OVERSAMPLING, peak=True)
             power = np.abs(beams @ profile).T ** 2
             if not power.any():
                 continue

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from rfgs_core.dataset.splits import HeldOut
-from rfgs_core.evaluate.rf import delay_profiles, frame_rf, pool_rf, rf_values, snr_db
+from rfgs_core.evaluate.rf import frame_rf, pool_rf, rf_values, snr_db
 from rfgs_core.radio import Layout
 
 #: Two devices, each with one transmitting and four receiving elements.
@@ -86,12 +86,6 @@ def test_errors_of_visible_entries_do_not_count() -> None:
     assert values["element_snr_db"] is not None and values["element_snr_db"] > 100
     assert values["subcarrier_snr_db"] is not None and values["subcarrier_snr_db"] > 100
     assert values["device_gain_mae_db"] == pytest.approx(0.0)
-
-
-def test_delay_profile_of_one_path_peaks_at_its_delay() -> None:
-    tone = np.arange(64)
-    csi = np.exp(-2j * np.pi * tone * 10 / 64)[None]
-    assert delay_profiles(csi)[0].argmax() == 10
 
 
 def test_delay_profiles_of_different_paths_do_not_correlate() -> None:

@@ -15,7 +15,7 @@ from rfgs_core.predict.prediction import predict_channel
 from rfgs_core.predict.spectra import (
     arrival_power,
     beam_power,
-    delay_profile,
+    profile_over_delay,
     sky_cells,
 )
 from rfgs_core.radio import preset
@@ -44,7 +44,7 @@ def test_one_gaussian_gives_the_radar_equation(make_points) -> None:
 
 def test_its_delay_profile_peaks_at_its_delay_with_its_amplitude(make_points) -> None:
     prediction = predict_channel(make_points([POINT], [0.3]), TX, RX[:, None], FREQ_HZ)
-    profile, delay_s = delay_profile(prediction.csi_scatter[:, 0], FREQ_HZ)
+    profile, delay_s = profile_over_delay(prediction.csi_scatter[:, 0], FREQ_HZ)
     length_m = np.linalg.norm(POINT - TX) + np.linalg.norm(POINT - RX, axis=1)
     peak = profile.argmax(axis=1)
     step_s = delay_s[1]

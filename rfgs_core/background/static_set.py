@@ -29,6 +29,7 @@ from rfgs_core.model.first_powers import noise_per_link
 from rfgs_core.model.head import RadioHead
 from rfgs_core.model.reflectivity import posterior_mean
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.radio.levels import decibels
 from rfgs_core.seeds import sub_seed
 
 #: Drawn in so many rounds, each from what the earlier ones leave.
@@ -65,7 +66,7 @@ class StaticSet:
     def power_db(self) -> Float[np.ndarray, "M"]:
         """|γ|² of each [dB, relative to 1 m²]."""
         power = np.abs(self.gamma.astype(np.complex128)) ** 2
-        return (10 * np.log10(np.maximum(power, 1e-30))).astype(np.float32)
+        return decibels(power).astype(np.float32)
 
     def away_from(self, antennas: Float[np.ndarray, "N 3"]) -> StaticSet:
         """The set less what stands nearer to one of the antennas than `NEAREST_M`."""

@@ -26,6 +26,7 @@ from rfgs_core.evaluate.geometry import reference_points
 from rfgs_core.evaluate.rf import RF_KEYS, frame_rf, pool_rf, snr_db
 from rfgs_core.evaluate.scene import Scene
 from rfgs_core.measure.direct_path import direct_background
+from rfgs_core.radio.levels import power_of
 from rfgs_core.run.calibration import read_calibration
 from rfgs_core.run.static import has_static_set, read_static_set
 from rfgs_core.seeds import sub_seed
@@ -128,7 +129,7 @@ def surface_distances(static: StaticSet, sequence: Sequence) -> dict[str, float]
     low, high = sequence.bounds_m
     own = np.asarray(tree.query(static.gaussians.means.numpy().astype(np.float64))[0])
     chance = tree.query(rng.uniform(low, high, (count, 3)))[0]
-    power = 10 ** (static.power_db.astype(np.float64) / 10)
+    power = power_of(static.power_db.astype(np.float64))
     return {
         "power_median": _weighted_median(own, power),
         "median": float(np.median(own)),

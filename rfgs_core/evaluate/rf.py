@@ -12,6 +12,7 @@ from jaxtyping import Complex, Float
 from rfgs_core.dataset.splits import HeldOut
 from rfgs_core.radio import Layout
 from rfgs_core.radio.delay import delay_profile, hann
+from rfgs_core.radio.levels import decibels
 
 #: Metrics of the RF group and, where it exists, the median over frames beside the pooled value.
 RF_KEYS = ("element_snr_db", "subcarrier_snr_db", "device_gain_mae_db", "delay_profile_corr")
@@ -23,7 +24,7 @@ def snr_db(error_power: float, power: float) -> float | None:
     """10 log10(Σ|true|² / Σ|true − predicted|²) [dB]; None where nothing is to be predicted."""
     if power <= 0.0:
         return None
-    return float(10.0 * np.log10(power / max(error_power, NEGLIGIBLE * power)))
+    return float(decibels(power / max(error_power, NEGLIGIBLE * power)))
 
 
 def _correlation(
@@ -87,7 +88,7 @@ def _gain_errors_db(
             want = float(np.mean(np.abs(true[links]).astype(np.float64) ** 2))
             got = float(np.mean(np.abs(predicted[links]).astype(np.float64) ** 2))
             if want > 0.0:
-                gains.append(abs(10.0 * float(np.log10(got / want))) if got > 0.0 else None)
+                gains.append(abs(float(decibels(got / want, least=0.0))) if got > 0.0 else None)
     return gains
 
 

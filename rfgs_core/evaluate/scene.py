@@ -26,6 +26,7 @@ from rfgs_core.gaussians.model import Gaussians
 from rfgs_core.measure.delay_maps import delay_power_map
 from rfgs_core.measure.observations import Kept, Observations
 from rfgs_core.radio import Layout, Radio
+from rfgs_core.radio.levels import power_of
 from rfgs_core.render.view import moving_gaussians
 from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import Background, Observe, Packets
@@ -202,7 +203,7 @@ class Scene:
             self.grid,
             gaussians.means.numpy().astype(np.float64),
             gaussians.covariances.numpy().astype(np.float64),
-            10.0 ** (power_db[len(power_db) - len(gaussians) :] / 10.0),
+            power_of(power_db[len(power_db) - len(gaussians) :]),
         )
 
     @property

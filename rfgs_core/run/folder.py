@@ -26,6 +26,7 @@ from rfgs_core.model.channel import Channel
 from rfgs_core.model.head import HEAD_SHAPES, RadioHead
 from rfgs_core.model.reflectivity import fitted_reflectivities
 from rfgs_core.model.unseen_pairs import levelled
+from rfgs_core.radio.levels import power_of
 from rfgs_core.run.calibration import read_calibration
 from rfgs_core.run.static import static_gaussians
 from rfgs_core.settings import TrainConfig
@@ -218,7 +219,7 @@ class Run:
 
     def _power(self, frame: int) -> Float64[np.ndarray, "M"]:
         """Reflected power of each moving Gaussian [m²]."""
-        return 10 ** (self.attributes(frame)["rf_power_db"].astype(np.float64) / 10)
+        return power_of(self.attributes(frame)["rf_power_db"].astype(np.float64))
 
     def _answer(
         self, frame: int, observations: Observations, gaussians: Gaussians

@@ -33,6 +33,7 @@ from rfgs_core.gaussians.ply import GaussianCloud, cloud_of, read_ply, write_ply
 from rfgs_core.measure.observations import need_still_antennas
 from rfgs_core.measure.offsets import Offsets
 from rfgs_core.model.head import HEAD_SHAPES, RadioHead
+from rfgs_core.radio.levels import decibels
 from rfgs_core.run.calibration import (
     calibration_path,
     need_shared_links,
@@ -253,7 +254,7 @@ def _partial_path(run: Run, frame: int) -> Path:
 
 def _store(run: Run, frame: int, state: FrameState) -> None:
     """Writes a finished frame; its checkpoint comes last and marks it as done."""
-    power_db = 10 * np.log10(np.maximum(state.power.numpy(), 1e-30)).astype(np.float32)
+    power_db = decibels(state.power.numpy()).astype(np.float32)
     write_ply(run.ply_path(frame), cloud_of(state.gaussians, rf_power_db=power_db))
     gamma = state.gamma.detach().numpy().astype(np.complex64)
     save_arrays(

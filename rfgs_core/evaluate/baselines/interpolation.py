@@ -15,6 +15,7 @@ from jaxtyping import Complex, Float, Int
 
 from rfgs_core.evaluate.evidence import ControlResult, Evidence
 from rfgs_core.radio import Layout
+from rfgs_core.radio.levels import decibels, power_of
 
 #: Values at `wanted` coordinates from values at `known` ones: (values [known, sample], known
 #: [known, dim], wanted [wanted, dim]) to [wanted, sample].
@@ -153,8 +154,8 @@ def _fill_pairs(
         nearest = int(np.argmin(np.linalg.norm(known - where[pair], axis=1)))
         value = pairs[names[nearest]]
         if level_db is not None and (power > 0.0).all():
-            level = level_db(10.0 * np.log10(power)[:, None], known, where[pair][None])[0, 0]
-            value = value * np.sqrt(10.0 ** (level / 10.0) / power[nearest])
+            level = level_db(decibels(power, least=0.0)[:, None], known, where[pair][None])[0, 0]
+            value = value * np.sqrt(power_of(level) / power[nearest])
         tx, rx = blocks[pair]
         out[np.ix_(tx, rx)] = value
 

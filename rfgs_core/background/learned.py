@@ -17,21 +17,18 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import torch
 from jaxtyping import Complex64
 from tqdm import tqdm
 
 from rfgs_core.dataset.observed import Observed
 from rfgs_core.errors import RfgsError
-from rfgs_core.fit.frame import FrameState, solve_reflectivity, start_frame
+from rfgs_core.fit.frame import explained_change, solved_frame
 from rfgs_core.measure.observations import (
-    Observations,
     Reported,
     observe,
     reported,
     visible_channel,
 )
-from rfgs_core.model.channel import Channel
 from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import Observe, Packets, TrainConfig
 from rfgs_core.threads import one_torch_thread
@@ -126,29 +123,22 @@ def without_movers(
         before, rows = None, []
         for frame in frames:
             seen = observe(
-                *(sequence, radio, frame, config.channel, "complex", background),
+                sequence,
+                radio,
+                frame,
+                channel=config.channel,
+                empty=background,
                 packets=config.packets,
             )
             left = seen.delta + seen.static
             if seen.changed:
                 seed = sub_seed(config.seed, sequence.name, radio, frame, turn, "background")
                 with one_torch_thread():
-                    before = start_frame(seen, config, seed, before)
-                    before = solve_reflectivity(seen, before, config)
-                    left = left - _explained(seen, before)
+                    before = solved_frame(seen, config, seed, before)
+                    left = left - explained_change(seen, before)
             rows.append(np.where(seen.links[..., None] & seen.tones, left, complex(np.nan, np.nan)))
         background = _median(np.stack(rows))
     return background
-
-
-def _explained(
-    observations: Observations, state: FrameState
-) -> Complex64[np.ndarray, "tx rx subcarrier"]:
-    """What moving Gaussians explain of the visible entries."""
-    channel = Channel.of(observations, observations.links, observations.tones)
-    with torch.no_grad():
-        change = channel.change(state.head, state.gaussians).numpy()
-    return observations.with_entries(change).delta
 
 
 def _median(rows: np.ndarray) -> Complex64[np.ndarray, "tx rx tone"]:

@@ -15,7 +15,7 @@ from tqdm import tqdm
 from rfgs_core.dataset import open_dataset
 from rfgs_core.device import Device, finish_device, need_device
 from rfgs_core.errors import RfgsError
-from rfgs_core.fit.frame import FrameState, solve_reflectivity, start_frame
+from rfgs_core.fit.frame import FrameState, solved_frame
 from rfgs_core.fit.losses import channel_loss
 from rfgs_core.fit.refine import refine
 from rfgs_core.frames import chosen_frames
@@ -84,7 +84,7 @@ def bench_training(
     config = TrainConfig(num_gaussians=bench.gaussians, device=bench.device)
     seed = sub_seed(0, "bench training", "fit")
     begin = time.perf_counter()
-    start = solve_reflectivity(seen, start_frame(seen, config, seed, None), config)
+    start = solved_frame(seen, config, seed)
     start_s = time.perf_counter() - begin
     losses, train_s, steps, still = [_validation(whole, aside, start, config)], start_s, 0, False
     lengths = range(WINDOW, LIMIT + 1, WINDOW) if bench.steps is None else [bench.steps]

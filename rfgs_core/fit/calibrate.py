@@ -16,14 +16,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import torch
-from jaxtyping import Complex64
 
-from rfgs_core.fit.frame import solve_reflectivity, start_frame
+from rfgs_core.fit.frame import explained_change, solved_frame
 from rfgs_core.measure.direct_path import direct_channel
 from rfgs_core.measure.observations import Observations
 from rfgs_core.measure.offsets import CrossSpectra, Offsets, estimate_offsets
-from rfgs_core.model.channel import Channel
 from rfgs_core.settings import TrainConfig
 
 #: Times that Gaussians and offsets are fitted in turn.
@@ -69,7 +66,8 @@ def calibrate(
     straight = CrossSpectra.of(observations, observations.static, direct_channel(observations))
     capture = _likeliest(config, straight, pooled=True)
     for _ in range(TURNS):
-        change = fitted_change(capture.undone(aligned), config, seed)
+        undone = capture.undone(aligned)
+        change = explained_change(undone, solved_frame(undone, config, seed))
         scattered = CrossSpectra.of(observations, aligned.delta, change)
         capture = _likeliest(config, straight, scattered, pooled=True)
     return Calibration(capture, drift)
@@ -78,15 +76,3 @@ def calibrate(
 def _likeliest(config: TrainConfig, *models: CrossSpectra, pooled: bool = False) -> Offsets:
     phase, timing = config.calibrate != "timing", config.calibrate != "phase"
     return estimate_offsets(*models, phase=phase, timing=timing, pooled=pooled)
-
-
-def fitted_change(
-    observations: Observations, config: TrainConfig, seed: int
-) -> Complex64[np.ndarray, "tx rx subcarrier"]:
-    """What Gaussians fitted to the observations predict at the visible entries."""
-    state = start_frame(observations, config, seed, None)
-    state = solve_reflectivity(observations, state, config)
-    channel = Channel.of(observations, observations.links, observations.tones)
-    with torch.no_grad():
-        predicted = channel.change(state.head, state.gaussians)
-    return observations.with_entries(predicted.numpy()).delta

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Complex, Float, Int64
+from jaxtyping import Bool, Complex, Complex64, Float, Float64, Int64
 from torch import Tensor
 
 from rfgs_core.bodies.body_prior import outward_normals
@@ -24,6 +24,7 @@ from rfgs_core.errors import RfgsError
 from rfgs_core.fit.sampling import encode
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.measure.observations import Observations
+from rfgs_core.model.channel import Channel
 from rfgs_core.model.first_gaussians import gaussians_at
 from rfgs_core.model.first_powers import fit_power, new_head
 from rfgs_core.model.head import RadioHead
@@ -120,12 +121,38 @@ def start_frame(
                 *(before.moving, bodies, cells, wanted, points, track_id, rng)
             )
         goes_on, next_track = np.isin(track_id, before.track_id), before.unused_track
-    gaussians = gaussians_at(points, outward_normals(points, bodies))
+    head = None if before is None else before.head
+    normals = outward_normals(points, bodies)
+    state = state_at(points, normals, observations, config, tracks, encoder, head)
+    return replace(state, track_id=track_id, goes_on=goes_on, next_track=next_track)
+
+
+def state_at(
+    points: Float64[np.ndarray, "M 3"],
+    normals: Float64[np.ndarray, "M 3"],
+    observations: Observations,
+    config: TrainConfig,
+    tracks: Tracks,
+    encoder: Encoder = MATCHED_FILTER,
+    head: RadioHead | None = None,
+) -> FrameState:
+    """Gaussians at given places with their first powers, which reflect nothing yet.
+
+    Args:
+        points: Where they are [m].
+        normals: How they face.
+        observations: The frame.
+        config: Settings.
+        tracks: Where the bodies are.
+        encoder: φ.
+        head: The head of the frame before; None makes one.
+    """
+    gaussians = gaussians_at(points, normals)
     power = fit_power(observations, gaussians)
-    head = before.head if before is not None else new_head(observations, config, power)
+    head = head or new_head(observations, config, power)
     features = head.without_readings(encode(observations, points, encoder).features)
-    gaussians = replace(gaussians, features=features)
-    return FrameState(gaussians, power, head, tracks, track_id, goes_on, next_track)
+    track_id = np.arange(len(points), dtype=np.int64)
+    return FrameState(replace(gaussians, features=features), power, head, tracks, track_id)
 
 
 def _followed(
@@ -162,6 +189,24 @@ def solve_reflectivity(
     gamma = _drawn_phases(state, config.seed) if gamma is None else gamma.cpu()
     features = state.head.with_gamma(state.gaussians.features, gamma)
     return replace(state, gaussians=replace(state.gaussians, features=features))
+
+
+def solved_frame(
+    observations: Observations, config: TrainConfig, seed: int, before: FrameState | None = None
+) -> FrameState:
+    """A started frame with its reflectivities, not refined."""
+    state = start_frame(observations, config, seed, before)
+    return solve_reflectivity(observations, state, config)
+
+
+def explained_change(
+    observations: Observations, state: FrameState
+) -> Complex64[np.ndarray, "tx rx subcarrier"]:
+    """What the Gaussians explain of the visible entries."""
+    channel = Channel.of(observations, observations.links, observations.tones)
+    with torch.no_grad():
+        predicted = channel.change(state.head, state.gaussians)
+    return observations.with_entries(predicted.numpy()).delta
 
 
 def _drawn_phases(state: FrameState, seed: int) -> Complex[Tensor, "M"]:

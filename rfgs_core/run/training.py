@@ -25,9 +25,10 @@ from rfgs_core.device import need_device
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json, write_json
 from rfgs_core.fit.calibrate import calibrate
-from rfgs_core.fit.frame import FrameState, solve_reflectivity, start_frame
+from rfgs_core.fit.frame import FrameState, start_frame
 from rfgs_core.fit.parameters import GAUSSIAN_SHAPES
-from rfgs_core.fit.refine import need_sample_points, refine
+from rfgs_core.fit.refine import need_sample_points
+from rfgs_core.fit.stages import fit_frame
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.gaussians.ply import GaussianCloud, cloud_of, read_ply, write_ply
 from rfgs_core.measure.observations import need_still_antennas
@@ -157,7 +158,7 @@ def train_sequence(
             state = _finished(run, frame)
             if state is None:
                 with one_torch_thread():
-                    state = fit_frame(run, frame, config, before, bar, curves.of_frame(frame))
+                    state = _fit(run, frame, config, before, bar, curves.of_frame(frame))
                 _store(run, frame, state)
                 spent += time.perf_counter() - begin
                 write_json(out / "config.json", {**settings, "train_s": round(spent, 2)})
@@ -177,7 +178,7 @@ def train_sequence(
     return Run(out, read_json(out / "config.json"))
 
 
-def fit_frame(
+def _fit(
     run: Run,
     frame: int,
     config: TrainConfig,
@@ -198,21 +199,22 @@ def fit_frame(
     state = start_frame(observations, config, seed, before, encoder, earlier)
     bar.update(1)
     bar.set_postfix_str(f"frame {frame}, solving reflectivities")
-    if config.objective != "paper":
-        state = solve_reflectivity(observations, state, config)
-    bar.update(1)
 
     def on_step(loss: float, count: int) -> None:
         bar.update(1)
         bar.set_postfix_str(f"frame {frame}, loss {loss:.3g}, {count} Gaussians")
 
-    state = refine(
-        *(observations, state, config, seed, _partial_path(run, frame)),
-        *(on_step, encoder, scalars),
+    return fit_frame(
+        observations,
+        state,
+        config,
+        seed,
+        encoder=encoder,
+        checkpoint=_partial_path(run, frame),
+        on_solved=lambda: bar.update(1),
+        on_step=on_step,
+        scalars=scalars,
     )
-    if config.objective == "paper":
-        state = solve_reflectivity(observations, state, config)
-    return state
 
 
 def _calibrate(run: Run, frame: int, config: TrainConfig, seed: int) -> None:

@@ -21,7 +21,8 @@ from rfgs_core.evaluate.geometry import geometry_metrics
 from rfgs_core.evaluate.provenance import conditions
 from rfgs_core.evaluate.scene import Scene
 from rfgs_core.files import write_json
-from rfgs_core.fit.calibrate import Calibration, fitted_change
+from rfgs_core.fit.calibrate import Calibration
+from rfgs_core.fit.frame import explained_change, solved_frame
 from rfgs_core.measure.offsets import CrossSpectra, Offsets, estimate_offsets
 from rfgs_core.run import Run, open_run
 from rfgs_core.run.calibration import read_calibration
@@ -131,7 +132,7 @@ def test_echoes_alone_tell_offsets_too(calibrated: Run, quick_config: TrainConfi
     for a ball heard through, and that error of the model is 5 % of 1/B = 6.25 ns."""
     config = enough(quick_config)
     seen = Calibration(CAPTURE, DRIFT[1]).undone(calibrated.as_reported(1))
-    change = fitted_change(seen, config, 0)
+    change = explained_change(seen, solved_frame(seen, config, 0))
     shape = np.vdot(change, seen.delta) / np.linalg.norm(change) / np.linalg.norm(seen.delta)
     assert 0.75 < abs(shape) < 1 - 1e-6
     assert not change[~seen.links].any() and not change[..., ~seen.tones].any()

@@ -19,14 +19,13 @@ from scipy.spatial import KDTree
 from rfgs_core.encode.matched_filter import matched_filter_map
 from rfgs_core.measure.delay_maps import delay_power_map
 from rfgs_core.measure.observations import Observations
+from rfgs_core.model.head import SHARPNESS, dimming
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
 #: Radius of the cylinder whose visible side is scored [m]: trunk and arms together.
 BODY_RADIUS_M = 0.18
 #: Height range of the cylinder [m].
 BODY_HEIGHTS_M = (0.15, 1.65)
-#: Steepness of the step from the lit to the dark side, per unit of cosine.
-SHARPNESS = 6.0
 #: Distance of neighbouring places that are tried [m].
 GROUND_STEP_M = 0.04
 #: A body is looked for this far around where it is expected [m].
@@ -126,7 +125,7 @@ def _visible_side_score(
         for antenna in (maps.tx_xyz[pair], maps.rx_xyz[pair]):
             towards = antenna[:2] - ground
             towards /= np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), 1e-9)
-            seen /= 1 + np.exp(-SHARPNESS * towards @ normal.T)
+            seen /= dimming(SHARPNESS * towards @ normal.T)
         level = (seen * around).sum(axis=1) / (seen.sum(axis=1) + 0.2)
         score += np.log(level + 0.05)
     return score / len(power)

@@ -23,7 +23,7 @@ from rfgs_core.bodies.localise import PairMaps, pair_maps
 from rfgs_core.bodies.separation import each_alone
 from rfgs_core.bodies.start import StartCells
 from rfgs_core.measure.observations import Observations
-from rfgs_core.model.head import SHARPNESS
+from rfgs_core.model.head import SHARPNESS, dimming
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import TrainConfig
@@ -108,7 +108,7 @@ def _leg(
     towards = antennas[:, None] - points
     distance = np.linalg.norm(towards, axis=2)
     facing = np.einsum("lmk,mk->lm", towards, normals) / distance
-    return distance, 1.0 / (distance * (1.0 + np.exp(-SHARPNESS * facing)))
+    return distance, 1.0 / (distance * dimming(SHARPNESS * facing))
 
 
 def pair_samples(observations: Observations, seed: int) -> list[PairSample]:

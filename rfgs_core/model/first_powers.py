@@ -12,7 +12,7 @@ from rfgs_core.gaussians import Gaussians
 from rfgs_core.measure.observations import Observations
 from rfgs_core.model.delay_power import DelayPowerModel
 from rfgs_core.model.first_gaussians import START_SCALES_M
-from rfgs_core.model.head import SHARPNESS, RadioHead
+from rfgs_core.model.head import SHARPNESS, RadioHead, dimming
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import TrainConfig
@@ -28,7 +28,7 @@ def visibility(
         for antenna in (entry.tx_xyz.mean(axis=0), entry.rx_xyz.mean(axis=0)):
             towards = antenna - points
             towards /= np.linalg.norm(towards, axis=1, keepdims=True)
-            seen /= 1 + np.exp(-SHARPNESS * np.sum(normals * towards, axis=1))
+            seen /= dimming(SHARPNESS * np.sum(normals * towards, axis=1))
         # Squared: visibility scales the amplitude.
         rows.append(seen**2)
     return np.array(rows, dtype=np.float32)

@@ -26,14 +26,21 @@ from rfgs_core.propagation import RadioGaussians
 SHARPNESS = 6.0
 #: ρ starts where k · 2 · s · ρ has this value: larger ones let nothing reflect.
 START_PHASE_SPREAD = 0.5
-
-
 #: Shapes of the arrays of a head in a file.
 HEAD_SHAPES: dict[str, Shape] = {
     "directions": (3, FEATURE_DIM),
     "gamma_scale_m": (),
     "rho_logit": (),
 }
+
+
+def dimming(cosine: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
+    """What the amplitude of a Gaussian is divided by towards an antenna: 1 + e^{−6 cos}.
+
+    Args:
+        cosine: `SHARPNESS` times the cosine between its normal and the way to the antenna.
+    """
+    return 1.0 + np.exp(-cosine)
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,9 @@ from jaxtyping import Bool, Complex64, Float
 
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.model.head import RadioHead
+from rfgs_core.propagation import Links, Tones
+from rfgs_core.propagation.reference import echoes
 from rfgs_core.radio import Layout
-from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
 
 def expected_power(
@@ -40,20 +41,17 @@ def expected_power(
     """
     with torch.no_grad():
         radio = head.radio_gaussians(gaussians)
-        axes = gaussians.rotations.numpy().astype(np.float64)
-    means, normals = radio.means.numpy(), axes[:, :, 2]
-    wavelength_m = SPEED_OF_LIGHT / freq_hz
-    amplitude = np.full(len(means), wavelength_m / (4 * np.pi) ** 1.5)
-    q = np.zeros((len(means), 3))
-    for antenna in (tx_xyz, rx_xyz):
-        towards = antenna - means
-        distance_m = np.linalg.norm(towards, axis=1)
-        towards = towards / distance_m[:, None]
-        amplitude /= distance_m * (1 + np.exp(-radio.sharpness * np.sum(normals * towards, axis=1)))
-        q += towards
-    along = np.einsum("mij,mi->mj", axes, q) * radio.scales_rf.numpy()
-    blur = np.exp(-((2 * np.pi / wavelength_m) ** 2) * np.sum(along**2, axis=1))
-    return float(np.sum(power * amplitude**2 * blur))
+        axes = gaussians.rotations.double() * radio.scales_rf.double()[:, None]
+        ends = (torch.from_numpy(np.asarray(xyz, np.float64))[None] for xyz in (tx_xyz, rx_xyz))
+        terms = echoes(
+            radio.means,
+            axes @ axes.mT,
+            Links(*ends),
+            Tones(freq_hz, 0.0, 1),
+            None if radio.normals is None else radio.normals.double(),
+            radio.sharpness,
+        )
+    return float(np.sum(power * terms[:, 0, 0].abs().numpy() ** 2))
 
 
 def levelled(

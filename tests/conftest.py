@@ -76,7 +76,7 @@ def small_run(tiny_dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> R
     """A run of 40 Gaussians on both frames; copy it before changing anything."""
     from rfgs_core.dataset import open_dataset
     from rfgs_core.run.training import train_sequence
-    from rfgs_core.train.config import TrainConfig
+    from rfgs_core.settings import TrainConfig
 
     data = open_dataset(tiny_dataset)
     config = TrainConfig(num_gaussians=40, solver_steps=2, iterations=1, posture="standing")

@@ -12,6 +12,7 @@ from rfgs_core.dataset import Sequence
 from rfgs_core.radio import Layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.images import DIFFRACTION, DIFFUSE, REFRACTION, SCATTERING, SPECULAR
+from rfgs_core.radio.levels import decibels
 from rfgs_core.radio.path_table import PathTable, ends_rad
 
 #: Largest difference of a path's delay and the length of its corners [m].
@@ -115,7 +116,7 @@ def channel_error_db(
         stored = csi[tx, rx].astype(np.complex128)
         error = np.abs(table.link(layout, tx, rx, freq_hz) - stored) ** 2
         ratios.append(error.sum() / max((np.abs(stored) ** 2).sum(), 1e-300))
-    return float(10.0 * np.log10(max(np.median(ratios), 1e-30)))
+    return float(decibels(float(np.median(ratios))))
 
 
 def _pairs(layout: Layout) -> np.ndarray:

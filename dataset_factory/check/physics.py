@@ -12,13 +12,15 @@ from rfgs_core.dataset import Sequence
 from rfgs_core.radio import DevicePose, Layout, Radio, devices_at, layout
 from rfgs_core.radio.antennas import field
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.radio.delay import delay_profile, hann_to_zero
 from rfgs_core.radio.layout import rotation
+from rfgs_core.radio.levels import amplitude_of, decibels, power_of
 
 #: Median amplitude of clear direct paths relative to free space; one path alone may add to a
 #: grazing reflection that nothing resolves, the median over links may not.
 DIRECT_LIMITS = (0.4, 2.5)
 #: Power that may arrive before the direct path, relative to the strongest arrival.
-EARLY_LIMIT = 10 ** (-25 / 10)
+EARLY_LIMIT = power_of(-25)
 #: Energy of all links relative to free space; reflections that add in phase stay below it.
 ENERGY_LIMIT = 6.0
 #: Peak power gain of Sionna's antenna patterns.
@@ -79,7 +81,7 @@ def _early_faults(
         early = _early_power(sequence, radio, links, float(distance_m.min()))
         if early > EARLY_LIMIT:
             yield (
-                f"{where}: devices {a} to {b}: {10 * np.log10(early):.0f} dB arrive before the "
+                f"{where}: devices {a} to {b}: {decibels(early):.0f} dB arrive before the "
                 "direct path can"
             )
 
@@ -131,7 +133,7 @@ def _response(spec: Radio, layout: Layout, devices: list[DevicePose], tx: int, r
         field(spec.pattern, slant, sign * way, turn)
         for slant, sign, turn in zip(slants, (1.0, -1.0), axes, strict=True)
     )
-    isolation = 10.0 ** (-spec.isolation_db / 20.0) if a == b else 1.0
+    isolation = amplitude_of(-spec.isolation_db) if a == b else 1.0
     return float((sent * heard).sum()) * isolation
 
 
@@ -155,7 +157,7 @@ def _early_power(sequence: Sequence, radio: str, links: np.ndarray, nearest_m: f
     """Strongest arrival earlier than light allows, relative to the strongest of all."""
     spec = sequence.radio_spec(radio)
     tones = spec.num_subcarriers
-    profile = np.fft.ifft(links * np.hanning(tones), axis=-1)
+    profile = delay_profile(links, hann_to_zero(tones))
     power = (np.abs(profile) ** 2).mean(axis=(0, 1))
     cell_m = SPEED_OF_LIGHT / spec.bandwidth_hz
     length_m = np.arange(tones) * cell_m

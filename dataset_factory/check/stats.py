@@ -14,8 +14,9 @@ from tqdm import tqdm
 from rfgs_core.dataset import Dataset, Sequence, open_dataset
 from rfgs_core.dataset.impaired_store import has_impaired
 from rfgs_core.radio import devices_at
+from rfgs_core.radio.delay import delay_profile, hann_to_zero
 from rfgs_core.radio.images import SCATTERING
-from rfgs_core.radio.levels import decibels
+from rfgs_core.radio.levels import decibels, power_of
 
 #: Arrivals weaker than this relative to a link's strongest do not count for its spread [dB].
 SPREAD_RANGE_DB = 20.0
@@ -89,7 +90,7 @@ def radio_stats(sequence: Sequence, radio: str) -> dict[str, Any]:
         "trace_depth": sequence.trace_depth(radio),
         "level_db": {"p01": low, "median": middle, "p99": high},
         "dynamic_range_db": high - low,
-        "dynamic_to_static_db": float(decibels(np.median(moving, keepdims=True))[0]),
+        "dynamic_to_static_db": float(decibels(float(np.median(moving)))),
         "delay_spread_ns": {
             "median": float(np.median(spread_ns)),
             "p90": float(np.percentile(spread_ns, 90)),
@@ -114,12 +115,12 @@ def delay_spread_s(links: np.ndarray, spacing_hz: float) -> np.ndarray:
         (link,); a single path gives the width of the band's own window, below 1/bandwidth.
     """
     tones = links.shape[-1]
-    profile = np.abs(np.fft.ifft(links * np.hanning(tones), axis=-1)) ** 2
+    profile = np.abs(delay_profile(links, hann_to_zero(tones))) ** 2
     peak = profile.argmax(axis=-1)
     # A profile is periodic; a quarter of it before the strongest arrival counts as before.
     order = (np.arange(tones) + peak[:, None] - tones // 4) % tones
     profile = np.take_along_axis(profile, order, axis=-1)
-    floor = profile.max(axis=-1, keepdims=True) * 10 ** (-SPREAD_RANGE_DB / 10)
+    floor = profile.max(axis=-1, keepdims=True) * power_of(-SPREAD_RANGE_DB)
     weight = np.where(profile >= floor, profile, 0.0)
     weight = weight / np.maximum(weight.sum(axis=-1, keepdims=True), 1e-300)
     delay_s = np.arange(tones) / (tones * spacing_hz)

@@ -21,6 +21,7 @@ from rfgs_core.dataset.writer import write_arrays
 from rfgs_core.files import write_json
 from rfgs_core.radio import Layout, Radio
 from rfgs_core.radio.images import DIFFRACTION, DIFFUSE, REFRACTION, SCATTERING, SPECULAR
+from rfgs_core.radio.levels import amplitude_decibels
 from rfgs_core.radio.path_table import PathTable
 
 #: Version of the format.
@@ -75,7 +76,7 @@ def matrices(rows: PathTable, users: int, carrier_hz: float) -> dict[str, np.nda
     phase = gain * np.exp(-2j * np.pi * carrier_hz * rows.delay_s)
     corners = np.where((rows.kind != 0)[..., None], rows.vertices[:, 1:-1], np.nan)
     columns = {
-        "power": 20.0 * np.log10(np.abs(gain)),
+        "power": amplitude_decibels(np.abs(gain), least=0.0),
         "phase": np.angle(phase, deg=True),
         "delay": rows.delay_s,
         "aoa_az": np.rad2deg(rows.arrival_azimuth_rad),

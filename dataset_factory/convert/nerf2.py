@@ -23,6 +23,7 @@ from rfgs_core.errors import RfgsError
 from rfgs_core.files import write_text
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.layout import rotation
+from rfgs_core.radio.levels import decibels
 
 ELEVATIONS, AZIMUTHS = 90, 360
 #: Device axes (x boresight, y, z up) in columns of the gateway's x, y and z.
@@ -87,7 +88,7 @@ def _write_gateway(sequence: Sequence, radio: str, number: int, out: Path) -> No
             top = power.max()
             pixels = np.rint(255 * power / top) if top > 0 else np.zeros_like(power)
             write_png(out / "spectrum" / f"{name}.png", pixels.astype(np.uint8))
-            level_db = 10 * np.log10(max(top, 1e-30))
+            level_db = decibels(float(top))
             rows.append(f"{name},{frame},{sequence.time_s(frame):.6f},{tx},{level_db:.3f}\n")
             split["test" if frame in held else "train"].append(f"{name}\n")
     write_text(out / "tx_pos.csv", "x,y,z\n" + "".join(positions))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from dataset_factory.preview.channels import RANGE_DB, delay_profile
+from dataset_factory.preview.channels import RANGE_DB, responses
 from dataset_factory.preview.strips import MARGINS, WIDTH_IN, Timeline
 from rfgs_core.dataset import Sequence
 from rfgs_core.encode.matched_filter import aperture_filter
@@ -97,7 +97,7 @@ def range_figure(sequence: Sequence, radio: str, frame: int) -> Figure:
     axes = figure.subplots(1, 3, sharex=True, sharey=True)
     kinds = ("with people", "static", "difference")
     for axis, value, title in zip(axes, (csi, static, csi - static), kinds, strict=True):
-        profile, length_m = delay_profile(sequence, radio, value)
+        profile, length_m = responses(sequence, radio, value)
         level = decibels(np.abs(profile) ** 2).T
         # The straight way from antenna to antenna would hide the room.
         top = level[length_m > 1.0].max()

@@ -13,6 +13,7 @@ import numpy as np
 
 from rfgs_core.dataset import Sequence
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.radio.delay import delay_profile, hann_to_zero, path_lengths_m
 from rfgs_core.radio.layout import rotation
 
 #: Interpolation of delays between the band's own bins.
@@ -45,7 +46,7 @@ def delay_image(
         return delay_angle(sequence, radio, value, pair)
     layout = sequence.layout(radio)
     tx, rx = layout.tx_device == pair[0], layout.rx_device == pair[1]
-    profile, length_m = delay_profile(sequence, radio, value[np.ix_(tx, rx)])
+    profile, length_m = responses(sequence, radio, value[np.ix_(tx, rx)])
     place_m = _local(sequence, radio, pair[1])[:, 1]
     order = np.argsort(place_m)
     return (np.abs(profile) ** 2).sum(axis=0)[order], place_m[order], length_m
@@ -80,7 +81,7 @@ def delay_angle(
     """
     layout, spec = sequence.layout(radio), sequence.radio_spec(radio)
     tx, rx = layout.tx_device == pair[0], layout.rx_device == pair[1]
-    profile, length_m = delay_profile(sequence, radio, value[np.ix_(tx, rx)])
+    profile, length_m = responses(sequence, radio, value[np.ix_(tx, rx)])
     local = _local(sequence, radio, pair[1])
     angle_deg = np.linspace(-90.0, 90.0, 181)
     turn = np.sin(np.deg2rad(angle_deg))[:, None] * local[:, 1]
@@ -94,20 +95,17 @@ def delay_angle(
     return power, angle_deg, length_m
 
 
-def delay_profile(
-    sequence: Sequence, radio: str, links: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def responses(sequence: Sequence, radio: str, links: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Hann-windowed impulse responses up to twice the scene's diagonal.
 
     Returns:
         Responses (..., delay) and path lengths [m].
     """
     spec = sequence.radio_spec(radio)
-    window = np.hanning(spec.num_subcarriers)
-    count = OVERSAMPLING * spec.num_subcarriers
+    window = hann_to_zero(spec.num_subcarriers)
     # The first tone's own phase is kept, so responses stay comparable between elements.
-    response = np.fft.ifft(links * window, n=count, axis=-1) * count / window.sum()
-    length_m = np.arange(count) * spec.unambiguous_path_m / count
+    response = delay_profile(links, window, OVERSAMPLING, peak=True) / window.sum()
+    length_m = path_lengths_m(spec, OVERSAMPLING)
     carrier = 2 * np.pi * spec.freq_hz[0] / SPEED_OF_LIGHT
     response = response * np.exp(1j * carrier * length_m)
     diagonal = float(np.linalg.norm(sequence.bounds_m[1] - sequence.bounds_m[0]))

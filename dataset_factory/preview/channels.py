@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from dataset_factory.preview.arrays import (
     across_label,
     delay_image,
-    delay_profile,
     draw_scatterer,
+    responses,
 )
 from rfgs_core.dataset import Sequence
 from rfgs_core.radio import Layout
@@ -93,7 +93,7 @@ def _profiles(
     layout = sequence.layout(radio)
     tx, rx = layout.tx_device == pair[0], layout.rx_device == pair[1]
     for value, name, colour in zip(values, _KINDS, _COLOURS, strict=True):
-        profile, length_m = delay_profile(sequence, radio, value[np.ix_(tx, rx)])
+        profile, length_m = responses(sequence, radio, value[np.ix_(tx, rx)])
         power = (np.abs(profile) ** 2).mean(axis=(0, 1))
         axis.plot(length_m, decibels(power), color=colour, lw=1.2, label=name)
     direct = np.linalg.norm(layout.tx_xyz[tx].mean(0) - layout.rx_xyz[rx].mean(0))

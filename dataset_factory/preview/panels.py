@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from dataset_factory.preview.arrays import delay_angle, delay_profile, seen_from
+from dataset_factory.preview.arrays import delay_angle, responses, seen_from
 from rfgs_core.dataset import Sequence
 from rfgs_core.encode.micro_doppler import micro_doppler
 from rfgs_core.radio.levels import decibels
@@ -129,7 +129,7 @@ def amplitude_panel(axis: Any, sequence: Sequence, radio: str, seen: Watch) -> A
 
 def delay_panel(axis: Any, sequence: Sequence, radio: str, seen: Watch) -> Any:
     """Delay profile of what people change, with the pelvis' own path length."""
-    profile, length_m = delay_profile(sequence, radio, seen.csi - seen.static)
+    profile, length_m = responses(sequence, radio, seen.csi - seen.static)
     level = decibels((np.abs(profile) ** 2).mean(axis=(1, 2)).T)
     axis.set_ylabel("path length\n[m]", fontsize=8)
     shown = _image(

@@ -28,6 +28,7 @@ from dataset_factory.trace.shadow.kirchhoff import Passed
 from rfgs_core.radio import Layout, Radio
 from rfgs_core.radio.images import DIFFUSE
 from rfgs_core.radio.layout import DevicePose
+from rfgs_core.radio.levels import amplitude_of
 from rfgs_core.simulate import (
     Faces,
     Sight,
@@ -183,7 +184,7 @@ class Environment:
         found = replace(found, tx=group[0][found.tx], rx=group[1][found.rx], amplitude=amplitude)
         tx_owner, rx_owner = owners(self._layout)
         straight = (found.kinds == 0).all(axis=1) & (tx_owner[found.tx] == rx_owner[found.rx])
-        found.amplitude[straight] *= 10.0 ** (-self._radio.isolation_db / 20.0)
+        found.amplitude[straight] *= amplitude_of(-self._radio.isolation_db)
         return found.select(measured_pairs(self._layout)[found.tx, found.rx])
 
 

@@ -13,6 +13,8 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from scipy.special import fresnel
 
+from rfgs_core.radio.levels import amplitude_decibels, decibels
+
 #: Speed of light [m/s], exact by definition of the metre.
 C = 299_792_458.0
 
@@ -40,13 +42,13 @@ def fresnel_integral(nu: np.ndarray | float) -> np.ndarray:
 
 def db(ratio: np.ndarray | complex | float) -> np.ndarray:
     """20 log10 of an amplitude [dB]."""
-    return 20.0 * np.log10(np.maximum(np.abs(ratio), 1e-300))
+    return amplitude_decibels(np.abs(ratio), least=1e-300)
 
 
 def error_db(found: np.ndarray, exact: np.ndarray) -> float:
     """Power of the error over the power of the exact channel [dB]."""
     error = np.sum(np.abs(found - exact) ** 2) / np.sum(np.abs(exact) ** 2)
-    return float(10.0 * np.log10(max(error, 1e-30)))
+    return float(decibels(float(error)))
 
 
 def sphere_path_m(tx: np.ndarray, rx: np.ndarray, centre: np.ndarray, radius_m: float) -> float:

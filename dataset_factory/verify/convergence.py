@@ -19,6 +19,7 @@ from dataset_factory.verify.text import number
 from dataset_factory.verify.tracing import monostatic, single
 from dataset_factory.verify.workshop import Workshop, devices_of
 from rfgs_core.radio import layout, preset
+from rfgs_core.radio.levels import decibels
 
 #: Largest change of csi_static [dB of its power], and of a target's level [dB].
 STATIC_DB, LEVEL_DB = -50.0, 0.3
@@ -72,7 +73,7 @@ def _targets(workshop: Workshop) -> list[Row]:
     top_hz = usual.freq_min_hz + count * usual.subcarrier_spacing_hz
     fine = replace(usual, num_subcarriers=count, freq_max_hz=top_hz)
     levels = [
-        10.0 * np.log10(ball_sections(workshop, radio, cells).mean())
+        decibels(float(ball_sections(workshop, radio, cells).mean()))
         for radio, cells in ((usual, 5), (usual, 6), (fine, 5))
     ]
     faces, points = (abs(float(level - levels[0])) for level in levels[1:])

@@ -15,6 +15,8 @@ from dataset_factory.verify.description import Description, Device, Part, steppi
 from dataset_factory.verify.tracing import Links, joined, links
 from dataset_factory.verify.workshop import Workshop, devices_of
 from rfgs_core.radio import PRESETS, Radio, layout
+from rfgs_core.radio.delay import delay_profile, hann_between
+from rfgs_core.radio.levels import amplitude_decibels
 
 #: Points per delay cell that a profile is interpolated to.
 _FINER = 32
@@ -72,10 +74,9 @@ def verify(workshop: Workshop) -> Group:
 def profile(channel: np.ndarray, radio: Radio) -> tuple[np.ndarray, np.ndarray]:
     """Path lengths [m], shape (n,), and amplitudes of delay profiles, shape (link, n)."""
     number = radio.num_subcarriers
-    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * (np.arange(number) + 0.5) / number)
     count = _FINER * number
     length_m = np.arange(count) * (radio.unambiguous_path_m / count)
-    return length_m, np.abs(np.fft.ifft(channel * window, count, axis=-1))
+    return length_m, np.abs(delay_profile(channel, hann_between(number), _FINER))
 
 
 def peaks_m(channel: np.ndarray, radio: Radio) -> np.ndarray:
@@ -119,7 +120,7 @@ def _plot(name: str, radio: Radio, found: Links, path_m: np.ndarray) -> Plot:
     """The profile of one link with the closed form's place marked."""
     length_m, amplitude = profile(found.channel[:1], radio)
     near = np.abs(length_m - path_m[0]) < 12.0 * radio.range_resolution_m
-    level_db = 20 * np.log10(amplitude[0] / amplitude[0].max())
+    level_db = amplitude_decibels(amplitude[0] / amplitude[0].max(), least=0.0)
     curves = [
         Curve("Fermat", np.full(2, path_m[0]), np.array([-60.0, 0.0]), "closed form"),
         Curve("csi − csi_static", length_m[near][::4], level_db[near][::4], "measured"),

@@ -12,6 +12,7 @@ from dataset_factory.verify.physical_optics import cuboid, scattered
 from dataset_factory.verify.tracing import echoes, monostatic, single, static_links
 from dataset_factory.verify.workshop import Workshop, devices_of
 from rfgs_core.radio import layout, preset
+from rfgs_core.radio.levels import decibels
 
 #: Largest error of the exponents of |H|² over distance.
 SPACE, ECHO = 0.02, 0.05
@@ -97,7 +98,7 @@ def exponent(distance_m: np.ndarray, power: np.ndarray) -> float:
 
 def _plot(title: str, distance: np.ndarray, exact: np.ndarray, got: np.ndarray, form: str) -> Plot:
     curves = [
-        Curve(form, distance, 10 * np.log10(exact), "closed form"),
-        Curve("measured", distance, 10 * np.log10(got), "measured"),
+        Curve(form, distance, decibels(exact), "closed form"),
+        Curve("measured", distance, decibels(got), "measured"),
     ]
     return Plot(title, "distance [m]", "|H|² [dB]", curves, log_x=True)

@@ -12,6 +12,7 @@ from dataset_factory.verify.description import Description, Device, Part, room, 
 from dataset_factory.verify.tracing import single
 from dataset_factory.verify.workshop import Workshop, devices_of
 from rfgs_core.radio import Radio, preset
+from rfgs_core.radio.levels import decibels
 
 #: Largest error power of a pair over that pair's power [dB].
 WORST_DB = -60.0
@@ -83,4 +84,4 @@ def _row(name: str, csi: np.ndarray) -> Row:
     error = (np.abs(there - there.transpose(1, 0, 2)) ** 2).sum(axis=2)
     apart = ~np.eye(len(power), dtype=bool)
     worst = float((error[apart] / power[apart]).max())
-    return within(name, 10.0 * np.log10(max(worst, 1e-30)), WORST_DB, "dB", SOURCE)
+    return within(name, decibels(worst), WORST_DB, "dB", SOURCE)

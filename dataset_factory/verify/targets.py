@@ -18,6 +18,7 @@ from dataset_factory.verify.physical_optics import (
 from dataset_factory.verify.tracing import echoes, monostatic
 from dataset_factory.verify.workshop import Workshop, devices_of
 from rfgs_core.radio import Layout, Radio, layout, preset
+from rfgs_core.radio.levels import decibels
 
 #: Largest error of levels [dB], and of a plate's phase [deg] at 5.8 and at 62 GHz.
 LEVEL_DB, SPHERE_DB, PHASE_DEG, PHASE_MM_DEG = 0.3, 0.5, 1.0, 5.0
@@ -128,8 +129,8 @@ def _plate_far(workshop: Workshop, radio: Radio) -> list[Row]:
     ways = (np.linalg.norm(xyz[0] - face) for xyz in (elements.tx_xyz, elements.rx_xyz))
     sigma = cross_section(_own(elements, found), radio.freq_hz, float(np.prod(list(ways))))
     area, wavelength = PLATE_M[0] * PLATE_M[2], 299_792_458.0 / radio.freq_hz
-    exact = 10 * np.log10(np.mean(4 * np.pi * area**2 / wavelength**2))
-    got = 10 * np.log10(np.mean(sigma))
+    exact = decibels(float(np.mean(4 * np.pi * area**2 / wavelength**2)))
+    got = decibels(float(np.mean(sigma)))
     source = "σ = 4πA²/λ², Knott et al., Radar Cross Section (2004)"
     return [near("plate, 12 m away, cross-section", exact, got, LEVEL_DB, "dBsm", source)]
 
@@ -142,7 +143,7 @@ def _plate(workshop: Workshop, name: str, radio: Radio, phase_deg: float) -> lis
     ends = elements.tx_xyz[0], elements.rx_xyz[0]
     exact = METAL * scattered([cuboid(PLATE_M, PLATE_AT)], *ends, radio.freq_hz)
     got = _own(elements, found)
-    level, measured = (float(10 * np.log10(np.mean(np.abs(h) ** 2))) for h in (exact, got))
+    level, measured = (decibels(float(np.mean(np.abs(h) ** 2))) for h in (exact, got))
     turned = abs(float(np.degrees(np.angle(np.sum(got * exact.conj())))))
     return [
         near(f"plate, {name}, level", level, measured, LEVEL_DB, "dB", PO),
@@ -168,13 +169,13 @@ def _cube(workshop: Workshop, radio: Radio) -> tuple[list[Row], Plot]:
         ("bistatic", slice(3, None), ((2, 4), (2, 5), (3, 4), (3, 5))),
     ):
         tx, rx = (list(column) for column in zip(*pairs, strict=True))
-        po, one, many = (float(10 * np.log10(p[frames, tx, rx].mean())) for p in powers)
+        po, one, many = (decibels(float(p[frames, tx, rx].mean())) for p in powers)
         rows.append(near(f"cube, {name}", po, one, LEVEL_DB, "dB", PO))
         rows.append(near(f"cube of 8 × 8 quads, {name}", po, many, LEVEL_DB, "dB", PO))
         label = f"cube, {name}, from 1 to 8 × 8 quads"
         rows.append(within(label, abs(many - one), LEVEL_DB, "dB", "its own tessellation"))
     yaws = np.array(YAWS_DEG)
-    own = [10 * np.log10(p[:, 0, 0]) for p in powers]
+    own = [decibels(p[:, 0, 0]) for p in powers]
     curves = [
         Curve("physical optics", yaws, own[0], "closed form"),
         Curve("one quad per face", yaws, own[1], "measured"),
@@ -197,14 +198,14 @@ def _cube_exact(elements: Layout, radio: Radio, yaw_deg: float) -> np.ndarray:
 def _sphere(workshop: Workshop, radio: Radio) -> tuple[Row, Plot]:
     """Mean over orientations of the mesh and over the band, and each of them."""
     sections = ball_sections(workshop, radio, 5)
-    exact = 10 * np.log10(np.pi * RADIUS_M**2)
-    got = exact + 10 * np.log10(sections.mean())
+    exact = decibels(np.pi * RADIUS_M**2)
+    got = exact + decibels(float(sections.mean()))
     source = "geometrical optics, σ = πr²"
     row = near("sphere, mean cross-section", float(exact), float(got), SPHERE_DB, "dBsm", source)
     views = np.arange(sections.size, dtype=np.float64)
     curves = [
         Curve("πr²", views, np.full(sections.size, exact), "closed form"),
-        Curve("each view", views, exact + 10 * np.log10(sections.T.ravel()), "measured"),
+        Curve("each view", views, exact + decibels(sections.T.ravel()), "measured"),
     ]
     title = "Sphere: points on curved skin scatter about the mean of all views"
     return row, Plot(title, "view", "σ [dBsm]", curves)

@@ -72,7 +72,7 @@ def _propagation(args: BenchArgs) -> dict[str, Any]:
 def _training(args: BenchArgs) -> dict[str, Any]:
     from rfgs_core.bench import hardware
     from rfgs_core.errors import RfgsError
-    from rfgs_core.train.bench import TrainingBench, bench_training
+    from rfgs_core.fit.bench import TrainingBench, bench_training
 
     if args.dataset is None:
         raise RfgsError("bench training: expected --dataset FOLDER, see `rfgs-factory generate`")

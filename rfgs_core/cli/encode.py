@@ -11,7 +11,7 @@ from typing import Literal
 import tyro
 
 from rfgs_core.dataset.observed import Observed
-from rfgs_core.train.config import Packets, TrainConfig
+from rfgs_core.settings import Packets, TrainConfig
 
 
 @dataclass(frozen=True)
@@ -54,9 +54,9 @@ def run(args: EncodeArgs) -> int:
     from rfgs_core.dataset import open_dataset
     from rfgs_core.encode.learned import network_for, save_encoder
     from rfgs_core.errors import RfgsError
+    from rfgs_core.fit.self_supervised import train_encoder
     from rfgs_core.frames import chosen_frames
-    from rfgs_core.train.observations import observe, packets_to_read
-    from rfgs_core.train.self_supervised import train_encoder
+    from rfgs_core.measure.observations import observe, packets_to_read
 
     if args.out.suffix != ".npz":
         raise RfgsError(f"--out {args.out}: expected a file name that ends in .npz")

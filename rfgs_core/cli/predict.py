@@ -172,8 +172,10 @@ def _reflectors(arrays: dict[str, np.ndarray]) -> list[str]:
     """What the Gaussians reflect, in two lines."""
     import numpy as np
 
+    from rfgs_core.radio.levels import decibels
+
     rcs_m2 = arrays["gaussian_rcs_m2"]
-    total_db = 10 * np.log10(max(float(rcs_m2.sum()), 1e-30))
+    total_db = decibels(float(rcs_m2.sum()))
     half = int(np.searchsorted(np.cumsum(np.sort(rcs_m2)[::-1]), 0.5 * rcs_m2.sum())) + 1
     return [
         f"{len(rcs_m2)} Gaussians reflect {total_db:.1f} dBsm in sum (|gamma|², no phases); "

@@ -12,7 +12,7 @@ import tyro
 
 from rfgs_core.dataset.observed import Observed
 from rfgs_core.device import Device
-from rfgs_core.train.config import (
+from rfgs_core.settings import (
     Background,
     Calibrate,
     Density,
@@ -92,17 +92,9 @@ class TrainArgs:
     feature_gradients (their condition for new Gaussians), prune; see `rfgs ablate`."""
     temporal: float = 0.0
     """Weight with which Gaussians are held to their place on the body from frame to frame."""
-    settle: float = 0.0
-    """Share of the steps at the end, 0 to 1, in which the rates fall to nothing."""
     posture: Posture = "told"
     """told: the radio decides in every frame who stands and who sits, and where the knees point;
     standing: everybody stands, as is assumed without phases anyway."""
-    power_trust: float = 0.0
-    """Exponent, 0 to 1, of reflected powers fitted to delay–angle power without phases; 0 starts
-    from equal powers, which has served better."""
-    coarse: float = 0.0
-    """Share of the steps, 0 to 1, in which the channel loss widens from a quarter of the band to
-    all of it; not with --observe delay_power, which has no tones."""
     log: bool = False
     """Write curves of loss and number of Gaussians into OUT/log, for `tensorboard --logdir`."""
     shader: Annotated[bool, tyro.conf.arg(name="shader")] = True
@@ -115,13 +107,13 @@ def run(args: TrainArgs) -> int:
     from rfgs_core.dataset import open_dataset
     from rfgs_core.errors import RfgsError
     from rfgs_core.frames import chosen_frames
+    from rfgs_core.measure.observations import packets_to_read
     from rfgs_core.render.shader import ShaderConfig
     from rfgs_core.render.view import fit_run_shader
     from rfgs_core.run.calibration import calibration_text
     from rfgs_core.run.encoders import with_encoder
     from rfgs_core.run.training import train_sequence
     from rfgs_core.seeds import sub_seed
-    from rfgs_core.train.observations import packets_to_read
 
     config = TrainConfig.of_recipe(args.recipe, args.objective, args.seed)
     config = replace(
@@ -132,11 +124,8 @@ def run(args: TrainArgs) -> int:
         static_set=args.static_set,
         calibrate=args.calibrate,
         density=args.density,
-        coarse_share=args.coarse,
-        settle_share=args.settle,
         posture=args.posture,
         device=args.device,
-        power_trust=args.power_trust,
         temporal=args.temporal,
         without=args.without,
     )
@@ -146,17 +135,6 @@ def run(args: TrainArgs) -> int:
         )
     if not args.temporal >= 0.0:
         raise RfgsError(f"--temporal {args.temporal}: expected at least 0")
-    if not 0.0 <= args.settle <= 1.0:
-        raise RfgsError(f"--settle {args.settle}: expected a share from 0 to 1")
-    if not 0.0 <= args.power_trust <= 1.0:
-        raise RfgsError(f"--power-trust {args.power_trust}: expected an exponent from 0 to 1")
-    if not 0.0 <= args.coarse <= 1.0:
-        raise RfgsError(f"--coarse {args.coarse}: expected a share from 0 to 1")
-    if args.coarse and args.observe == "delay_power":
-        raise RfgsError(
-            "--coarse narrows the band of tones, and --observe delay_power reports delays; leave "
-            "one of them out"
-        )
     if args.iterations is not None:
         if args.iterations < 0:
             raise RfgsError(f"--iterations {args.iterations}: expected at least 0")

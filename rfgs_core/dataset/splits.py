@@ -3,9 +3,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from jaxtyping import Bool
 
 from rfgs_core.radio import Layout, Radio
 from rfgs_core.seeds import sub_seed
@@ -61,3 +64,55 @@ def radio_split(radio: Radio, layout: Layout, seed: int) -> dict[str, list[Any]]
         "subcarriers": list(range(first, max(last, first + 1))) if tones >= 8 else [],
         "device_pairs": held.tolist() if len(pairs) > 1 else [],
     }
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Which entries of a channel training must not see; the three kinds do not overlap."""
+
+    links: Bool[np.ndarray, "tx rx"]
+    """Measured links that training may use."""
+    tones: Bool[np.ndarray, "subcarrier"]
+    """Tones that training may use."""
+    pair_links: Bool[np.ndarray, "tx rx"]
+    """Links of held-out device pairs, in both directions; all their tones are held out."""
+    element_links: Bool[np.ndarray, "tx rx"]
+    """Links of held-out elements outside the held-out device pairs."""
+
+    @staticmethod
+    def of(split: Mapping[str, Any], layout: Layout, num_subcarriers: int) -> HeldOut:
+        """Reads a radio's split, as `radio_split` chooses it.
+
+        Args:
+            split: `rx_elements`, `subcarriers` and unordered `device_pairs`.
+            layout: Antenna elements and the links that exist.
+            num_subcarriers: Tones of the radio.
+        """
+        tones = np.ones(num_subcarriers, dtype=bool)
+        tones[list(split["subcarriers"])] = False
+        column = np.zeros(layout.measured.shape, dtype=bool)
+        column[:, list(split["rx_elements"])] = True
+        pair = np.zeros(layout.measured.shape, dtype=bool)
+        for a, b in split["device_pairs"]:
+            pair |= layout.links_between(a, b) | layout.links_between(b, a)
+        return HeldOut(
+            links=layout.measured & ~pair & ~column,
+            tones=tones,
+            pair_links=layout.measured & pair,
+            element_links=layout.measured & ~pair & column,
+        )
+
+    @property
+    def element(self) -> Bool[np.ndarray, "tx rx subcarrier"]:
+        """Held-out array columns, at training tones."""
+        return self.element_links[:, :, None] & self.tones
+
+    @property
+    def subcarrier(self) -> Bool[np.ndarray, "tx rx subcarrier"]:
+        """Held-out tones, at training elements."""
+        return self.links[:, :, None] & ~self.tones
+
+    @property
+    def visible(self) -> Bool[np.ndarray, "tx rx subcarrier"]:
+        """Measured entries that training may see."""
+        return self.links[:, :, None] & self.tones

@@ -15,20 +15,21 @@ import numpy as np
 from jaxtyping import Complex, Float
 from scipy.spatial import KDTree
 
+from rfgs_core.background.static_set import StaticSet
 from rfgs_core.dataset.sequence import Sequence
-from rfgs_core.evaluate.controls.gaussian_process import krige, krige_level
-from rfgs_core.evaluate.controls.interpolation import completed, fill
-from rfgs_core.evaluate.controls.linear import inverse_distance, linear
-from rfgs_core.evaluate.controls.spectrum import spectral
+from rfgs_core.evaluate.baselines.gaussian_process import krige, krige_level
+from rfgs_core.evaluate.baselines.interpolation import completed, fill
+from rfgs_core.evaluate.baselines.linear import inverse_distance, linear
+from rfgs_core.evaluate.baselines.spectrum import spectral
 from rfgs_core.evaluate.evidence import Evidence
 from rfgs_core.evaluate.geometry import reference_points
 from rfgs_core.evaluate.rf import RF_KEYS, frame_rf, pool_rf, snr_db
 from rfgs_core.evaluate.scene import Scene
+from rfgs_core.measure.direct_path import direct_background
+from rfgs_core.radio.levels import power_of
 from rfgs_core.run.calibration import read_calibration
 from rfgs_core.run.static import has_static_set, read_static_set
 from rfgs_core.seeds import sub_seed
-from rfgs_core.train.background import direct_background
-from rfgs_core.train.static_set import StaticSet
 
 #: Metrics of a background; the first two are added here.
 BACKGROUND_KEYS = ("visible_snr_db", "pair_snr_db", *RF_KEYS)
@@ -63,8 +64,15 @@ class Backgrounds:
             # As devices with the offsets of the capture hear it, like `Run.predict`.
             turn = read_calibration(run.path, run.frames[0]).capture.turn(layout, freq_hz)
         visible = np.where(seen.links[..., None] & seen.tones, seen.static * turn, np.nan)
-        grid = (scene.grid, scene.voxels)
-        evidence = Evidence.hide(visible, visible, scene.held_out, layout, freq_hz, *grid)
+        evidence = Evidence.hide(
+            visible,
+            visible,
+            scene.held_out,
+            layout,
+            freq_hz,
+            grid=scene.grid,
+            voxels=scene.voxels,
+        )
         straight, whole = direct_background(seen), static.background(seen)
         parts = ((part * turn).astype(np.complex64) for part in (straight, whole))
         return Backgrounds(static, evidence, *parts)
@@ -97,8 +105,7 @@ def background_metrics(scene: Scene, own: Backgrounds) -> dict[str, Any]:
 
 def _metrics(scene: Scene, predicted: Channel) -> dict[str, float | None]:
     true, held_out = scene.csi_static, scene.held_out
-    layout = scene.layout
-    values = pool_rf([frame_rf(true, predicted, held_out, layout.tx_device, layout.rx_device)])
+    values = pool_rf([frame_rf(true, predicted, held_out, scene.layout)])
     pairs = held_out.pair_links[..., None] & np.ones(true.shape, dtype=bool)
     for name, where in (("visible_snr_db", held_out.visible), ("pair_snr_db", pairs)):
         error = float(np.sum(np.abs(true - predicted)[where].astype(np.float64) ** 2))
@@ -122,7 +129,7 @@ def surface_distances(static: StaticSet, sequence: Sequence) -> dict[str, float]
     low, high = sequence.bounds_m
     own = np.asarray(tree.query(static.gaussians.means.numpy().astype(np.float64))[0])
     chance = tree.query(rng.uniform(low, high, (count, 3)))[0]
-    power = 10 ** (static.power_db.astype(np.float64) / 10)
+    power = power_of(static.power_db.astype(np.float64))
     return {
         "power_median": _weighted_median(own, power),
         "median": float(np.median(own)),

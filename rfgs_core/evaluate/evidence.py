@@ -10,12 +10,12 @@ from functools import cached_property, partial
 import numpy as np
 from jaxtyping import Bool, Complex, Float
 
+from rfgs_core.bodies.body_prior import Bodies
+from rfgs_core.dataset.splits import HeldOut
 from rfgs_core.encode.matched_filter import device_pairs, matched_filter_map
 from rfgs_core.evaluate.backprojection import PowerMap, ThinnedMaps, thinned_maps
 from rfgs_core.evaluate.grid import Grid
-from rfgs_core.evaluate.rf import HeldOut
 from rfgs_core.radio import Layout
-from rfgs_core.train.body_prior import Bodies
 
 
 @dataclass(frozen=True)

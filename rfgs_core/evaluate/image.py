@@ -17,6 +17,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 from skimage.metrics import structural_similarity
 
+from rfgs_core.radio.levels import decibels
+
 #: Names of the image group in `metrics.json`.
 IMAGE_KEYS = ("psnr", "psnr_person", "ssim", "lpips")
 #: Colour around the person in `psnr_person`.
@@ -52,7 +54,7 @@ def psnr_db(true: Float[np.ndarray, "..."], predicted: Float[np.ndarray, "..."])
         20.0
     """
     error = float(np.mean((np.asarray(true, dtype=np.float64) - predicted) ** 2))
-    return round(min(-10.0 * float(np.log10(max(error, 1e-30))), PSNR_LIMIT_DB), 6)
+    return round(min(-float(decibels(error)), PSNR_LIMIT_DB), 6)
 
 
 def psnr_person_db(true: Picture, predicted: Picture) -> float | None:

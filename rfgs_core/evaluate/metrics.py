@@ -14,7 +14,7 @@ from jaxtyping import Float
 from tqdm import tqdm
 
 from rfgs_core.evaluate.background import Backgrounds, background_metrics
-from rfgs_core.evaluate.controls import CONTROLS, ControlResult, phase_free
+from rfgs_core.evaluate.baselines import CONTROLS, ControlResult, phase_free
 from rfgs_core.evaluate.geometry import GEOMETRY_KEYS, geometry_metrics
 from rfgs_core.evaluate.image import IMAGE_KEYS
 from rfgs_core.evaluate.oracle import oracle_scores
@@ -26,8 +26,8 @@ from rfgs_core.evaluate.rf import RF_KEYS, frame_rf, pool_rf, rf_values
 from rfgs_core.evaluate.scene import EvaluatedRun, Scene
 from rfgs_core.evaluate.verdicts import verdicts
 from rfgs_core.files import write_json
+from rfgs_core.measure.observations import Kept
 from rfgs_core.render.view import pictures_of
-from rfgs_core.train.observations import Kept
 
 SCHEMA = "rfgs-metrics/1"
 #: Name of the evaluated method among the controls while they are computed alike.
@@ -214,11 +214,10 @@ def _add(
         table.add(name, frame, "geometry", geometry)
     if result.delta is None:
         return
-    devices = scene.layout.tx_device, scene.layout.rx_device
     static = scene.environment if result.static is None else result.static
-    rf = frame_rf(csi - scene.csi_static, result.delta, scene.held_out, *devices)
+    rf = frame_rf(csi - scene.csi_static, result.delta, scene.held_out, scene.layout)
     table.add(name, frame, "rf", rf)
-    both = frame_rf(csi, result.delta + static, scene.held_out, *devices)
+    both = frame_rf(csi, result.delta + static, scene.held_out, scene.layout)
     table.add(name, frame, "rf_csi", both)
 
 

@@ -3,29 +3,26 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import fields
 
 import numpy as np
 import torch
 from jaxtyping import Float32
 from tqdm import tqdm
 
+from rfgs_core.bodies.tracks import Tracks
 from rfgs_core.encode import Encoder
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.evaluate.geometry import surface_samples
 from rfgs_core.evaluate.grid import splat_gaussians
 from rfgs_core.evaluate.scene import EvaluatedRun, Scene
+from rfgs_core.fit.frame import FrameState, state_at
+from rfgs_core.fit.stages import fit_frame
+from rfgs_core.measure.observations import Observations
 from rfgs_core.run.encoders import run_encoder
 from rfgs_core.seeds import sub_seed
+from rfgs_core.settings import TrainConfig
 from rfgs_core.threads import one_torch_thread
-from rfgs_core.train.config import TrainConfig
-from rfgs_core.train.first_powers import fit_power, new_head
-from rfgs_core.train.frame import FrameState, solve_reflectivity
-from rfgs_core.train.observations import Observations
-from rfgs_core.train.refine import refine
-from rfgs_core.train.sampling import encode
-from rfgs_core.train.start import gaussians_at
-from rfgs_core.train.tracks import Tracks
 
 
 def start_on_surface(
@@ -39,27 +36,16 @@ def start_on_surface(
     vertices, faces, _ = run.sequence.moving_mesh(frame)
     rng = np.random.default_rng(sub_seed(config.seed, "oracle", frame))
     points, normals = surface_samples(vertices, faces, config.num_gaussians, rng)
-    gaussians = gaussians_at(points, normals)
-    power = fit_power(observations, gaussians, config)
-    head = new_head(observations, config, power)
-    features = head.without_readings(encode(observations, points, encoder).features)
-    return FrameState(
-        gaussians=replace(gaussians, features=features),
-        power=power,
-        head=head,
-        tracks=Tracks.begun(points[:, :2].mean(axis=0, keepdims=True), observations.time_s),
-        track_id=np.arange(len(points), dtype=np.int64),
-    )
+    tracks = Tracks.begun(points[:, :2].mean(axis=0, keepdims=True), observations.time_s)
+    return state_at(points, normals, observations, config, tracks, encoder)
 
 
 def _fit_from_surface(run: EvaluatedRun, config: TrainConfig, frame: int) -> FrameState:
     observations = run.observations(frame)
     encoder = run_encoder(run.path, run.config, run.sequence, frame)
     state = start_on_surface(run, observations, config, frame, encoder)
-    if config.objective != "paper":
-        state = solve_reflectivity(observations, state, config)
     seed = sub_seed(config.seed, "oracle", frame)
-    return refine(observations, state, config, seed, encoder=encoder)
+    return fit_frame(observations, state, config, seed, encoder=encoder)
 
 
 def oracle_scores(scene: Scene) -> dict[int, Float32[np.ndarray, "x y z"]]:

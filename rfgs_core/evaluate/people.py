@@ -15,9 +15,9 @@ import numpy as np
 from jaxtyping import Float, Float64, Int
 from scipy.optimize import linear_sum_assignment
 
+from rfgs_core.bodies.body_prior import nearest_axis
 from rfgs_core.evaluate.geometry import TRACKED_M, spanned
 from rfgs_core.pose.score import identity_kept
-from rfgs_core.train.body_prior import nearest_axis
 
 
 @dataclass(frozen=True)

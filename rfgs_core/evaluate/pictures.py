@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from rfgs_core.evaluate.controls.silhouette import empty_picture, silhouette_picture
+from rfgs_core.evaluate.baselines.silhouette import empty_picture, silhouette_picture
 from rfgs_core.evaluate.image import (
     IMAGE_KEYS,
     Lpips,

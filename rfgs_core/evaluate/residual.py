@@ -22,10 +22,10 @@ from jaxtyping import Bool, Complex, Complex64, Float64
 from scipy.optimize import nnls
 
 from rfgs_core.encode.matched_filter import device_pairs
-from rfgs_core.evaluate.controls.interpolation import completed, fill
-from rfgs_core.evaluate.controls.spectrum import spectral
+from rfgs_core.evaluate.baselines.interpolation import completed, fill
+from rfgs_core.evaluate.baselines.spectrum import spectral
 from rfgs_core.evaluate.evidence import Evidence
-from rfgs_core.train.observations import Kept
+from rfgs_core.measure.observations import Kept
 
 #: Row of the prediction of the Gaussians by themselves.
 GAUSSIANS_ALONE = "gaussians_alone"

@@ -4,11 +4,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Complex, Float, Int
+from jaxtyping import Complex, Float
+
+from rfgs_core.dataset.splits import HeldOut
+from rfgs_core.radio import Layout
+from rfgs_core.radio.delay import delay_profile, hann
+from rfgs_core.radio.levels import decibels
 
 #: Metrics of the RF group and, where it exists, the median over frames beside the pooled value.
 RF_KEYS = ("element_snr_db", "subcarrier_snr_db", "device_gain_mae_db", "delay_profile_corr")
@@ -16,62 +20,11 @@ RF_KEYS = ("element_snr_db", "subcarrier_snr_db", "device_gain_mae_db", "delay_p
 NEGLIGIBLE = 1e-14
 
 
-@dataclass(frozen=True)
-class HeldOut:
-    """Which entries of a channel training must not see; the three kinds do not overlap."""
-
-    element: Bool[np.ndarray, "tx rx subcarrier"]
-    """Held-out array columns, at training tones."""
-    subcarrier: Bool[np.ndarray, "tx rx subcarrier"]
-    """Held-out tones, at training elements."""
-    pair_links: Bool[np.ndarray, "tx rx"]
-    """Links of held-out device pairs, in both directions; all their tones are held out."""
-    element_links: Bool[np.ndarray, "tx rx"]
-    """Links of held-out elements outside the held-out device pairs."""
-    visible: Bool[np.ndarray, "tx rx subcarrier"]
-    """Measured entries that training may see."""
-
-    @staticmethod
-    def of(
-        split: Mapping[str, Any],
-        tx_device: Int[np.ndarray, "tx"],
-        rx_device: Int[np.ndarray, "rx"],
-        measured: Bool[np.ndarray, "tx rx"],
-        num_subcarriers: int,
-    ) -> HeldOut:
-        """Reads a radio's split: `rx_elements`, `subcarriers` and unordered `device_pairs`."""
-        tone = np.zeros(num_subcarriers, dtype=bool)
-        tone[list(split["subcarriers"])] = True
-        column = np.zeros(measured.shape, dtype=bool)
-        column[:, list(split["rx_elements"])] = True
-        pair = np.zeros(measured.shape, dtype=bool)
-        for a, b in split["device_pairs"]:
-            for one, other in ((a, b), (b, a)):
-                pair |= (tx_device[:, None] == one) & (rx_device[None, :] == other)
-        pair &= measured
-        column &= measured & ~pair
-        plain = measured & ~pair & ~column
-        return HeldOut(
-            element=column[:, :, None] & ~tone,
-            subcarrier=plain[:, :, None] & tone,
-            pair_links=pair,
-            element_links=column,
-            visible=plain[:, :, None] & ~tone,
-        )
-
-
 def snr_db(error_power: float, power: float) -> float | None:
     """10 log10(Σ|true|² / Σ|true − predicted|²) [dB]; None where nothing is to be predicted."""
     if power <= 0.0:
         return None
-    return float(10.0 * np.log10(power / max(error_power, NEGLIGIBLE * power)))
-
-
-def delay_profiles(
-    csi: Complex[np.ndarray, "link subcarrier"],
-) -> Float[np.ndarray, "link delay"]:
-    """Magnitude of the delay profile of each link, Hann-windowed against side lobes."""
-    return np.abs(np.fft.ifft(csi * np.hanning(csi.shape[1] + 2)[1:-1], axis=1))
+    return float(decibels(power / max(error_power, NEGLIGIBLE * power)))
 
 
 def _correlation(
@@ -90,8 +43,7 @@ def frame_rf(
     true: Complex[np.ndarray, "tx rx subcarrier"],
     predicted: Complex[np.ndarray, "tx rx subcarrier"],
     held_out: HeldOut,
-    tx_device: Int[np.ndarray, "tx"],
-    rx_device: Int[np.ndarray, "rx"],
+    layout: Layout,
 ) -> dict[str, Any]:
     """Sums and values of one frame, to be pooled by `pool_rf`.
 
@@ -99,8 +51,7 @@ def frame_rf(
         true: Channel of the frame.
         predicted: Prediction of the same entries.
         held_out: Entries to compare.
-        tx_device: Device of each transmitting element.
-        rx_device: Device of each receiving element.
+        layout: Antenna elements, whose devices make the pairs.
 
     Returns:
         For `element` and `subcarrier` the pair (error power, power); `gain_db`, the absolute
@@ -113,10 +64,10 @@ def frame_rf(
         error = np.abs(true[where] - predicted[where]).astype(np.float64)
         power = np.abs(true[where]).astype(np.float64)
         result[name] = (float(np.sum(error**2)), float(np.sum(power**2)))
-    result["gain_db"] = _gain_errors_db(true, predicted, held_out, tx_device, rx_device)
+    result["gain_db"] = _gain_errors_db(true, predicted, held_out, layout)
     links = held_out.pair_links | held_out.element_links
     result["delay_profile_corr"] = _correlation(
-        delay_profiles(true[links]), delay_profiles(predicted[links])
+        *(np.abs(delay_profile(csi[links], hann(csi.shape[2]))) for csi in (true, predicted))
     )
     return result
 
@@ -125,20 +76,19 @@ def _gain_errors_db(
     true: Complex[np.ndarray, "tx rx subcarrier"],
     predicted: Complex[np.ndarray, "tx rx subcarrier"],
     held_out: HeldOut,
-    tx_device: Int[np.ndarray, "tx"],
-    rx_device: Int[np.ndarray, "rx"],
+    layout: Layout,
 ) -> list[float | None]:
     """Absolute difference of mean power per ordered held-out device pair [dB]."""
     gains: list[float | None] = []
-    for a in np.unique(tx_device):
-        for b in np.unique(rx_device):
-            links = held_out.pair_links & (tx_device[:, None] == a) & (rx_device[None, :] == b)
+    for a in np.unique(layout.tx_device):
+        for b in np.unique(layout.rx_device):
+            links = held_out.pair_links & layout.links_between(int(a), int(b))
             if not links.any():
                 continue
             want = float(np.mean(np.abs(true[links]).astype(np.float64) ** 2))
             got = float(np.mean(np.abs(predicted[links]).astype(np.float64) ** 2))
             if want > 0.0:
-                gains.append(abs(10.0 * float(np.log10(got / want))) if got > 0.0 else None)
+                gains.append(abs(float(decibels(got / want, least=0.0))) if got > 0.0 else None)
     return gains
 
 

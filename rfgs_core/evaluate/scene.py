@@ -11,24 +11,25 @@ from typing import Any, Protocol
 import numpy as np
 from jaxtyping import Complex, Float, Float32, Float64
 
+from rfgs_core.bodies.body_prior import Bodies
 from rfgs_core.dataset.observed import Observed, observed_csi
 from rfgs_core.dataset.sequence import Sequence
+from rfgs_core.dataset.splits import HeldOut
 from rfgs_core.errors import RfgsError
-from rfgs_core.evaluate.controls.gaussian_process import krige, krige_level
-from rfgs_core.evaluate.controls.interpolation import fill
+from rfgs_core.evaluate.baselines.gaussian_process import krige, krige_level
+from rfgs_core.evaluate.baselines.interpolation import fill
 from rfgs_core.evaluate.evidence import Evidence
 from rfgs_core.evaluate.geometry import best_voxels, reference_points, voxel_budget
 from rfgs_core.evaluate.grid import Grid, splat_gaussians
 from rfgs_core.evaluate.people import FramePeople, match_people, surface_centroids
-from rfgs_core.evaluate.rf import HeldOut
 from rfgs_core.gaussians.model import Gaussians
+from rfgs_core.measure.delay_maps import delay_power_map
+from rfgs_core.measure.observations import Kept, Observations
 from rfgs_core.radio import Layout, Radio
+from rfgs_core.radio.levels import power_of
 from rfgs_core.render.view import moving_gaussians
 from rfgs_core.seeds import sub_seed
-from rfgs_core.train.body_prior import Bodies
-from rfgs_core.train.config import Background, Observe, Packets
-from rfgs_core.train.delay_maps import delay_power_map
-from rfgs_core.train.observations import Kept, Observations
+from rfgs_core.settings import Background, Observe, Packets
 
 
 class EvaluatedRun(Protocol):
@@ -124,13 +125,7 @@ class Scene:
         if not isinstance(name, str):
             raise RfgsError(f"{run.path / 'config.json'}: expected the name of a radio, got {name}")
         radio, layout = sequence.radio_spec(name), sequence.layout(name)
-        held_out = HeldOut.of(
-            sequence.splits["rf"][name],
-            layout.tx_device,
-            layout.rx_device,
-            layout.measured,
-            radio.num_subcarriers,
-        )
+        held_out = HeldOut.of(sequence.splits["rf"][name], layout, radio.num_subcarriers)
         grid = Grid.over(sequence.bounds_m)
         voxels = voxel_budget(sequence.instances)
         static = sequence.csi_static(name)
@@ -208,7 +203,7 @@ class Scene:
             self.grid,
             gaussians.means.numpy().astype(np.float64),
             gaussians.covariances.numpy().astype(np.float64),
-            10.0 ** (power_db[len(power_db) - len(gaussians) :] / 10.0),
+            power_of(power_db[len(power_db) - len(gaussians) :]),
         )
 
     @property

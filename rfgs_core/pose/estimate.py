@@ -13,6 +13,7 @@ from jaxtyping import Bool, Float64
 from rfgs_core.errors import RfgsError
 from rfgs_core.pose.body import index_of, joints_of
 from rfgs_core.pose.fit import Cloud, fit_body, standing
+from rfgs_core.radio.levels import power_of
 from rfgs_core.run import Run
 from rfgs_core.seeds import sub_seed
 
@@ -111,7 +112,7 @@ def _clouds(run: Run, frame: int, floor_m: float) -> list[Cloud]:
             "this run again"
         )
     body, means = attributes["body"], run.moving(frame).means.numpy().astype(np.float64)
-    power = 10.0 ** (attributes["rf_power_db"].astype(np.float64) / 10.0)
+    power = power_of(attributes["rf_power_db"].astype(np.float64))
     clouds = []
     for number in range(run.config["bodies"]):
         own = body == number

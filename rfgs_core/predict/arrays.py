@@ -10,7 +10,7 @@ import numpy as np
 from rfgs_core.arrays import save_arrays
 from rfgs_core.predict.echoes import Echoes, Reflectors
 from rfgs_core.predict.prediction import Prediction
-from rfgs_core.predict.spectra import arrival_power, beam_power, delay_profile, sky_cells
+from rfgs_core.predict.spectra import arrival_power, beam_power, profile_over_delay, sky_cells
 
 #: What a prediction holds and what it does not; printed and stored with every one.
 NOTE = (
@@ -69,7 +69,7 @@ def prediction_arrays(
     """
     profiles = {}
     for name, csi in (("profile", prediction.csi), ("profile_scatter", prediction.csi_scatter)):
-        magnitude, delay_s = delay_profile(csi, prediction.freq_hz)
+        magnitude, delay_s = profile_over_delay(csi, prediction.freq_hz)
         profiles[name] = np.sqrt(np.mean(magnitude**2, axis=1))
         profiles["delay_s"] = delay_s
     elevation_deg, azimuth_deg = sky_cells()

@@ -26,6 +26,7 @@ from rfgs_core.predict.prediction import tones_of
 from rfgs_core.propagation import Links, RadioGaussians, scatter
 from rfgs_core.radio import Layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.radio.levels import amplitude_decibels, decibels
 from rfgs_core.radio.materials import MATERIALS
 from rfgs_core.radio.reflection import slab_reflection
 
@@ -110,13 +111,13 @@ def material_weights(levels: Levels, surface_m2: float) -> dict[str, float]:
         for material in MATERIALS.values()
         if (freq_hz >= material.freq_min_hz).all() and (freq_hz <= material.freq_max_hz).all()
     ]
-    found_db = 10 * np.log10(np.maximum(levels.rcs_m2, 1e-30))
-    slope_db = 10 * np.log10(freq_hz / np.exp(np.log(freq_hz).mean()))
+    found_db = decibels(levels.rcs_m2)
+    slope_db = decibels(freq_hz / np.exp(np.log(freq_hz).mean()))
     cov = np.diag(levels.speckle_db**2) + LEVEL_DB**2 + SLOPE**2 * np.outer(slope_db, slope_db)
     score = []
     for name in known:
-        own_db = 20 * np.log10(np.abs(slab_reflection(name, freq_hz)))
-        off_db = found_db - own_db - 10 * np.log10(surface_m2 / 4)
+        own_db = amplitude_decibels(np.abs(slab_reflection(name, freq_hz)))
+        off_db = found_db - own_db - decibels(surface_m2 / 4)
         score.append(-0.5 * off_db @ np.linalg.solve(cov, off_db))
     weight = np.exp(np.array(score) - max(score))
     weight /= weight.sum()

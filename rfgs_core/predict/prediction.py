@@ -17,6 +17,7 @@ from jaxtyping import Complex, Complex64, Complex128, Float, Float64
 
 from rfgs_core.propagation import EnvironmentPaths, Links, RadioGaussians, Tones, scatter, shadow
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.radio.levels import decibels
 
 
 @dataclass(frozen=True)
@@ -130,4 +131,4 @@ def _straight(links: Links, freq_hz: np.ndarray) -> EnvironmentPaths:
 def gain_db(csi: Complex[np.ndarray, "... subcarrier"]) -> float:
     """Mean power of a channel over all its entries [dB]; −inf where it is zero."""
     power = float(np.mean(np.abs(csi).astype(np.float64) ** 2))
-    return 10 * float(np.log10(power)) if power > 0 else -np.inf
+    return float(decibels(power, least=0.0)) if power > 0 else -np.inf

@@ -10,6 +10,7 @@ from jaxtyping import Complex, Float, Float64
 
 from rfgs_core.predict.echoes import Echoes
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.radio.delay import delay_profile, hann
 
 #: Delay samples per tone: the peak of a path is read within 0.1 dB.
 OVERSAMPLING = 8
@@ -19,7 +20,7 @@ CELL_DEG = 2.0
 BEAM_TONES = 16
 
 
-def delay_profile(
+def profile_over_delay(
     csi: Complex[np.ndarray, "*link subcarrier"], freq_hz: Float[np.ndarray, "subcarrier"]
 ) -> tuple[Float64[np.ndarray, "*link delay"], Float64[np.ndarray, "delay"]]:
     """Magnitude over absolute delay, Hann-windowed: a path of amplitude a peaks at |a|.
@@ -31,9 +32,9 @@ def delay_profile(
     Returns:
         Magnitudes, and delays from 0 to 1/Δf [s], after which they repeat.
     """
-    window = np.hanning(len(freq_hz) + 2)[1:-1]
-    size = OVERSAMPLING * len(freq_hz)
-    response = np.fft.ifft(csi * (window / window.sum()), n=size, axis=-1) * size
+    window = hann(len(freq_hz))
+    response = delay_profile(csi, window / window.sum(), OVERSAMPLING, peak=True)
+    size = response.shape[-1]
     return np.abs(response), np.arange(size) / (size * float(freq_hz[1] - freq_hz[0]))
 
 

@@ -12,6 +12,8 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float64
 
+from rfgs_core.radio.levels import amplitude_of
+
 _Angles = Float64[np.ndarray, "point"]
 _Vectors = Float64[np.ndarray, "point 3"]
 
@@ -48,7 +50,7 @@ def _tr38901(theta: _Angles, phi: _Angles) -> _Angles:
     phi = (phi + np.pi) % (2.0 * np.pi) - np.pi
     vertical_db = np.minimum(12.0 * ((theta - 0.5 * np.pi) / width) ** 2, 30.0)
     horizontal_db = np.minimum(12.0 * (phi / width) ** 2, 30.0)
-    return 10.0 ** ((8.0 - np.minimum(vertical_db + horizontal_db, 30.0)) / 20.0)
+    return amplitude_of(8.0 - np.minimum(vertical_db + horizontal_db, 30.0))
 
 
 #: Magnitude of the field over zenith angle and azimuth [rad] in the antenna's own axes.

@@ -68,6 +68,10 @@ class Layout:
         pairs = np.unique(np.stack([self.tx_device[tx], self.rx_device[rx]], axis=1), axis=0)
         return [(int(a), int(b)) for a, b in pairs]
 
+    def links_between(self, a: int, b: int) -> Bool[np.ndarray, "tx rx"]:
+        """Links from elements of device `a` to those of device `b`, measured or not."""
+        return (self.tx_device[:, None] == a) & (self.rx_device[None, :] == b)
+
 
 def rotation(quat_wxyz: tuple[float, float, float, float]) -> Float64[np.ndarray, "3 3"]:
     """Rotation matrix of a quaternion, w first; the quaternion is normalised first."""

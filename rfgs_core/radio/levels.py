@@ -1,12 +1,47 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Powers as levels."""
+"""Powers and amplitudes as levels in decibels, and back."""
 
 from __future__ import annotations
+
+from typing import overload
 
 import numpy as np
 from jaxtyping import Float
 
+_Array = Float[np.ndarray, "..."]
 
-def decibels(power: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
-    """Powers in dB, at least -300, of the same shape."""
-    return 10.0 * np.log10(np.maximum(power, 1e-30))
+
+@overload
+def decibels(power: float, least: float = ...) -> float: ...
+@overload
+def decibels(power: _Array, least: float = ...) -> _Array: ...
+def decibels(power: _Array | float, least: float = 1e-30) -> _Array | float:
+    """Powers in dB, those below `least` as `least`: by default at least -300 dB."""
+    return 10.0 * np.log10(np.maximum(power, least))
+
+
+@overload
+def amplitude_decibels(amplitude: float, least: float = ...) -> float: ...
+@overload
+def amplitude_decibels(amplitude: _Array, least: float = ...) -> _Array: ...
+def amplitude_decibels(amplitude: _Array | float, least: float = 1e-15) -> _Array | float:
+    """Amplitudes in dB, those below `least` as `least`: by default at least -300 dB."""
+    return 20.0 * np.log10(np.maximum(amplitude, least))
+
+
+@overload
+def power_of(level_db: float) -> float: ...
+@overload
+def power_of(level_db: _Array) -> _Array: ...
+def power_of(level_db: _Array | float) -> _Array | float:
+    """Power of a level [dB]."""
+    return 10.0 ** (level_db / 10.0)
+
+
+@overload
+def amplitude_of(level_db: float) -> float: ...
+@overload
+def amplitude_of(level_db: _Array) -> _Array: ...
+def amplitude_of(level_db: _Array | float) -> _Array | float:
+    """Amplitude of a level [dB]."""
+    return 10.0 ** (level_db / 20.0)

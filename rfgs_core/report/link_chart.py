@@ -11,9 +11,10 @@ from jaxtyping import Complex64
 
 from rfgs_core.errors import RfgsError
 from rfgs_core.radio import Radio
+from rfgs_core.radio.delay import path_lengths_m
 from rfgs_core.radio.levels import decibels
 from rfgs_core.report.charts import new_figure, write_picture
-from rfgs_core.report.radio_charts import RANGE_DB, delay_profile, path_lengths_m
+from rfgs_core.report.radio_charts import PADDING, RANGE_DB, padded_profile
 from rfgs_core.run import Run
 
 
@@ -37,7 +38,7 @@ class LinkChannels:
         """Energy of the difference over that of the measured channel [dB]; 0 explains nothing."""
         left = np.sum(np.abs(self.measured - self.predicted).astype(np.float64) ** 2)
         whole = np.sum(np.abs(self.measured).astype(np.float64) ** 2)
-        return float(10 * np.log10(max(left, 1e-300) / max(whole, 1e-300)))
+        return float(decibels(max(left, 1e-300) / max(whole, 1e-300), least=0.0))
 
     @property
     def explained(self) -> str:
@@ -81,7 +82,7 @@ def write_link_chart(path: Path, link: LinkChannels) -> None:
 
     Powers are means over the antenna pairs; each column shares one scale.
     """
-    mhz, length_m = link.radio.freq_hz / 1e6, path_lengths_m(link.radio)
+    mhz, length_m = link.radio.freq_hz / 1e6, path_lengths_m(link.radio, PADDING)
     shown = length_m <= link.longest_m
     with new_figure(10.0, 6.0) as figure:
         axes = figure.subplots(2, 2)
@@ -89,7 +90,7 @@ def write_link_chart(path: Path, link: LinkChannels) -> None:
             (
                 ([link.measured, link.predicted], (mhz[0], mhz[-1]), "frequency [MHz]"),
                 (
-                    [delay_profile(csi)[..., shown] for csi in (link.measured, link.predicted)],
+                    [padded_profile(csi)[..., shown] for csi in (link.measured, link.predicted)],
                     (0.0, float(length_m[shown][-1])),
                     "path length [m]",
                 ),

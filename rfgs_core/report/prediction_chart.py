@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.radio.levels import amplitude_decibels, decibels
 from rfgs_core.report.charts import INK, METHOD, TRUTH, new_figure, power_colours, write_picture
 
 #: Powers this far below the strongest are not drawn [dB].
@@ -40,10 +41,10 @@ def _draw_profile(axes, arrays: Mapping[str, np.ndarray], index: int) -> None:
         ("profile", TRUTH, "with the direct path"),
         ("profile_scatter", METHOD, "person's scattering"),
     ):
-        level_db = 20 * np.log10(np.maximum(arrays[name][index], 1e-12))
+        level_db = amplitude_decibels(arrays[name][index], least=1e-12)
         axes.plot(delay_ns[shown], level_db[shown], color=colour, label=label, linewidth=1.2)
     axes.axvline(straight_m / SPEED_OF_LIGHT * 1e9, color=INK, linewidth=0.6, linestyle=":")
-    top = 20 * np.log10(max(float(arrays["profile"][index].max()), 1e-12))
+    top = amplitude_decibels(float(arrays["profile"][index].max()), least=1e-12)
     axes.set(
         title=f"delay profile at {_place(arrays['rx_xyz'][index])}",
         xlabel="delay [ns]; dotted: the straight way",
@@ -56,7 +57,7 @@ def _draw_profile(axes, arrays: Mapping[str, np.ndarray], index: int) -> None:
 def _draw_spectrum(axes, arrays: Mapping[str, np.ndarray], index: int) -> None:
     name = "beam_power" if "beam_power" in arrays else "arrival_power"
     power = arrays[name][index]
-    level_db = 10 * np.log10(np.maximum(power, 1e-30))
+    level_db = decibels(power)
     top = float(np.nanmax(level_db))
     level_db = np.where(level_db < top - RANGE_DB, np.nan, level_db)
     colours = power_colours()

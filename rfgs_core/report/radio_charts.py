@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Complex, Float
 
 from rfgs_core.evaluate.scene import Scene
-from rfgs_core.radio import Radio
+from rfgs_core.radio.delay import delay_profile, hann, path_lengths_m
 from rfgs_core.radio.layout import rotation
 from rfgs_core.radio.levels import decibels
 from rfgs_core.report.charts import INK, METHOD, figure_uri, new_figure
@@ -50,8 +50,8 @@ def _delay_over_time(scene: Scene, axis, figure) -> None:
     profiles = []
     for frame in scene.run.frames:
         delta = (scene.csi(frame) - scene.csi_static)[scene.layout.measured]
-        profiles.append(np.mean(np.abs(delay_profile(delta)) ** 2, axis=0))
-    length_m = path_lengths_m(scene.radio)
+        profiles.append(np.mean(np.abs(padded_profile(delta)) ** 2, axis=0))
+    length_m = path_lengths_m(scene.radio, PADDING)
     shown = length_m <= _longest_m(scene)
     level = decibels(np.stack(profiles)[:, shown].T)
     image = axis.imshow(
@@ -82,7 +82,7 @@ def delay_angle_chart(scene: Scene, frame: int, centroid_m: Float[np.ndarray, "3
             world = rotation(device.quat_wxyz)
             tx_device = _partner(scene, index)
             power = _delay_angle(scene, delta, tx_device, index, world)
-            length_m = path_lengths_m(scene.radio)
+            length_m = path_lengths_m(scene.radio, PADDING)
             shown = length_m <= _longest_m(scene)
             level = decibels(power[shown])
             axis.pcolormesh(
@@ -117,7 +117,7 @@ def _delay_angle(
     local_y = (layout.rx_xyz[rx] - layout.rx_xyz[rx].mean(axis=0)) @ world[:, 1]
     by_column = np.stack([rx[layout.rx_column[rx] == c] for c in columns])
     y = np.array([local_y[layout.rx_column[rx] == c].mean() for c in columns])
-    profile = delay_profile(delta[np.ix_(tx, by_column.ravel())])
+    profile = padded_profile(delta[np.ix_(tx, by_column.ravel())])
     profile = profile.reshape(len(tx), *by_column.shape, -1)
     k = 2.0 * np.pi / scene.radio.wavelength_m
     # A wave from azimuth φ is ahead by k y sin φ at local y.
@@ -154,16 +154,9 @@ def _partner(scene: Scene, rx_device: int) -> int:
     return rx_device if rx_device in measured else measured[0]
 
 
-def delay_profile(csi: Complex[np.ndarray, "..."]) -> Complex[np.ndarray, "..."]:
-    """Hann-windowed, zero-padded delay profile along the last axis."""
-    window = np.hanning(csi.shape[-1] + 2)[1:-1]
-    return np.fft.ifft(csi * window, n=PADDING * csi.shape[-1], axis=-1)
-
-
-def path_lengths_m(radio: Radio) -> Float[np.ndarray, "delay"]:
-    """Path length of each sample of a profile [m]."""
-    count = PADDING * radio.num_subcarriers
-    return np.arange(count) * radio.unambiguous_path_m / count
+def padded_profile(csi: Complex[np.ndarray, "*link subcarrier"]) -> Complex[np.ndarray, "..."]:
+    """Delay profile as charts show it."""
+    return delay_profile(csi, hann(csi.shape[-1]), PADDING)
 
 
 def _longest_m(scene: Scene) -> float:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from rfgs_core.evaluate.controls.matched_filter import default_score
+from rfgs_core.evaluate.baselines.matched_filter import default_score
 from rfgs_core.evaluate.geometry import best_voxels
 from rfgs_core.evaluate.scene import Scene
 from rfgs_core.render.view import moving_gaussians

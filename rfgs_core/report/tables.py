@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from rfgs_core.evaluate.controls import CONTROLS
+from rfgs_core.evaluate.baselines import CONTROLS
 from rfgs_core.evaluate.residual import GAUSSIANS_ALONE
 
 METHOD_LABEL = "RF-GS"

@@ -10,9 +10,9 @@ import numpy as np
 from rfgs_core.arrays import Shape, load_arrays, save_arrays
 from rfgs_core.dataset import Sequence
 from rfgs_core.errors import RfgsError
-from rfgs_core.train.calibrate import Calibration
-from rfgs_core.train.config import TrainConfig
-from rfgs_core.train.offsets import Offsets
+from rfgs_core.fit.calibrate import Calibration
+from rfgs_core.measure.offsets import Offsets
+from rfgs_core.settings import TrainConfig
 
 _SHAPES: dict[str, Shape] = {
     "capture_phase_rad": ("device",),

@@ -18,7 +18,7 @@ from rfgs_core.encode.path_features import PathFeatures
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import sha256, write_bytes
 from rfgs_core.radio.path_table import PathTable
-from rfgs_core.train.config import Packets, TrainConfig
+from rfgs_core.settings import Packets, TrainConfig
 
 #: Name of a learned encoder inside a run.
 ENCODER_FILE = "encoder.npz"

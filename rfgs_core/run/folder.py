@@ -14,22 +14,23 @@ import torch
 from jaxtyping import Complex64, Float64
 
 from rfgs_core.arrays import Shape, load_arrays
+from rfgs_core.bodies.body_prior import Bodies
 from rfgs_core.dataset import Sequence, open_dataset
 from rfgs_core.dataset.observed import Observed
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.files import read_json
 from rfgs_core.gaussians import FEATURE_DIM, Gaussians
 from rfgs_core.gaussians.ply import read_ply
+from rfgs_core.measure.observations import Kept, Observations, Reported, observe
+from rfgs_core.model.channel import Channel
+from rfgs_core.model.head import HEAD_SHAPES, RadioHead
+from rfgs_core.model.reflectivity import fitted_reflectivities
+from rfgs_core.model.unseen_pairs import levelled
+from rfgs_core.radio.levels import power_of
 from rfgs_core.run.calibration import read_calibration
 from rfgs_core.run.static import static_gaussians
+from rfgs_core.settings import TrainConfig
 from rfgs_core.threads import one_torch_thread
-from rfgs_core.train.body_prior import Bodies
-from rfgs_core.train.channel import Channel
-from rfgs_core.train.config import TrainConfig
-from rfgs_core.train.head import HEAD_SHAPES, RadioHead
-from rfgs_core.train.observations import Kept, Observations, Reported, observe
-from rfgs_core.train.reflectivity import fitted_reflectivities
-from rfgs_core.train.unseen_pairs import levelled
 
 #: Schema of `config.json`.
 SCHEMA = "rfgs-run/1"
@@ -218,7 +219,7 @@ class Run:
 
     def _power(self, frame: int) -> Float64[np.ndarray, "M"]:
         """Reflected power of each moving Gaussian [m²]."""
-        return 10 ** (self.attributes(frame)["rf_power_db"].astype(np.float64) / 10)
+        return power_of(self.attributes(frame)["rf_power_db"].astype(np.float64))
 
     def _answer(
         self, frame: int, observations: Observations, gaussians: Gaussians

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from rfgs_core.arrays import Shape, load_arrays, save_arrays
+from rfgs_core.background.static_set import StaticSet
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.gaussians import FEATURE_DIM, Gaussians
 from rfgs_core.gaussians.ply import GaussianCloud, cloud_of, read_ply, write_ply
-from rfgs_core.train.config import TrainConfig
-from rfgs_core.train.head import HEAD_SHAPES, RadioHead
-from rfgs_core.train.static_set import StaticSet
+from rfgs_core.model.head import HEAD_SHAPES, RadioHead
+from rfgs_core.settings import TrainConfig
 
 #: Decodes the features of the static set; written last.
 HEAD_FILE = "static_head.npz"

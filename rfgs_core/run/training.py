@@ -13,12 +13,28 @@ import torch
 from tqdm import tqdm
 
 from rfgs_core.arrays import Shape, load_arrays, save_arrays
+from rfgs_core.background.learned import (
+    learned_background,
+    need_enough_frames,
+    without_movers,
+)
+from rfgs_core.background.static_set import fit_static_set
+from rfgs_core.bodies.tracks import Tracks
 from rfgs_core.dataset import Dataset, Sequence
 from rfgs_core.device import need_device
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json, write_json
+from rfgs_core.fit.calibrate import calibrate
+from rfgs_core.fit.frame import FrameState, start_frame
+from rfgs_core.fit.parameters import GAUSSIAN_SHAPES
+from rfgs_core.fit.refine import need_sample_points
+from rfgs_core.fit.stages import fit_frame
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.gaussians.ply import GaussianCloud, cloud_of, read_ply, write_ply
+from rfgs_core.measure.observations import need_still_antennas
+from rfgs_core.measure.offsets import Offsets
+from rfgs_core.model.head import HEAD_SHAPES, RadioHead
+from rfgs_core.radio.levels import decibels
 from rfgs_core.run.calibration import (
     calibration_path,
     need_shared_links,
@@ -48,22 +64,8 @@ from rfgs_core.run.static import (
     write_static_set,
 )
 from rfgs_core.seeds import sub_seed
+from rfgs_core.settings import TrainConfig
 from rfgs_core.threads import one_torch_thread
-from rfgs_core.train.calibrate import calibrate
-from rfgs_core.train.config import TrainConfig
-from rfgs_core.train.frame import FrameState, solve_reflectivity, start_frame
-from rfgs_core.train.head import HEAD_SHAPES, RadioHead
-from rfgs_core.train.learned_background import (
-    learned_background,
-    need_enough_frames,
-    without_movers,
-)
-from rfgs_core.train.observations import need_still_antennas
-from rfgs_core.train.offsets import Offsets
-from rfgs_core.train.parameters import GAUSSIAN_SHAPES
-from rfgs_core.train.refine import need_sample_points, refine
-from rfgs_core.train.static_set import fit_static_set
-from rfgs_core.train.tracks import Tracks
 
 _CHECKPOINT: dict[str, Shape] = {
     **GAUSSIAN_SHAPES,
@@ -156,7 +158,7 @@ def train_sequence(
             state = _finished(run, frame)
             if state is None:
                 with one_torch_thread():
-                    state = fit_frame(run, frame, config, before, bar, curves.of_frame(frame))
+                    state = _fit(run, frame, config, before, bar, curves.of_frame(frame))
                 _store(run, frame, state)
                 spent += time.perf_counter() - begin
                 write_json(out / "config.json", {**settings, "train_s": round(spent, 2)})
@@ -176,7 +178,7 @@ def train_sequence(
     return Run(out, read_json(out / "config.json"))
 
 
-def fit_frame(
+def _fit(
     run: Run,
     frame: int,
     config: TrainConfig,
@@ -197,21 +199,22 @@ def fit_frame(
     state = start_frame(observations, config, seed, before, encoder, earlier)
     bar.update(1)
     bar.set_postfix_str(f"frame {frame}, solving reflectivities")
-    if config.objective != "paper":
-        state = solve_reflectivity(observations, state, config)
-    bar.update(1)
 
     def on_step(loss: float, count: int) -> None:
         bar.update(1)
         bar.set_postfix_str(f"frame {frame}, loss {loss:.3g}, {count} Gaussians")
 
-    state = refine(
-        *(observations, state, config, seed, _partial_path(run, frame)),
-        *(on_step, encoder, scalars),
+    return fit_frame(
+        observations,
+        state,
+        config,
+        seed,
+        encoder=encoder,
+        checkpoint=_partial_path(run, frame),
+        on_solved=lambda: bar.update(1),
+        on_step=on_step,
+        scalars=scalars,
     )
-    if config.objective == "paper":
-        state = solve_reflectivity(observations, state, config)
-    return state
 
 
 def _calibrate(run: Run, frame: int, config: TrainConfig, seed: int) -> None:
@@ -253,7 +256,7 @@ def _partial_path(run: Run, frame: int) -> Path:
 
 def _store(run: Run, frame: int, state: FrameState) -> None:
     """Writes a finished frame; its checkpoint comes last and marks it as done."""
-    power_db = 10 * np.log10(np.maximum(state.power.numpy(), 1e-30)).astype(np.float32)
+    power_db = decibels(state.power.numpy()).astype(np.float32)
     write_ply(run.ply_path(frame), cloud_of(state.gaussians, rf_power_db=power_db))
     gamma = state.gamma.detach().numpy().astype(np.complex64)
     save_arrays(

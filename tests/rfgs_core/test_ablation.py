@@ -8,10 +8,10 @@ import sys
 import pytest
 import torch
 
+from rfgs_core.fit.density import DensityRule
+from rfgs_core.fit.losses import SamplePoints, position_loss
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.study.ablation import VARIANTS, ablation_row, ablation_table
-from rfgs_core.train.density import DensityRule
-from rfgs_core.train.losses import SamplePoints, position_loss
 
 
 def test_parts_leave_the_rule_one_by_one() -> None:

@@ -86,13 +86,7 @@ def test_train_without_a_dataset(tmp_path: Path, capsys) -> None:
     [
         (["--radio", "radar"], "has no radio 'radar'; it has wifi"),
         (["--radio", "wifi", "--temporal", "-1"], "--temporal -1.0: expected at least 0"),
-        (["--radio", "wifi", "--settle", "2"], "--settle 2.0: expected a share from 0 to 1"),
         (["--radio", "wifi", "--without", "prune"], "expected --objective paper or both"),
-        (["--radio", "wifi", "--coarse", "1.5"], "--coarse 1.5: expected a share from 0 to 1"),
-        (
-            ["--radio", "wifi", "--coarse", "0.5", "--observe", "delay_power"],
-            "--coarse narrows the band of tones",
-        ),
         (["--radio", "wifi", "--frames", "one"], "--frames 'one': expected FIRST:LAST"),
         (["--radio", "wifi", "--frames", "7:9"], "none of these is there; there are [1, 2]"),
         (["--radio", "wifi", "--sequence", "no"], "no sequence 'no'; expected one of tiny"),

@@ -10,6 +10,7 @@ import numpy as np
 from rfgs_core.radio.constants import BOLTZMANN
 from rfgs_core.radio.impairments.settings import Impairments
 from rfgs_core.radio.layout import Layout
+from rfgs_core.radio.levels import amplitude_decibels, amplitude_of, power_of
 from rfgs_core.radio.presets import Radio
 
 #: Temperature that noise figures refer to (IEEE standard temperature) [K].
@@ -26,8 +27,8 @@ def noise_variance(settings: Impairments, radio: Radio) -> float:
         radio.noise_figure_db if settings.noise_figure_db is None else (settings.noise_figure_db)
     )
     power_dbm = radio.power_dbm if settings.power_dbm is None else settings.power_dbm
-    power_w = 10 ** (power_dbm / 10) * 1e-3
-    noise_w = BOLTZMANN * REFERENCE_TEMPERATURE_K * radio.bandwidth_hz * 10 ** (figure_db / 10)
+    power_w = power_of(power_dbm) * 1e-3
+    noise_w = BOLTZMANN * REFERENCE_TEMPERATURE_K * radio.bandwidth_hz * power_of(figure_db)
     return noise_w / power_w / settings.training_symbols
 
 
@@ -54,14 +55,16 @@ def pair_gain_db(settings: Impairments, layout: Layout, value: np.ndarray) -> np
     peak = np.zeros((len(value), devices, devices))
     index: Any = (slice(None), layout.tx_device[:, None], layout.rx_device[None, :])
     np.maximum.at(peak, index, np.where(layout.measured, strongest, 0.0))
-    wanted_db = -settings.headroom_db - 20 * np.log10(np.where(peak > 0.0, peak, 1.0))
+    wanted_db = -settings.headroom_db - amplitude_decibels(
+        np.where(peak > 0.0, peak, 1.0), least=0.0
+    )
     steps = np.floor(wanted_db / settings.agc_step_db)
     return np.where(peak > 0.0, steps * settings.agc_step_db, 0.0)
 
 
 def amplitude(gain_db: np.ndarray, layout: Layout) -> np.ndarray:
     """Field gain of every link (sample, tx, rx, 1) from gains of device pairs [dB]."""
-    gain = 10.0 ** (gain_db / 20.0)
+    gain = amplitude_of(gain_db)
     return gain[:, layout.tx_device[:, None], layout.rx_device[None, :], None]
 
 

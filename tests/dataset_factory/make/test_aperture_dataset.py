@@ -33,7 +33,7 @@ from rfgs_core.files import write_json
 from rfgs_core.radio import preset
 from rfgs_core.radio.impairments import IMPAIRMENT_PRESETS
 from rfgs_core.run.training import train_sequence
-from rfgs_core.train.config import TrainConfig
+from rfgs_core.settings import TrainConfig
 
 #: They share a dataset that takes half a minute to trace.
 pytestmark = pytest.mark.slow

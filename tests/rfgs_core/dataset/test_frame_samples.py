@@ -17,8 +17,8 @@ from rfgs_core.dataset.csi_store import chunk_file, create_csi, write_csi
 from rfgs_core.dataset.torch_dataset import FrameDataset
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.files import write_json
+from rfgs_core.measure.observations import observe
 from rfgs_core.radio import FrameSamples, frame_samples, preset
-from rfgs_core.train.observations import observe
 
 COUNT = 3
 

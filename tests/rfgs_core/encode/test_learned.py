@@ -22,9 +22,9 @@ from rfgs_core.encode.learned.networks import (
 from rfgs_core.encode.protocol import FEATURES
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.gaussians import FEATURE_DIM
+from rfgs_core.measure.observations import Observations
 from rfgs_core.radio import Radio, layout, place_devices
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
-from rfgs_core.train.observations import Observations
 
 BOUNDS_M = np.array([[0.0, 0.0, 0.0], [4.0, 3.5, 2.5]])
 SCATTERER_M = np.array([1.7, 2.1, 1.2])

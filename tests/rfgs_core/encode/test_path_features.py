@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from rfgs_core.encode.path_features import ANGLE_RAD, PathFeatures
+from rfgs_core.measure.observations import Observations
 from rfgs_core.radio import Radio, layout, place_devices
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.path_table import PathTable, ends_rad
-from rfgs_core.train.observations import Observations
 
 BOUNDS_M = np.array([[0.0, 0.0, 0.0], [4.0, 3.5, 2.5]])
 RADIO = Radio("wifi", 5.5e9, 6.0e9, 32, 1, 1, 2, 2, (0.0, 0.0, -0.3))

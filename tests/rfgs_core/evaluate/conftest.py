@@ -12,19 +12,18 @@ import numpy as np
 import pytest
 import torch
 
+from rfgs_core.bodies.body_prior import Bodies
 from rfgs_core.dataset import Sequence, open_dataset
 from rfgs_core.dataset.observed import Observed
-from rfgs_core.dataset.splits import radio_split
+from rfgs_core.dataset.splits import HeldOut, radio_split
 from rfgs_core.evaluate.evidence import Evidence
 from rfgs_core.evaluate.geometry import reference_points
 from rfgs_core.evaluate.grid import Grid
 from rfgs_core.evaluate.metrics import evaluate_run
-from rfgs_core.evaluate.rf import HeldOut
 from rfgs_core.gaussians.model import FEATURE_DIM, Gaussians
+from rfgs_core.measure.observations import Kept, Observations, observe
 from rfgs_core.radio import Radio, layout, place_devices
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
-from rfgs_core.train.body_prior import Bodies
-from rfgs_core.train.observations import Kept, Observations, observe
 
 BOUNDS_M = np.array([[0.0, 0.0, 0.0], [4.0, 3.5, 2.5]])
 
@@ -133,13 +132,7 @@ def scatterers() -> Callable[..., Synthetic]:
         direct = np.linalg.norm(elements.tx_xyz[:, None] - elements.rx_xyz, axis=-1)[..., None]
         static = np.exp(-1j * direct * k) / direct * elements.measured[..., None]
         static = static.astype(np.complex64)
-        held_out = HeldOut.of(
-            radio_split(radio, elements, 0),
-            elements.tx_device,
-            elements.rx_device,
-            elements.measured,
-            radio.num_subcarriers,
-        )
+        held_out = HeldOut.of(radio_split(radio, elements, 0), elements, radio.num_subcarriers)
         evidence = Evidence.hide(
             delta + static, static, held_out, elements, radio.freq_hz, Grid.over(BOUNDS_M), voxels
         )

@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rfgs_core.evaluate.controls import CONTROLS
-from rfgs_core.evaluate.controls.clean import separated_peaks
-from rfgs_core.evaluate.controls.gaussian_process import krige
-from rfgs_core.evaluate.controls.linear import linear
-from rfgs_core.evaluate.controls.nearest_element import nearest
-from rfgs_core.evaluate.controls.spectrum import _like, _likeliest, spectral
+from rfgs_core.bodies.body_prior import Bodies
+from rfgs_core.evaluate.baselines import CONTROLS
+from rfgs_core.evaluate.baselines.clean import separated_peaks
+from rfgs_core.evaluate.baselines.gaussian_process import krige
+from rfgs_core.evaluate.baselines.linear import linear
+from rfgs_core.evaluate.baselines.nearest_element import nearest
+from rfgs_core.evaluate.baselines.spectrum import _like, _likeliest, spectral
 from rfgs_core.evaluate.evidence import Evidence
 from rfgs_core.evaluate.geometry import best_voxels
 from rfgs_core.evaluate.rf import frame_rf, rf_values
-from rfgs_core.train.body_prior import Bodies
 
 Make = Callable[..., object]
 ONE = np.array([[2.0, 1.7, 1.2]])
@@ -26,9 +26,7 @@ TWO = np.array([[1.4, 1.3, 1.0], [2.6, 2.2, 1.4]])
 def rf_of(made, name: str) -> dict:
     result = CONTROLS[name](made.evidence)
     elements = made.evidence.layout
-    return rf_values(
-        frame_rf(made.delta, result.delta, made.held_out, elements.tx_device, elements.rx_device)
-    )
+    return rf_values(frame_rf(made.delta, result.delta, made.held_out, elements))
 
 
 def test_held_out_entries_are_hidden(scatterers) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rfgs_core.evaluate.controls.silhouette import empty_picture, silhouette_picture
+from rfgs_core.evaluate.baselines.silhouette import empty_picture, silhouette_picture
 from rfgs_core.evaluate.image import (
     LPIPS_WEIGHTS,
     Lpips,

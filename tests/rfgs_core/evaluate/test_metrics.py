@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rfgs_core.evaluate.controls import CONTROLS
+from rfgs_core.evaluate.baselines import CONTROLS
 from rfgs_core.evaluate.geometry import GEOMETRY_KEYS
 from rfgs_core.evaluate.image import IMAGE_KEYS
 from rfgs_core.evaluate.metrics import evaluate_run

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from rfgs_core.evaluate.controls import CONTROLS
+from rfgs_core.evaluate.baselines import CONTROLS
 from rfgs_core.evaluate.evidence import Evidence
 from rfgs_core.evaluate.residual import Answer, with_residual
-from rfgs_core.train.observations import Kept
+from rfgs_core.measure.observations import Kept
 
 ONE = np.array([[2.0, 1.7, 1.2]])
 

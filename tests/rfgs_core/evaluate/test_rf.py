@@ -4,15 +4,30 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rfgs_core.evaluate.rf import HeldOut, delay_profiles, frame_rf, pool_rf, rf_values, snr_db
+from rfgs_core.dataset.splits import HeldOut
+from rfgs_core.evaluate.rf import frame_rf, pool_rf, rf_values, snr_db
+from rfgs_core.radio import Layout
 
-TX = np.array([0, 1])
-RX = np.repeat([0, 1], 4)
+#: Two devices, each with one transmitting and four receiving elements.
+ELEMENTS = Layout(
+    tx_xyz=np.zeros((2, 3)),
+    rx_xyz=np.zeros((8, 3)),
+    tx_device=np.array([0, 1]),
+    rx_device=np.repeat([0, 1], 4),
+    rx_column=np.tile(np.arange(4), 2),
+    measured=np.ones((2, 8), bool),
+    tx_port=np.zeros(2, int),
+    rx_port=np.zeros(8, int),
+    tx_site=np.array([0, 1]),
+    rx_site=np.repeat([0, 1], 4),
+    tx_quat_wxyz=np.tile([1.0, 0.0, 0.0, 0.0], (2, 1)),
+    rx_quat_wxyz=np.tile([1.0, 0.0, 0.0, 0.0], (8, 1)),
+)
 SPLIT = {"rx_elements": [3, 7], "subcarriers": [5, 6], "device_pairs": [[0, 1]]}
 
 
 def held_out() -> HeldOut:
-    return HeldOut.of(SPLIT, TX, RX, np.ones((2, 8), bool), 16)
+    return HeldOut.of(SPLIT, ELEMENTS, 16)
 
 
 def channel(seed: int = 0) -> np.ndarray:
@@ -21,7 +36,7 @@ def channel(seed: int = 0) -> np.ndarray:
 
 
 def score(true: np.ndarray, predicted: np.ndarray) -> dict:
-    return frame_rf(true, predicted, held_out(), TX, RX)
+    return frame_rf(true, predicted, held_out(), ELEMENTS)
 
 
 def test_kinds_of_held_out_entries_do_not_overlap() -> None:
@@ -71,12 +86,6 @@ def test_errors_of_visible_entries_do_not_count() -> None:
     assert values["element_snr_db"] is not None and values["element_snr_db"] > 100
     assert values["subcarrier_snr_db"] is not None and values["subcarrier_snr_db"] > 100
     assert values["device_gain_mae_db"] == pytest.approx(0.0)
-
-
-def test_delay_profile_of_one_path_peaks_at_its_delay() -> None:
-    tone = np.arange(64)
-    csi = np.exp(-2j * np.pi * tone * 10 / 64)[None]
-    assert delay_profiles(csi)[0].argmax() == 10
 
 
 def test_delay_profiles_of_different_paths_do_not_correlate() -> None:

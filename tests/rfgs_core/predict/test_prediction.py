@@ -7,20 +7,20 @@ import numpy as np
 import pytest
 import torch
 
+from rfgs_core.measure.observations import observe
+from rfgs_core.model.channel import Channel
 from rfgs_core.predict.antennas import receiving_array
 from rfgs_core.predict.echoes import echoes_at, reflectors
 from rfgs_core.predict.prediction import predict_channel
 from rfgs_core.predict.spectra import (
     arrival_power,
     beam_power,
-    delay_profile,
+    profile_over_delay,
     sky_cells,
 )
 from rfgs_core.radio import preset
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.run import Run
-from rfgs_core.train.channel import Channel
-from rfgs_core.train.observations import observe
 
 FREQ_HZ = preset("wifi").freq_hz
 TX = np.array([0.0, 0.0, 1.0])
@@ -44,7 +44,7 @@ def test_one_gaussian_gives_the_radar_equation(make_points) -> None:
 
 def test_its_delay_profile_peaks_at_its_delay_with_its_amplitude(make_points) -> None:
     prediction = predict_channel(make_points([POINT], [0.3]), TX, RX[:, None], FREQ_HZ)
-    profile, delay_s = delay_profile(prediction.csi_scatter[:, 0], FREQ_HZ)
+    profile, delay_s = profile_over_delay(prediction.csi_scatter[:, 0], FREQ_HZ)
     length_m = np.linalg.norm(POINT - TX) + np.linalg.norm(POINT - RX, axis=1)
     peak = profile.argmax(axis=1)
     step_s = delay_s[1]

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mesh_pictures import MeshPicture, rasterize_mesh
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from dataset_factory.scene.bundle import Bundle, read_bundle
 from rfgs_core.dataset.pictures import read_exr
 from rfgs_core.render.cameras import Camera
-from rfgs_core.render.meshes import MeshPicture, rasterize_mesh
 
 pytest.importorskip("bpy")
 

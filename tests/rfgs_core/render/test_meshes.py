@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from mesh_pictures import rasterize_mesh
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from rfgs_core.dataset import open_dataset
 from rfgs_core.errors import RfgsFormatError
-from rfgs_core.render.meshes import rasterize_mesh
 from rfgs_core.render.view import camera_of
 
 

@@ -13,9 +13,9 @@ from rfgs_core.dataset import Sequence, open_dataset
 from rfgs_core.files import write_json
 from rfgs_core.gaussians import FEATURE_DIM, Gaussians
 from rfgs_core.gaussians.ply import cloud_of, write_ply
+from rfgs_core.model.head import RadioHead
 from rfgs_core.render.shader import Shader
 from rfgs_core.run.folder import SCHEMA, relative_dataset
-from rfgs_core.train.head import RadioHead
 
 #: Static Gaussians, which have no radio values of their own.
 STATIC = 3

@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whether a body stands or sits, and where its knees point: the likeliest of a few.
+
+Gaussians of equal expected power, drawn as for the fit, make the channel of a device pair a normal
+vector of covariance s (A Aᴴ + n I), A their responses. Its likelihood, at the best level s and
+share of noise n, is exact and needs no reflectivities (the evidence of a linear model; MacKay,
+Neural Computation 4(3), 1992). It tells postures apart where powers per height do not, since it
+knows which echoes fit together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Complex64, Float, Float64
+from scipy.linalg import eigh
+
+from rfgs_core.bodies.body_prior import Bodies, outward_normals
+from rfgs_core.bodies.localise import PairMaps, pair_maps
+from rfgs_core.bodies.separation import each_alone
+from rfgs_core.bodies.start import StartCells
+from rfgs_core.measure.observations import Observations
+from rfgs_core.model.head import SHARPNESS, dimming
+from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.seeds import sub_seed
+from rfgs_core.settings import TrainConfig
+
+#: Gaussians that stand for a body.
+GAUSSIANS = 1500
+#: Entries (links times tones) that are read of all device pairs together, and at most of one at a
+#: time. Of few pairs others are read, with other Gaussians, in several rounds: what one round says
+#: of a single pair may be 100 nat off.
+ENTRIES, MOST_ENTRIES, MOST_ROUNDS = 4096, 256, 4
+#: Links that are read of a pair; the other entries are tones.
+LINKS = 32
+#: Shares of noise that are tried, against the mean power of the echoes.
+NOISE_SHARES = 10.0 ** np.arange(-3.0, 1.01, 0.25)
+#: Directions of knees that are tried.
+DIRECTIONS = 8
+#: Somebody who stands may be this far from the place that was found [m]: legs that point to where
+#: the body truly is would otherwise make up for the error.
+SHIFTS_M = (0.1, 0.2)
+#: What one device pair may say for or against a posture [nat], where there are so many pairs that
+#: others can outvote it: furniture that hides legs or trunk, and noise, mislead some without end.
+MOST_PER_PAIR, FEWEST_PAIRS = 10.0, 8
+#: Evidence that it takes to call somebody seated [nat].
+TO_SIT = 15.0
+
+
+@dataclass(frozen=True)
+class PairSample:
+    """Some visible links and tones of one device pair."""
+
+    tx_xyz: Float64[np.ndarray, "link 3"]
+    """Transmitting elements [m]."""
+    rx_xyz: Float64[np.ndarray, "link 3"]
+    """Receiving elements [m]."""
+    freq_hz: Float64[np.ndarray, "tone"]
+    """Tones [Hz]."""
+    change: Complex64[np.ndarray, "entry"]
+    """Channel change of these links and tones, tones fastest."""
+
+    def log_likelihood(
+        self, points: Float64[np.ndarray, "M 3"], normals: Float64[np.ndarray, "M 3"]
+    ) -> float:
+        """Log evidence of Gaussians of equal power, at their best level and share of noise.
+
+        Zero where nothing is heard, which speaks for no posture.
+        """
+        response = self._responses(points, normals)
+        covariance = response @ response.conj().T
+        level = float(np.trace(covariance).real) / len(covariance)
+        if not (level > 0.0 and self.change.any()):
+            return 0.0
+        eigenvalues, vectors = eigh(covariance / level, lower=True, driver="evd")
+        power = np.abs(vectors.conj().T @ self.change) ** 2
+        variance = np.maximum(eigenvalues, 0.0) + NOISE_SHARES[:, None]
+        # The best s has a closed form: the mean of power over variance.
+        scale = (power / variance).mean(axis=1)
+        log = np.log(scale) + np.log(variance).mean(axis=1) + 1.0
+        return -len(power) * float(log.min())
+
+    def _responses(
+        self, points: Float64[np.ndarray, "M 3"], normals: Float64[np.ndarray, "M 3"]
+    ) -> Complex64[np.ndarray, "entry M"]:
+        """The propagation model's answer of each link and tone to each Gaussian of γ = 1.
+
+        Without its factor λ/(4π)^{3/2}, which hardly differs within a band: levels are fitted.
+        """
+        out_m, lit = _leg(self.tx_xyz, points, normals)
+        back_m, heard = _leg(self.rx_xyz, points, normals)
+        turns = (self.freq_hz[:, None] / SPEED_OF_LIGHT) * (out_m + back_m)[:, None]
+        # Whole turns go in double precision: paths have thousands of wavelengths.
+        phase = (-2 * np.pi * (turns - np.round(turns))).astype(np.float32)
+        response = (lit * heard)[:, None].astype(np.float32) * np.exp(1j * phase)
+        return response.reshape(-1, len(points))
+
+
+def _leg(
+    antennas: Float64[np.ndarray, "link 3"],
+    points: Float64[np.ndarray, "M 3"],
+    normals: Float64[np.ndarray, "M 3"],
+) -> tuple[Float64[np.ndarray, "link M"], Float64[np.ndarray, "link M"]]:
+    """Distance [m], and visibility over distance, between antennas and Gaussians."""
+    towards = antennas[:, None] - points
+    distance = np.linalg.norm(towards, axis=2)
+    facing = np.einsum("lmk,mk->lm", towards, normals) / distance
+    return distance, 1.0 / (distance * dimming(SHARPNESS * facing))
+
+
+def pair_samples(observations: Observations, seed: int) -> list[PairSample]:
+    """Entries of each device pair, drawn by chance, in units of their root mean square."""
+    rng = np.random.default_rng(seed)
+    pair, names = observations.pairs
+    visible = np.flatnonzero(observations.tones)
+    entries = min(ENTRIES // max(len(names), 1), MOST_ENTRIES)
+    result = []
+    for index in range(len(names)):
+        tx, rx = np.nonzero(pair == index)
+        count = min(len(tx), LINKS)
+        link = np.sort(rng.choice(len(tx), count, replace=False))
+        tone = rng.choice(visible, min(len(visible), max(entries // count, 4)), replace=False)
+        tx, rx, tone = tx[link], rx[link], np.sort(tone)
+        change = observations.delta[tx[:, None], rx[:, None], tone].ravel()
+        scale = np.sqrt(np.mean(np.abs(change) ** 2)) or 1.0
+        ends = observations.layout.tx_xyz[tx], observations.layout.rx_xyz[rx]
+        freq_hz = observations.freq_hz[tone]
+        result.append(PairSample(*ends, freq_hz, (change / scale).astype(np.complex64)))
+    return result
+
+
+def tell_postures(
+    observations: Observations,
+    maps: PairMaps,
+    axes_xy: Float64[np.ndarray, "body 2"],
+    config: TrainConfig,
+    seed: int,
+) -> Bodies:
+    """Who stands and who sits, of bodies whose places are known.
+
+    Args:
+        observations: The frame; without phases all are taken to stand.
+        maps: Its matched-filter maps.
+        axes_xy: Where bodies are [m].
+        config: How reflectivities are fitted, and whether postures are told at all.
+        seed: Seed of the Gaussians that stand for bodies.
+    """
+    if config.posture == "standing" or observations.kind != "complex":
+        return Bodies.standing(axes_xy)
+    knees = np.full(len(axes_xy), np.nan)
+    for body, alone in enumerate(each_alone(observations, maps, axes_xy, config, seed)):
+        own_maps = maps if alone is observations else pair_maps(alone)
+        knees[body] = _knees(alone, own_maps, axes_xy[[body]], sub_seed(seed, "posture", body))
+    return Bodies(axes_xy, knees)
+
+
+def _knees(
+    observations: Observations, maps: PairMaps, axis_xy: Float[np.ndarray, "1 2"], seed: int
+) -> float:
+    """Where the knees of one body point [rad]; NaN if it stands."""
+    pairs = max(len(observations.pairs[1]), 1)
+    rounds = int(np.clip(ENTRIES // (pairs * MOST_ENTRIES), 1, MOST_ROUNDS))
+    samples = [pair_samples(observations, sub_seed(seed, number)) for number in range(rounds)]
+    cells = StartCells.around(maps, axis_xy, observations.bounds_m)
+
+    def evidence(bodies: Bodies) -> Float64[np.ndarray, "pair"]:
+        density, logs = cells.density(bodies), []
+        for number, drawn in enumerate(samples):
+            # The same seed for all postures.
+            points = density.draw(GAUSSIANS, np.random.default_rng(sub_seed(seed, number)))
+            normals = outward_normals(points, bodies)
+            logs.append([sample.log_likelihood(points, normals) for sample in drawn])
+        return np.mean(logs, axis=0)
+
+    def seated(knees_rad: float) -> Bodies:
+        return Bodies(axis_xy, np.array([knees_rad]))
+
+    most = MOST_PER_PAIR if pairs >= FEWEST_PAIRS else np.inf
+    step = 2 * np.pi / DIRECTIONS
+    angles = step * np.arange(DIRECTIONS)
+    upright, *sitting = _all(evidence, [Bodies.standing(axis_xy), *map(seated, angles)])
+    best = int(np.argmax([_lead(log, upright, most) for log in sitting]))
+    if _lead(sitting[best], upright, most) <= TO_SIT:
+        return np.nan
+    around = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    shifted = [Bodies.standing(axis_xy + far * away) for far in SHIFTS_M for away in around]
+    rivals = [upright, *_all(evidence, shifted)]
+    rival = max(rivals, key=lambda log: _lead(log, upright, most))
+    if _lead(sitting[best], rival, most) <= TO_SIT:
+        return np.nan
+    between = [step * (best - 0.5), step * (best + 0.5)]
+    found = [(sitting[best], angles[best])]
+    found += zip(_all(evidence, [*map(seated, between)]), between, strict=True)
+    likeliest = max(found, key=lambda row: _lead(row[0], upright, most))
+    return float(likeliest[1] % (2 * np.pi))
+
+
+def _lead(
+    log: Float64[np.ndarray, "pair"], other: Float64[np.ndarray, "pair"], most: float
+) -> float:
+    """By how much one posture's evidence is above another's, with at most `most` per pair [nat]."""
+    return float(np.clip(log - other, -most, most).sum())
+
+
+def _all(
+    evidence: Callable[[Bodies], Float64[np.ndarray, "pair"]], bodies: list[Bodies]
+) -> list[Float64[np.ndarray, "pair"]]:
+    """Evidence of each; numpy lets other threads go on while it multiplies."""
+    with ThreadPoolExecutor(2) as pool:
+        return list(pool.map(evidence, bodies))

@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Filling hidden channel entries from visible ones: what all interpolating controls share.
+
+Three kinds of entries are hidden: array columns, tones and whole device pairs. Tones and
+columns keep the phase; a pair of other devices has a phase of its own that nothing visible
+determines, so only the level of the nearest visible pair's channel is adapted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from jaxtyping import Complex, Float, Int
+
+from rfgs_core.evaluate.evidence import ControlResult, Evidence
+from rfgs_core.radio import Layout
+from rfgs_core.radio.levels import decibels, power_of
+
+#: Values at `wanted` coordinates from values at `known` ones: (values [known, sample], known
+#: [known, dim], wanted [wanted, dim]) to [wanted, sample].
+Interpolator = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+
+WHY_NO_SCORE = "interpolates channels and says nothing about space"
+
+
+def interpolating_control(
+    evidence: Evidence, along: Interpolator, level_db: Interpolator | None
+) -> ControlResult:
+    """Fills csi − csi_static and csi_static alike.
+
+    Args:
+        evidence: The frame.
+        along: Interpolates complex values along columns and along tones.
+        level_db: Interpolates mean power [dB] between device pairs, whose coordinates are both
+            device positions [m]; None keeps the level of the nearest pair.
+    """
+    return ControlResult(
+        delta=fill(evidence.delta, evidence, along, level_db),
+        static=fill(evidence.static, evidence, along, level_db),
+        reason=WHY_NO_SCORE,
+    )
+
+
+def fill(
+    field: Complex[np.ndarray, "tx rx subcarrier"],
+    evidence: Evidence,
+    along: Interpolator,
+    level_db: Interpolator | None = None,
+) -> Complex[np.ndarray, "tx rx subcarrier"]:
+    """A field without NaN: hidden entries interpolated, links that are not measured zero."""
+    layout, tone_visible = evidence.layout, evidence.tone_visible
+    out = np.zeros_like(field)
+    pairs: dict[tuple[int, int], np.ndarray] = {}
+    for (a, b), (tx, rx) in _device_blocks(layout).items():
+        seen = evidence.link_visible[np.ix_(tx, rx)].any(axis=0)
+        if not seen.any():
+            continue
+        block = _fill_tones(field[np.ix_(tx, rx[seen])], tone_visible, along)
+        block = _fill_columns(block, layout.rx_column[rx], seen, along)
+        out[np.ix_(tx, rx)] = pairs[a, b] = block
+    _fill_pairs(out, pairs, evidence, level_db)
+    out[~layout.measured] = 0.0
+    return out
+
+
+def completed(
+    predicted: Complex[np.ndarray, "tx rx subcarrier"],
+    field: Complex[np.ndarray, "tx rx subcarrier"],
+    evidence: Evidence,
+    along: Interpolator,
+) -> Complex[np.ndarray, "tx rx subcarrier"]:
+    """A prediction and what it leaves of a field's visible entries, interpolated.
+
+    Between devices that heard nothing of each other the prediction stays as it is.
+    """
+    left = field - np.where(np.isnan(field), 0.0, predicted)
+    residual = fill(left.astype(np.complex64), evidence, along)
+    for tx, rx in _device_blocks(evidence.layout).values():
+        block = np.ix_(tx, rx)
+        if not evidence.link_visible[block].any():
+            residual[block] = 0.0
+    return predicted + residual
+
+
+def _device_blocks(layout: Layout) -> dict[tuple[int, int], tuple[np.ndarray, np.ndarray]]:
+    """Elements of each ordered pair of devices that has a measured link."""
+    blocks = {}
+    for a in np.unique(layout.tx_device):
+        for b in np.unique(layout.rx_device):
+            tx, rx = np.flatnonzero(layout.tx_device == a), np.flatnonzero(layout.rx_device == b)
+            if layout.measured[np.ix_(tx, rx)].any():
+                blocks[int(a), int(b)] = (tx, rx)
+    return blocks
+
+
+def _fill_tones(
+    block: Complex[np.ndarray, "tx rx subcarrier"],
+    tone_visible: np.ndarray,
+    along: Interpolator,
+) -> Complex[np.ndarray, "tx rx subcarrier"]:
+    """Fills hidden tones of links that are otherwise visible."""
+    tones = np.arange(block.shape[2], dtype=np.float64)[:, None]
+    out = np.nan_to_num(block, nan=0.0)
+    if not tone_visible.all():
+        values = block[:, :, tone_visible].reshape(-1, int(tone_visible.sum())).T
+        filled = along(values, tones[tone_visible], tones[~tone_visible])
+        out[:, :, ~tone_visible] = filled.T.reshape(*block.shape[:2], -1)
+    return out
+
+
+def _fill_columns(
+    visible: Complex[np.ndarray, "tx seen subcarrier"],
+    column: Int[np.ndarray, "rx"],
+    seen: np.ndarray,
+    along: Interpolator,
+) -> Complex[np.ndarray, "tx rx subcarrier"]:
+    """Fills hidden columns of one device's array, each row from its own visible elements."""
+    num_tx, _, num_tones = visible.shape
+    out = np.zeros((num_tx, len(column), num_tones), dtype=visible.dtype)
+    out[:, seen] = visible
+    hidden = np.flatnonzero(~seen)
+    if len(hidden) == 0:
+        return out
+    known_columns, wanted_columns = np.unique(column[seen]), np.unique(column[hidden])
+    # Elements are numbered column by column, so reshaping gives rows in equal order.
+    by_column = np.stack([out[:, column == c] for c in known_columns])
+    filled = along(
+        by_column.reshape(len(known_columns), -1),
+        known_columns[:, None].astype(np.float64),
+        wanted_columns[:, None].astype(np.float64),
+    ).reshape(len(wanted_columns), *by_column.shape[1:])
+    for index, c in enumerate(wanted_columns):
+        out[:, column == c] = filled[index]
+    return out
+
+
+def _fill_pairs(
+    out: Complex[np.ndarray, "tx rx subcarrier"],
+    pairs: dict[tuple[int, int], np.ndarray],
+    evidence: Evidence,
+    level_db: Interpolator | None,
+) -> None:
+    """Fills hidden device pairs in place from the nearest visible one."""
+    blocks = _device_blocks(evidence.layout)
+    hidden = [pair for pair in blocks if pair not in pairs]
+    if not hidden or not pairs:
+        return
+    where = {pair: _pair_position(evidence.layout, *pair) for pair in blocks}
+    names = list(pairs)
+    known = np.stack([where[name] for name in names])
+    power = np.array([np.mean(np.abs(pairs[name]) ** 2) for name in names])
+    for pair in hidden:
+        nearest = int(np.argmin(np.linalg.norm(known - where[pair], axis=1)))
+        value = pairs[names[nearest]]
+        if level_db is not None and (power > 0.0).all():
+            level = level_db(decibels(power, least=0.0)[:, None], known, where[pair][None])[0, 0]
+            value = value * np.sqrt(power_of(level) / power[nearest])
+        tx, rx = blocks[pair]
+        out[np.ix_(tx, rx)] = value
+
+
+def _pair_position(layout: Layout, a: int, b: int) -> Float[np.ndarray, "6"]:
+    """Centres of the transmitting and of the receiving array [m]."""
+    return np.concatenate(
+        [
+            layout.tx_xyz[layout.tx_device == a].mean(axis=0),
+            layout.rx_xyz[layout.rx_device == b].mean(axis=0),
+        ]
+    )

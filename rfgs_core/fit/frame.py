@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The fit of one frame, in named stages: locate, posture, draw, power, reflectivity, refine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Complex, Complex64, Float, Float64, Int64
+from torch import Tensor
+
+from rfgs_core.bodies.body_prior import outward_normals
+from rfgs_core.bodies.localise import PairMaps, locate_bodies, pair_maps
+from rfgs_core.bodies.pace import novelty, paces_m_s, wanted_counts
+from rfgs_core.bodies.posture import tell_postures
+from rfgs_core.bodies.separation import tell_apart
+from rfgs_core.bodies.start import StartCells
+from rfgs_core.bodies.tracks import Tracks
+from rfgs_core.bodies.warm_start import Moving, at_pace, carry_over
+from rfgs_core.device import on_device
+from rfgs_core.encode import MATCHED_FILTER, Encoder
+from rfgs_core.errors import RfgsError
+from rfgs_core.fit.sampling import encode
+from rfgs_core.gaussians import Gaussians
+from rfgs_core.measure.observations import Observations
+from rfgs_core.model.channel import Channel
+from rfgs_core.model.first_gaussians import gaussians_at
+from rfgs_core.model.first_powers import fit_power, new_head
+from rfgs_core.model.head import RadioHead
+from rfgs_core.model.reflectivity import fitted_reflectivities
+from rfgs_core.seeds import sub_seed
+from rfgs_core.settings import TrainConfig
+
+
+@dataclass(frozen=True)
+class FrameState:
+    """The moving Gaussians of one frame and what the next one starts from."""
+
+    gaussians: Gaussians
+    """Moving Gaussians."""
+    power: Float[Tensor, "M"]
+    """Reflected power of each, the prior variance of its reflectivity [m²]."""
+    head: RadioHead
+    """Decodes reflectivity and ρ from the features."""
+    tracks: Tracks
+    """Where the bodies are and how they move."""
+    track_id: Int64[np.ndarray, "M"]
+    """Number that a Gaussian keeps from frame to frame."""
+
+    goes_on: Bool[np.ndarray, "M"] | None = None
+    """Which Gaussians were there in the frame before; None in a first frame."""
+
+    next_track: int = 0
+    """Numbers below it were given out, some of them to Gaussians that are gone."""
+
+    @property
+    def unused_track(self) -> int:
+        """The first number that no Gaussian has had."""
+        return max(self.next_track, int(self.track_id.max(initial=-1)) + 1)
+
+    @property
+    def moving(self) -> Moving:
+        """What the next frame starts from."""
+        means = self.gaussians.means.numpy().astype(np.float64)
+        power = self.power.numpy().astype(np.float64)
+        return Moving(means, self.tracks.bodies, power, self.track_id, self.unused_track)
+
+    @property
+    def gamma(self) -> Complex[Tensor, "M"]:
+        """Complex reflectivity of each Gaussian [m]."""
+        return self.head.gamma(self.gaussians.features)
+
+
+def start_frame(
+    observations: Observations,
+    config: TrainConfig,
+    seed: int,
+    before: FrameState | None,
+    encoder: Encoder = MATCHED_FILTER,
+    earlier: Observations | None = None,
+) -> FrameState:
+    """Locates the bodies, tells how they hold themselves and draws Gaussians.
+
+    From frame to frame all Gaussians move along with their body; the third that the new
+    channel supports least is drawn anew and gets new track numbers, and so is whoever has sat
+    down or stood up. With `--density motion` their number then follows the bodies' pace.
+
+    Args:
+        observations: The frame.
+        config: Settings.
+        seed: Seed of the draws.
+        before: The fitted frame before; None in a first one.
+        encoder: φ.
+        earlier: What was observed then; only `--density motion` reads it.
+
+    Raises:
+        RfgsError: Nobody changes the channel.
+    """
+    if not observations.changed:
+        raise RfgsError(
+            "the channel of this frame is that of the empty scene, or lost in noise: nobody is in "
+            "it; choose other --frames, or generate the dataset with a larger --depth or more "
+            "--packets-per-frame"
+        )
+    rng = np.random.default_rng(seed)
+    maps = pair_maps(observations)
+    tracks = _followed(before, maps, observations, config, seed)
+    bodies = tell_postures(observations, maps, tracks.axes_xy, config, seed)
+    tracks = replace(tracks, knees_rad=bodies.knees_rad)
+    cells = StartCells.around(maps, bodies.axes_xy, observations.bounds_m)
+    density = cells.density(bodies)
+    points = density.draw(config.num_gaussians, rng)
+    track_id, goes_on, next_track = np.arange(len(points), dtype=np.int64), None, 0
+    if before is not None:
+        points, track_id = carry_over(before.moving, bodies, cells, density, points, rng)
+        if config.density == "motion" and earlier is not None:
+            pace_m_s = paces_m_s(tracks, novelty(observations, earlier))
+            wanted = wanted_counts(config.num_gaussians, pace_m_s)
+            points, track_id = at_pace(
+                *(before.moving, bodies, cells, wanted, points, track_id, rng)
+            )
+        goes_on, next_track = np.isin(track_id, before.track_id), before.unused_track
+    head = None if before is None else before.head
+    normals = outward_normals(points, bodies)
+    state = state_at(points, normals, observations, config, tracks, encoder, head)
+    return replace(state, track_id=track_id, goes_on=goes_on, next_track=next_track)
+
+
+def state_at(
+    points: Float64[np.ndarray, "M 3"],
+    normals: Float64[np.ndarray, "M 3"],
+    observations: Observations,
+    config: TrainConfig,
+    tracks: Tracks,
+    encoder: Encoder = MATCHED_FILTER,
+    head: RadioHead | None = None,
+) -> FrameState:
+    """Gaussians at given places with their first powers, which reflect nothing yet.
+
+    Args:
+        points: Where they are [m].
+        normals: How they face.
+        observations: The frame.
+        config: Settings.
+        tracks: Where the bodies are.
+        encoder: φ.
+        head: The head of the frame before; None makes one.
+    """
+    gaussians = gaussians_at(points, normals)
+    power = fit_power(observations, gaussians)
+    head = head or new_head(observations, config, power)
+    features = head.without_readings(encode(observations, points, encoder).features)
+    track_id = np.arange(len(points), dtype=np.int64)
+    return FrameState(replace(gaussians, features=features), power, head, tracks, track_id)
+
+
+def _followed(
+    before: FrameState | None,
+    maps: PairMaps,
+    observations: Observations,
+    config: TrainConfig,
+    seed: int,
+) -> Tracks:
+    """Finds the bodies, anywhere in a first frame, where they are expected in a later one."""
+    bounds_m, time_s = observations.bounds_m, observations.time_s
+    if before is None:
+        axes_xy = locate_bodies(maps, bounds_m, config.bodies)
+        return Tracks.begun(tell_apart(observations, maps, axes_xy, config, seed), time_s)
+    near, reach_m = before.tracks.expected(time_s)
+    axes_xy = locate_bodies(maps, bounds_m, config.bodies, near, reach_m)
+    axes_xy = tell_apart(observations, maps, axes_xy, config, seed, near, reach_m)
+    return before.tracks.moved(axes_xy, time_s)
+
+
+def solve_reflectivity(
+    observations: Observations, state: FrameState, config: TrainConfig
+) -> FrameState:
+    """Writes posterior-mean reflectivities into the features.
+
+    Powers per delay know nothing of phases: there each Gaussian gets the root of its reflected
+    power and a phase drawn for it, the model that the power fit assumes.
+    """
+    there = on_device(state, config.device)
+    gamma = fitted_reflectivities(
+        *(observations, there.head, there.gaussians, there.power),
+        *(config.unexplained, config.solver_steps),
+    )
+    gamma = _drawn_phases(state, config.seed) if gamma is None else gamma.cpu()
+    features = state.head.with_gamma(state.gaussians.features, gamma)
+    return replace(state, gaussians=replace(state.gaussians, features=features))
+
+
+def solved_frame(
+    observations: Observations, config: TrainConfig, seed: int, before: FrameState | None = None
+) -> FrameState:
+    """A started frame with its reflectivities, not refined."""
+    state = start_frame(observations, config, seed, before)
+    return solve_reflectivity(observations, state, config)
+
+
+def explained_change(
+    observations: Observations, state: FrameState
+) -> Complex64[np.ndarray, "tx rx subcarrier"]:
+    """What the Gaussians explain of the visible entries."""
+    channel = Channel.of(observations, observations.links, observations.tones)
+    with torch.no_grad():
+        predicted = channel.change(state.head, state.gaussians)
+    return observations.with_entries(predicted.numpy()).delta
+
+
+def _drawn_phases(state: FrameState, seed: int) -> Complex[Tensor, "M"]:
+    """√p with uniform phases; a track keeps its phase from frame to frame."""
+    rng = np.random.default_rng(sub_seed(seed, "phase"))
+    phase = torch.from_numpy(rng.uniform(0, 2 * np.pi, int(state.track_id.max()) + 1)).float()
+    return torch.polar(state.power.sqrt(), phase[torch.from_numpy(state.track_id)])

@@ -1,0 +1,284 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Gradient descent on the Gaussians of one frame: the paper's losses, the channel's, or both."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import torch
+from jaxtyping import Float, Int64
+from torch import Tensor
+
+from rfgs_core.arrays import load_arrays, save_arrays
+from rfgs_core.device import Device, on_device
+from rfgs_core.encode import MATCHED_FILTER, Encoder
+from rfgs_core.errors import RfgsError
+from rfgs_core.fit.density import (
+    DensityControl,
+    DensityRule,
+    NoDensity,
+    PaperDensity,
+    ResidualDensity,
+    ResidualRule,
+    StandardDensity,
+    StandardRule,
+)
+from rfgs_core.fit.frame import FrameState
+from rfgs_core.fit.last_finite import LastFinite
+from rfgs_core.fit.losses import SamplePoints, channel_loss, paper_loss
+from rfgs_core.fit.parameters import GAUSSIAN_SHAPES, LearningRates, TrainableGaussians
+from rfgs_core.fit.sampling import sample_points
+from rfgs_core.fit.temporal import Continuity
+from rfgs_core.gaussians import Gaussians
+from rfgs_core.measure.observations import Observations
+from rfgs_core.model.channel import Channel
+from rfgs_core.model.comparison import Comparison, comparison_of
+from rfgs_core.model.first_powers import noise_per_link
+from rfgs_core.seeds import sub_seed
+from rfgs_core.settings import TrainConfig
+
+#: Our rates for the channel loss: positions move by fractions of a wavelength.
+CHANNEL_RATES = LearningRates(
+    means=5e-4, log_scales=2e-3, quats=1e-3, features=1e-2, logit_opacities=2e-2
+)
+#: Adam steps between checkpoints within a frame.
+CHECKPOINT_EVERY = 1000
+
+
+@dataclass(frozen=True)
+class Task:
+    """What one frame's descent compares with."""
+
+    channel: Channel
+    """Visible links and tones."""
+    comparison: Comparison
+    """The terms in which the change is reported."""
+    target: Tensor
+    """Channel change to explain, (link, entry), in those terms."""
+    noise: Float[Tensor, "link"]
+    """Variance per link that need not be explained."""
+    points: SamplePoints | None
+    """Sample points of the paper's losses; None without them."""
+    weighted: bool
+    """Whether eq. 5 weighs its points by ‖φ‖."""
+
+    def on(self, device: Device) -> Task:
+        """The task for Gaussians on a device; links and paths go there when they are used."""
+        return replace(on_device(self, device), channel=self.channel)
+
+    @staticmethod
+    def of(observations: Observations, config: TrainConfig, seed: int, encoder: Encoder) -> Task:
+        """Gathers what the objective needs."""
+        points = None
+        if config.objective != "csi":
+            rng = np.random.default_rng(seed)
+            points = sample_points(
+                observations, config.grid_side, rng, encoder, config.refine_levels
+            )
+        comparison = comparison_of(observations)
+        target = comparison.measured()
+        return Task(
+            Channel.of(observations, observations.links, observations.tones),
+            comparison,
+            target,
+            noise_per_link(observations, target, config.unexplained),
+            points,
+            "rf_weights" not in config.without,
+        )
+
+
+def _batch(task: Task, config: TrainConfig, seed: int, step: int) -> tuple[np.ndarray, Tensor]:
+    """Links and sample points of a step; a function of the step, so that resuming is exact."""
+    rng = np.random.default_rng(sub_seed(seed, "batch", step))
+    count = len(task.channel.links)
+    wanted = max(1, config.batch_entries // task.channel.tones.num_selected)
+    links = np.sort(rng.choice(count, min(wanted, count), replace=False))
+    size = 0 if task.points is None else len(task.points.xyz)
+    points = rng.choice(size, min(config.batch_points, size), replace=False) if size else []
+    return links, torch.as_tensor(np.asarray(points, dtype=np.int64))
+
+
+def _loss(
+    task: Task,
+    state: FrameState,
+    gaussians: Gaussians,
+    links: np.ndarray,
+    points: SamplePoints | None,
+) -> Float[Tensor, ""]:
+    loss = gaussians.means.new_zeros(())
+    if points is not None:
+        loss = loss + paper_loss(gaussians, points, task.weighted)
+    if len(links):
+        part = task.channel.rows(links)
+        predicted = task.comparison.predicted(part.change(state.head, gaussians), links)
+        loss = loss + channel_loss(predicted, task.target[links], task.noise[links])
+    return loss
+
+
+def refine(
+    observations: Observations,
+    state: FrameState,
+    config: TrainConfig,
+    seed: int,
+    checkpoint: Path | None = None,
+    on_step: Callable[[float, int], None] | None = None,
+    encoder: Encoder = MATCHED_FILTER,
+    scalars: Callable[[int, Mapping[str, float]], None] | None = None,
+) -> FrameState:
+    """Descends the objective of `config` for `config.iterations` steps.
+
+    Args:
+        observations: Visible channel of the frame.
+        state: Where to start.
+        config: Objective, steps and batch sizes.
+        seed: Seed of batches and line points.
+        checkpoint: File to resume from and to save to; None keeps nothing.
+        on_step: Called with loss and number of Gaussians after each step.
+        encoder: φ of the sample points.
+        scalars: Takes the finished steps and values to log.
+
+    Raises:
+        RfgsError: The loss is not a number; the last good state is then in `checkpoint`.
+    """
+    task = Task.of(observations, config, seed, encoder).on(config.device)
+    before, state = state, on_device(state, config.device)
+    rates = LearningRates() if config.recipe == "paper" else CHANNEL_RATES
+    trained, first, memory = _resume(checkpoint, state.gaussians, rates)
+    density = density_control(observations, state, config, seed, task)
+    density.resume(memory)
+    last_finite, continuity = LastFinite(checkpoint), _continuity(state, config)
+    for step in range(first + 1, config.iterations + 1):
+        links, chosen = _batch(task, config, seed, step)
+        links = links if config.objective != "paper" else links[:0]
+        points = None if task.points is None else task.points.rows(chosen)
+        loss = _loss(task, state, trained.gaussians, links, points)
+        if continuity is not None:
+            loss = loss + continuity.loss(trained.gaussians, trained.origin)
+        if not torch.isfinite(loss):
+            last_finite.stop(step, loss, task.target, trained)
+        last_finite.remember(partial(_arrays, step - 1, trained, density))
+        trained.optimiser.zero_grad()
+        loss.backward()
+        trained.optimiser.step()
+        density.after_step(step, trained, points)
+        if checkpoint is not None and step % CHECKPOINT_EVERY == 0:
+            save_arrays(checkpoint, _arrays(step, trained, density))
+        if scalars is not None:
+            scalars(step, {"loss": float(loss.detach()), "Gaussians": len(trained.gaussians)})
+        if on_step is not None:
+            on_step(float(loss.detach()), len(trained.gaussians))
+    return _with_gaussians(before, trained, config)
+
+
+def _continuity(state: FrameState, config: TrainConfig) -> Continuity | None:
+    if state.goes_on is None or config.temporal == 0.0:
+        return None
+    means = state.gaussians.means.detach().clone()
+    goes_on = torch.from_numpy(state.goes_on).to(means.device)
+    return Continuity(means, goes_on, config.temporal)
+
+
+def need_sample_points(config: TrainConfig) -> None:
+    """Refuses the paper's density rule where nothing gives it sample points.
+
+    Raises:
+        RfgsError: It is asked for without the paper's losses.
+    """
+    if config.density == "paper" and config.objective == "csi":
+        raise RfgsError(
+            "--density paper reads the sample points of the paper's losses; expected "
+            "--objective paper or both, or another --density"
+        )
+
+
+def density_control(
+    observations: Observations, state: FrameState, config: TrainConfig, seed: int, task: Task
+) -> DensityControl:
+    """The density control of the settings.
+
+    Raises:
+        RfgsError: The paper's rule is asked for without the paper's losses.
+    """
+    need_sample_points(config)
+    kind = config.density or ("none" if task.points is None else "paper")
+    if kind == "paper":
+        return PaperDensity(DensityRule.without(config.without))
+    if kind == "3dgs":
+        layout = observations.layout
+        antennas = np.concatenate([layout.tx_xyz, layout.rx_xyz])
+        radius_m = np.linalg.norm(antennas - antennas.mean(axis=0), axis=1).max()
+        return StandardDensity(StandardRule.for_steps(config.iterations), 1.1 * radius_m, seed)
+    if kind == "residual":
+        return ResidualDensity(
+            *(ResidualRule(), observations, task.channel, task.comparison, task.noise),
+            *(state.head, state.tracks.bodies, config.iterations),
+        )
+    return NoDensity()
+
+
+def _arrays(
+    step: int, trained: TrainableGaussians, density: DensityControl
+) -> dict[str, np.ndarray]:
+    """All that resuming after `step` steps needs."""
+    memory = {f"density.{name}": value for name, value in density.state().items()}
+    return {**trained.state(), **memory, "finished_steps": np.array(step)}
+
+
+def _resume(
+    checkpoint: Path | None, start: Gaussians, rates: LearningRates
+) -> tuple[TrainableGaussians, int, dict[str, Tensor]]:
+    if checkpoint is None or not checkpoint.exists():
+        return TrainableGaussians(start, rates), 0, {}
+    arrays = load_arrays(
+        checkpoint,
+        "delete it to start this frame over",
+        {**GAUSSIAN_SHAPES, "edited": (), "origin": ("M",), "finished_steps": ()},
+    )
+    mark, device = "density.", start.means.device
+    memory = {
+        name.removeprefix(mark): torch.from_numpy(value.copy()).to(device)
+        for name, value in arrays.items()
+        if name.startswith(mark)
+    }
+    trained = TrainableGaussians.restore(arrays, rates, device)
+    return trained, int(arrays["finished_steps"]), memory
+
+
+def _with_gaussians(
+    state: FrameState, trained: TrainableGaussians, config: TrainConfig
+) -> FrameState:
+    """The state with the trained Gaussians; what came anew has its own power and track.
+
+    With the paper's objective features are no reflectivities, and all powers are new.
+    """
+    gaussians = on_device(trained.gaussians.detach(), state.gaussians.means.device)
+    if not trained.edited:
+        return replace(state, gaussians=gaussians)
+    origin = trained.origin.to(gaussians.means.device)
+    unused = state.unused_track
+    tracks = {"track_id": _tracks(state.track_id, origin.numpy(), unused), "next_track": unused}
+    if config.objective == "paper":
+        strength = torch.linalg.norm(gaussians.features, dim=1) ** 2 * gaussians.opacities
+        power = strength * state.head.gamma_scale_m**2
+        return replace(state, gaussians=gaussians, power=power, **tracks)
+    known = origin >= 0
+    shares = torch.bincount(origin[known], minlength=len(state.power)).clamp(min=1)
+    inherited = (state.power / shares)[origin.clamp(min=0)]
+    power = torch.where(known, inherited, state.head.gamma(gaussians.features).abs() ** 2)
+    return replace(state, gaussians=gaussians, power=power, **tracks)
+
+
+def _tracks(
+    before: Int64[np.ndarray, "start"], origin: Int64[np.ndarray, "M"], unused: int
+) -> Int64[np.ndarray, "M"]:
+    """Track numbers of rows: the first that stems from an earlier one goes on, others are new."""
+    track_id = np.full(len(origin), -1, dtype=np.int64)
+    earlier, first = np.unique(origin, return_index=True)
+    track_id[first[earlier >= 0]] = before[earlier[earlier >= 0]]
+    fresh = track_id < 0
+    track_id[fresh] = unused + np.arange(int(fresh.sum()))
+    return track_id

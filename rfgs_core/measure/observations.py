@@ -1,0 +1,257 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What one frame's training may see: the channel less everything that is held out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from jaxtyping import Bool, Complex, Complex64, Float32, Float64, Int64
+
+from rfgs_core.dataset.observed import Observed, observed_packets
+from rfgs_core.dataset.splits import HeldOut
+from rfgs_core.encode.matched_filter import device_pairs
+from rfgs_core.errors import RfgsError
+from rfgs_core.measure.packets import change_of_packets
+from rfgs_core.measure.phase_free import (
+    delay_amplitude,
+    direct_amplitude,
+    direct_wave,
+    hologram,
+)
+from rfgs_core.radio import Layout
+from rfgs_core.settings import Observe, Packets, TrainConfig
+
+if TYPE_CHECKING:
+    from rfgs_core.dataset import Sequence
+
+
+#: What a radio reports of a channel; the last axis is subcarrier or delay.
+Reported = Complex64[np.ndarray, "tx rx entry"] | Float32[np.ndarray, "tx rx entry"]
+
+#: Links and tones that are left when more is hidden than what is held out.
+Kept = tuple[Bool[np.ndarray, "tx rx"], Bool[np.ndarray, "subcarrier"]]
+
+
+@dataclass(frozen=True)
+class Observations:
+    """Channel change of one frame on the links and tones that training may use."""
+
+    delta: Complex64[np.ndarray, "tx rx subcarrier"]
+    """csi − csi_static where visible, zero elsewhere; of powers per tone the hologram of
+    `phase_free`, of powers per delay nothing."""
+    static: Complex64[np.ndarray, "tx rx subcarrier"]
+    """csi_static where visible, zero elsewhere; without phases its amplitude (of powers per
+    delay: that of the direct path) on the phase of the direct path."""
+    links: Bool[np.ndarray, "tx rx"]
+    """Links that training may use."""
+    tones: Bool[np.ndarray, "subcarrier"]
+    """Tones that training may use."""
+    layout: Layout
+    """Antenna elements, and the links that the radio has at all, held out or not."""
+    freq_hz: Float64[np.ndarray, "subcarrier"]
+    """Tone frequencies [Hz], equally spaced."""
+    bounds_m: Float64[np.ndarray, "2 3"]
+    """Scene bounds [m]."""
+    time_s: float = 0.0
+    """When the frame was taken [s]."""
+    kind: Observe = "complex"
+    """What the radio reports."""
+    delay_change: Float32[np.ndarray, "tx rx delay"] | None = None
+    """||h(τ)| − |h₀(τ)|| of each visible link, zero elsewhere; only of powers per delay."""
+    packets: Complex64[np.ndarray, "packet tx rx subcarrier"] | None = None
+    """Change at each packet, estimated from all, zero where hidden; None where one was read."""
+    packet_interval_s: float = 0.0
+    """Time between packets [s]; zero where one was read."""
+
+    @property
+    def changed(self) -> bool:
+        """Whether the frame differs from the empty room at all."""
+        return bool(self.delta.any() if self.delay_change is None else self.delay_change.any())
+
+    @property
+    def centre_hz(self) -> float:
+        """Centre of the band [Hz]."""
+        return float(self.freq_hz.mean())
+
+    @property
+    def monostatic(self) -> bool:
+        """Whether every visible link stays within one device (a radar)."""
+        tx, rx = np.nonzero(self.links)
+        return bool((self.layout.tx_device[tx] == self.layout.rx_device[rx]).all())
+
+    @property
+    def pairs(self) -> tuple[Int64[np.ndarray, "tx rx"], list[tuple[int, int]]]:
+        """Device pair of each visible link (−1 elsewhere) and the list of pairs."""
+        return device_pairs(self.layout.tx_device, self.layout.rx_device, self.links)
+
+    def with_delta(self, delta: Complex64[np.ndarray, "tx rx subcarrier"]) -> Observations:
+        """The same observations with another channel change, for example a residual."""
+        return replace(self, delta=delta.astype(np.complex64), packets=None, packet_interval_s=0.0)
+
+    def with_entries(self, entries: Complex[np.ndarray, "link tone"]) -> Observations:
+        """The same observations with other visible entries of the change, zero where hidden."""
+        delta = np.zeros_like(self.delta)
+        tx, rx = np.nonzero(self.links)
+        delta[tx[:, None], rx[:, None], np.flatnonzero(self.tones)] = entries
+        return self.with_delta(delta)
+
+
+def need_still_antennas(sequence: Sequence, radio: str) -> None:
+    """Refuses radios that training cannot use.
+
+    Raises:
+        RfgsError: The radio's antennas move within a frame.
+    """
+    data = sequence.coordinates(radio)
+    if data["tx_xyz"].ndim != 2 or data["rx_xyz"].ndim != 2:
+        raise RfgsError(
+            f"{sequence.name}, {radio}: the antennas move within a frame, and training takes one "
+            "sample per frame; choose a radio whose antennas stand still"
+        )
+
+
+def packets_to_read(
+    asked: Packets | None, sequence: Sequence, radio: str, config: TrainConfig
+) -> Packets:
+    """Which packets of a frame a run reads; None asks for all where that makes sense.
+
+    Raises:
+        RfgsError: All are asked for where there is one, or where their phases are not known.
+    """
+    count = sequence.radio_spec(radio).samples_per_frame
+    if count == 1:
+        why_not = (
+            f"{sequence.name} holds one packet of {radio} per frame; generate it with "
+            "--packets-per-frame"
+        )
+    elif config.observe != "complex":
+        why_not = f"--observe {config.observe} has no phases to follow from packet to packet"
+    elif config.calibrate != "none":
+        why_not = f"--calibrate {config.calibrate} finds offsets of a frame, not of its packets"
+    else:
+        return asked or "all"
+    if asked == "all":
+        raise RfgsError(f"--packets all: {why_not}; leave --packets out")
+    return "first"
+
+
+def reported(
+    csi: Complex64[np.ndarray, "*link subcarrier"],
+    tones: Bool[np.ndarray, "subcarrier"],
+    kind: Observe,
+) -> Reported:
+    """What a radio reports of a channel: itself, |csi| per tone, or |h(τ)| per link.
+
+    Hidden tones do not enter the delay profile; NaN of a lost packet stays NaN.
+    """
+    if kind == "complex":
+        return csi
+    return np.abs(csi) if kind == "power" else delay_amplitude(csi, tones)
+
+
+def visible_channel(
+    sequence: Sequence, radio: str, frame: int, channel: Observed, packets: Packets = "first"
+) -> tuple[Layout, Bool[np.ndarray, "tx rx"], Bool[np.ndarray, "subcarrier"], np.ndarray]:
+    """Elements, visible links and tones, and the channels of a frame with everything in them.
+
+    Returns:
+        The channels are (packet, tx, rx, subcarrier), NaN where a packet was lost; links that
+        lost all of them are not visible.
+
+    Raises:
+        RfgsError: What is visible is not finite, or the antennas move within a frame.
+    """
+    need_still_antennas(sequence, radio)
+    data = sequence.coordinates(radio)
+    # The links that exist are those the channels were stored with.
+    elements = replace(sequence.layout(radio), measured=data["measured"].values.copy())
+    split = HeldOut.of(sequence.splits["rf"][radio], elements, data.sizes["subcarrier"])
+    links, tones = split.links, split.tones
+    count = 1 if packets == "first" else None
+    csi = observed_packets(sequence, radio, frame, channel, count)
+    received = np.broadcast_to(links, csi.shape[:3])
+    if channel == "impaired":
+        received = received & ~np.isnan(csi).all(axis=3)
+    _need_finite(csi, received, tones, f"csi of frame {frame} ({sequence.name}, {radio})")
+    return elements, received.any(axis=0), tones, csi
+
+
+def _need_finite(csi: np.ndarray, links: np.ndarray, tones: np.ndarray, what: str) -> None:
+    if not np.isfinite(csi[links[..., None] & tones]).all():
+        raise RfgsError(f"{what} holds NaN or infinity; run `rfgs-factory validate` on the dataset")
+
+
+def observe(
+    sequence: Sequence,
+    radio: str,
+    frame: int,
+    channel: Observed = "clean",
+    kind: Observe = "complex",
+    empty: Reported | None = None,
+    packets: Packets = "first",
+    kept: Kept | None = None,
+) -> Observations:
+    """Reads one frame at its own time and hides what is held out, and links that heard nothing.
+
+    Args:
+        sequence: The data.
+        radio: Which radio.
+        frame: Which frame.
+        channel: The traced channel, or what imperfect radios make of it.
+        kind: What the radio reports of it; nothing else reaches the result.
+        empty: What it reports of the empty room, as `reported` gives it; None takes the
+            empty-room capture.
+        packets: Whether the frame's other packets help to tell the change from noise; only of
+            the channel itself.
+        kept: Hides all other links and tones as well, before anything is made of the channel.
+
+    Raises:
+        RfgsError: The channel holds values that are not finite, or its antennas move within a
+            frame.
+    """
+    elements, links, tones, csi = visible_channel(sequence, radio, frame, channel, packets)
+    if kept is not None:
+        links, tones = links & kept[0], tones & kept[1]
+    if empty is None:
+        static = sequence.csi_static(radio)
+        _need_finite(
+            static, links, tones, f"csi_static of frame {frame} ({sequence.name}, {radio})"
+        )
+        empty = reported(static, tones, kind)
+    seen = links[:, :, None] & tones
+    freq_hz = np.array(sequence.coordinates(radio)["freq_hz"].values, dtype=np.float64)
+    now, delay_change = reported(csi[0], tones, kind), None
+    change, interval_s = None, 0.0
+    if kind == "complex" and len(csi) > 1:
+        change = change_of_packets(csi - empty, links, tones, elements)
+        delta, static = change[0], empty
+        interval_s = float(np.diff(sequence.sample_times_s(radio, frame)[:2])[0])
+    elif kind == "complex":
+        delta, static = now - empty, empty
+    elif kind == "power":
+        wave = direct_wave(elements, freq_hz)
+        # Hidden links must not set the scale of the others.
+        now, empty = np.where(seen, now, 0), np.where(seen, empty, 0)
+        delta, static = hologram(now, empty, tones, wave), empty * wave
+    else:
+        spacing_hz = float(freq_hz[1] - freq_hz[0])
+        delay_change = np.where(links[..., None], np.abs(now - empty), 0).astype(np.float32)
+        direct = direct_amplitude(empty, elements, spacing_hz)
+        static = direct[..., None] * direct_wave(elements, freq_hz)
+        delta = np.zeros_like(static)
+    return Observations(
+        delta=np.where(seen, delta, 0).astype(np.complex64),
+        static=np.where(seen, static, 0).astype(np.complex64),
+        links=links,
+        tones=tones,
+        layout=elements,
+        freq_hz=freq_hz,
+        bounds_m=np.asarray(sequence.bounds_m, dtype=np.float64),
+        time_s=sequence.time_s(frame),
+        kind=kind,
+        delay_change=delay_change,
+        packets=change,
+        packet_interval_s=interval_s,
+    )

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Levels that a fit begins with: reflected powers, noise, and the scale of the head."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from rfgs_core.gaussians import Gaussians
+from rfgs_core.measure.observations import Observations
+from rfgs_core.model.delay_power import DelayPowerModel
+from rfgs_core.model.first_gaussians import START_SCALES_M
+from rfgs_core.model.head import SHARPNESS, RadioHead, dimming
+from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.seeds import sub_seed
+from rfgs_core.settings import TrainConfig
+
+
+def visibility(
+    points: Float[np.ndarray, "M 3"], normals: Float[np.ndarray, "M 3"], model: DelayPowerModel
+) -> Float[np.ndarray, "map M"]:
+    """How much of a Gaussian each map's antennas see, by the propagation model's own rule."""
+    rows = []
+    for entry in model.maps:
+        seen = np.ones(len(points))
+        for antenna in (entry.tx_xyz.mean(axis=0), entry.rx_xyz.mean(axis=0)):
+            towards = antenna - points
+            towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+            seen /= dimming(SHARPNESS * np.sum(normals * towards, axis=1))
+        # Squared: visibility scales the amplitude.
+        rows.append(seen**2)
+    return np.array(rows, dtype=np.float32)
+
+
+def fit_power(observations: Observations, gaussians: Gaussians) -> Float[Tensor, "M"]:
+    """Reflected powers from delay–angle maps: equal ones, at the level of the typical map.
+
+    Each map has a gain of its own against the model: wall bounces and the neighbours of an
+    antenna lift or lower whole device pairs.
+    """
+    points = gaussians.means.numpy().astype(np.float64)
+    model = DelayPowerModel(observations, points)
+    seen = visibility(points, gaussians.rotations[:, :, 2].numpy(), model)
+    start = model.scaled(np.ones(len(points), dtype=np.float32), seen)
+    gain = [
+        data.sum() / max(float(model.expected(k, start * seen[k]).sum()), 1e-30)
+        for k, (_, _, data) in enumerate(model.parts)
+    ]
+    # The level that suits the typical pair: the median keeps shadowed pairs out of it.
+    return torch.from_numpy((start * np.median(gain)).astype(np.float32))
+
+
+def noise_per_link(
+    observations: Observations, target: Tensor, share: float
+) -> Float[Tensor, "link"]:
+    """Variance per link: a share of the mean power of its device pair."""
+    pair, names = observations.pairs
+    index = pair[observations.links]
+    power = (target.abs() ** 2).mean(dim=1).cpu().numpy()
+    mean = np.bincount(index, power, len(names)) / np.bincount(index, minlength=len(names))
+    floor = 1e-3 * mean.max() if len(mean) else 0.0
+    return torch.from_numpy((share * np.maximum(mean, floor * 1e-3))[index].astype(np.float32))
+
+
+def new_head(
+    observations: Observations, config: TrainConfig, power: Float[Tensor, "M"]
+) -> RadioHead:
+    """A head scaled so that typical reflectivities are features of about one."""
+    wavelength_m = SPEED_OF_LIGHT / observations.centre_hz
+    return RadioHead.create(
+        sub_seed(config.seed, "head"),
+        wavelength_m,
+        START_SCALES_M[0],
+        float(power.mean().sqrt().clamp(min=1e-9)),
+    )

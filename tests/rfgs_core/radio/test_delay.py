@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Delay profiles of a single path, under every window."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from rfgs_core.radio.delay import band_window, delay_profile, hann, hann_between, hann_to_zero
+
+
+@pytest.mark.parametrize("window", [hann, hann_to_zero, hann_between])
+def test_one_path_peaks_at_its_delay_with_its_amplitude(window: Callable) -> None:
+    weight = window(64)
+    csi = 0.5 * np.exp(-2j * np.pi * np.arange(64) * 10.25 / 64)[None]
+    profile = np.abs(delay_profile(csi, weight / weight.sum(), 4, peak=True))
+    assert profile.shape == (1, 256)
+    assert profile[0].argmax() == 41
+    assert profile[0, 41] == pytest.approx(0.5)
+    mean = np.abs(delay_profile(csi, weight, 4))
+    assert mean[0, 41] == pytest.approx(0.5 * weight.sum() / 256)
+
+
+def test_hidden_tones_have_no_weight() -> None:
+    tones = np.ones(16, bool)
+    tones[5:8] = False
+    window = band_window(tones)
+    assert window.sum() == pytest.approx(1.0)
+    assert (window[~tones] == 0).all() and (window[tones] > 0).all()

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rfgs_core.errors import run_cli
 from rfgs_core.files import refuse_place
+from rfgs_core.outcome import run_cli
 
 #: Arguments of commands that name what they write.
 _OUTPUTS = ("out", "json")

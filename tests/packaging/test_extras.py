@@ -13,8 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from rfgs_core.errors import MissingToolError, run_cli
+from rfgs_core.errors import MissingToolError
 from rfgs_core.extras import EXTRA_OF, require
+from rfgs_core.outcome import run_cli
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]

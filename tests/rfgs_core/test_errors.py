@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from rfgs_core.errors import MissingToolError, RfgsError, RfgsFormatError, run_cli
+from rfgs_core.errors import MissingToolError, RfgsError, RfgsFormatError
 from rfgs_core.files import write_text
+from rfgs_core.outcome import run_cli
 
 
 def raising(error: BaseException):

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How a command ends: the one place where errors become a line on the terminal."""
+
+from __future__ import annotations
+
+import errno
+import sys
+from collections.abc import Callable
+
+from rfgs_core.errors import RfgsError
+from rfgs_core.extras import how_to_install
+from rfgs_core.interrupts import MESSAGE, STOPPED
+
+#: The user named a place that is not theirs, no folder, or no file.
+_WRONG_PLACE = (
+    *(errno.EACCES, errno.EPERM, errno.EROFS),
+    *(errno.EISDIR, errno.ENOTDIR, errno.EEXIST, errno.ENAMETOOLONG),
+)
+
+
+def run_cli(command: Callable[[], int | None]) -> int:
+    """Runs a command and turns user errors into one clear line.
+
+    Args:
+        command: The command; its return value is the exit code, None meaning 0.
+
+    Returns:
+        Exit code: 2 for an `RfgsError`, a package of an extra that is not installed, a full disk
+        or a place that cannot be written or read, 130 after Ctrl-C.
+    """
+    try:
+        return command() or 0
+    except RfgsError as error:
+        sys.stderr.write(f"error: {error}\n")
+        return 2
+    except KeyboardInterrupt:
+        sys.stderr.write(MESSAGE)
+        return STOPPED
+    except ModuleNotFoundError as error:
+        remedy = how_to_install(error.name or "")
+        if remedy is None:
+            raise
+        sys.stderr.write(f"error: {remedy}\n")
+        return 2
+    except OSError as error:
+        place = error.filename2 or error.filename
+        if error.errno in _WRONG_PLACE and place:
+            sys.stderr.write(
+                f"error: {place}: {error.strerror}; check the path and who may use it\n"
+            )
+            return 2
+        if error.errno != errno.ENOSPC:
+            raise
+        where = f" while writing {error.filename}" if error.filename else ""
+        sys.stderr.write(
+            f"error: the disk is full{where}; free some space and run the same command again\n"
+        )
+        return 2

@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The script of the README's moving picture draws every frame of a run."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from rfgs_core.run import Run
+
+ANIMATE = Path(__file__).resolve().parents[2] / "docs" / "animate.py"
+Python = Callable[..., subprocess.CompletedProcess[str]]
+
+
+def test_both_frames_are_drawn(python: Python, small_run: Run, tmp_path: Path) -> None:
+    out = tmp_path / "person.webp"
+    told = python(ANIMATE, small_run.path, "--out", out, must_work=True).stdout
+    assert "2 frames" in told
+    with Image.open(out) as picture:
+        assert picture.n_frames == 2 and picture.size == (24 + 4 + 24, 24)
+        seen = []
+        for frame in range(2):
+            picture.seek(frame)
+            seen.append(np.asarray(picture.convert("RGB")).astype(int))
+            assert picture.info["duration"] == 100
+    # The person moves.
+    assert np.abs(seen[0] - seen[1]).max() > 20
+
+
+def test_a_folder_that_is_no_run_is_named(python: Python, tmp_path: Path) -> None:
+    done = python(ANIMATE, tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.strip().splitlines()[-1].startswith("error: ")

@@ -14,9 +14,10 @@ EXTRA_OF = {
     "drjit": "factory",
     "bpy": "blender",
     "anny": "scenes",
-    "distributed": "cluster",
-    "dask": "cluster",
+    "distributed": "factory",
+    "dask": "factory",
     "triton": "gpu",
+    "playwright": "picture",
 }
 
 

@@ -36,36 +36,31 @@ CLASSES = [
 class RFGS_PG_object(bpy.types.PropertyGroup):
     """Radio meaning of an object."""
 
-    role: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    role: bpy.props.EnumProperty(
         name="Role",
         description="What this Empty is in the radio scene; its local +X is the boresight",
         items=ROLES,
         default="NONE",
     )
-    radio: bpy.props.StringProperty(  # type: ignore[valid-type]
+    radio: bpy.props.StringProperty(
         name="Radio",
         description="Preset this device belongs to, 'any' for every radio, or 'scene' for the one "
         "described below",
         default="any",
         search=search_radios,
     )
-    rf: bpy.props.PointerProperty(type=RFGS_PG_radio)  # type: ignore[valid-type]
-    object_class: bpy.props.EnumProperty(  # type: ignore[valid-type]
-        name="Class",
-        description="What this mesh is to the radio",
-        items=CLASSES,
-        default="AUTO",
+    rf: bpy.props.PointerProperty(type=RFGS_PG_radio)
+    object_class: bpy.props.EnumProperty(
+        name="Class", description="What this mesh is to the radio", items=CLASSES, default="AUTO"
     )
-    instance: bpy.props.StringProperty(  # type: ignore[valid-type]
+    instance: bpy.props.StringProperty(
         name="Instance",
         description="Objects of one name form one instance in masks; empty: the object itself",
-        default="",
     )
-    surface_m2: bpy.props.FloatProperty(  # type: ignore[valid-type]
+    surface_m2: bpy.props.FloatProperty(
         name="Nominal surface",
         description="Outer surface of its whole instance [m²], by which evaluation sizes "
         "predictions; 0: the standard body for people, the box around it for vehicles",
-        default=0.0,
         min=0.0,
         soft_max=100.0,
         precision=1,
@@ -75,20 +70,20 @@ class RFGS_PG_object(bpy.types.PropertyGroup):
 class RFGS_PG_scene(bpy.types.PropertyGroup):
     """Settings of the panels, a group for each."""
 
-    devices: bpy.props.PointerProperty(type=RFGS_PG_devices)  # type: ignore[valid-type]
-    export: bpy.props.PointerProperty(type=RFGS_PG_export)  # type: ignore[valid-type]
-    gaussians: bpy.props.PointerProperty(type=RFGS_PG_gaussians)  # type: ignore[valid-type]
-    channels: bpy.props.PointerProperty(type=RFGS_PG_channels)  # type: ignore[valid-type]
-    jobs: bpy.props.PointerProperty(type=RFGS_PG_jobs)  # type: ignore[valid-type]
-    paths: bpy.props.PointerProperty(type=RFGS_PG_paths)  # type: ignore[valid-type]
-    materials: bpy.props.PointerProperty(type=RFGS_PG_materials)  # type: ignore[valid-type]
+    devices: bpy.props.PointerProperty(type=RFGS_PG_devices)
+    export: bpy.props.PointerProperty(type=RFGS_PG_export)
+    gaussians: bpy.props.PointerProperty(type=RFGS_PG_gaussians)
+    channels: bpy.props.PointerProperty(type=RFGS_PG_channels)
+    jobs: bpy.props.PointerProperty(type=RFGS_PG_jobs)
+    paths: bpy.props.PointerProperty(type=RFGS_PG_paths)
+    materials: bpy.props.PointerProperty(type=RFGS_PG_materials)
 
 
 class RFGS_PG_window(bpy.types.PropertyGroup):
     """What lasts as long as the file is open, and is not saved in it."""
 
-    check: bpy.props.PointerProperty(type=RFGS_PG_check)  # type: ignore[valid-type]
-    guesses: bpy.props.PointerProperty(type=RFGS_PG_guesses)  # type: ignore[valid-type]
+    check: bpy.props.PointerProperty(type=RFGS_PG_check)
+    guesses: bpy.props.PointerProperty(type=RFGS_PG_guesses)
 
 
 CLASSES_TO_REGISTER = (

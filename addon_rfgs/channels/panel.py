@@ -9,7 +9,6 @@ from ..tab import Tab
 class RFGS_PT_channels(Tab, bpy.types.Panel):
     """Measured and predicted channels of a link."""
 
-    bl_idname = "RFGS_PT_channels"
     bl_parent_id = "RFGS_PT_gaussians"
     bl_label = "Channels"
     bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012

@@ -9,7 +9,6 @@ from ..tab import Tab
 class RFGS_PT_dataset(Tab, bpy.types.Panel):
     """Bundle and ground truth."""
 
-    bl_idname = "RFGS_PT_dataset"
     bl_label = "Bundle and Ground Truth"
     bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
 

@@ -12,7 +12,6 @@ from .coloring import RAMPED, missing
 class RFGS_PT_gaussians(Tab, bpy.types.Panel):
     """Gaussians back into the scene."""
 
-    bl_idname = "RFGS_PT_gaussians"
     bl_label = "Gaussians"
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -46,7 +45,6 @@ class _Part(Tab):
 class RFGS_PT_gaussians_display(_Part, bpy.types.Panel):
     """How Gaussians are shown; acts at once."""
 
-    bl_idname = "RFGS_PT_gaussians_display"
     bl_label = "Display"
     bl_options = set()  # noqa: RUF012
     names = ("display_mode", "size", "opacity_threshold", "power_threshold_db", "solid_view")
@@ -61,7 +59,6 @@ class RFGS_PT_gaussians_display(_Part, bpy.types.Panel):
 class RFGS_PT_gaussians_color(_Part, bpy.types.Panel):
     """What the colour of Gaussians says."""
 
-    bl_idname = "RFGS_PT_gaussians_color"
     bl_label = "Colour"
     bl_options = set()  # noqa: RUF012
     names = ("color_by",)
@@ -86,7 +83,6 @@ class RFGS_PT_gaussians_color(_Part, bpy.types.Panel):
 class RFGS_PT_gaussians_crop(_Part, bpy.types.Panel):
     """Only the Gaussians inside a box."""
 
-    bl_idname = "RFGS_PT_gaussians_crop"
     bl_label = "Crop"
     names = ("crop_box",)
 
@@ -103,7 +99,6 @@ class RFGS_PT_gaussians_crop(_Part, bpy.types.Panel):
 class RFGS_PT_gaussians_timing(_Part, bpy.types.Panel):
     """When each cloud is seen."""
 
-    bl_idname = "RFGS_PT_gaussians_timing"
     bl_label = "Timeline"
     names = ("frame_offset", "interpolation")
 
@@ -111,7 +106,6 @@ class RFGS_PT_gaussians_timing(_Part, bpy.types.Panel):
 class RFGS_PT_gaussians_compare(_Part, bpy.types.Panel):
     """How far Gaussians are from the true surface."""
 
-    bl_idname = "RFGS_PT_gaussians_compare"
     bl_label = "Compare with Mesh"
     names = ("compare_with",)
 

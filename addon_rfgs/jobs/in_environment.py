@@ -15,7 +15,7 @@ from .preferences import environment_path
 class InEnvironment(Reporting):
     """Mixed into operators that need the environment."""
 
-    python: bpy.props.StringProperty(  # type: ignore[valid-type]
+    python: bpy.props.StringProperty(
         name="Python",
         description="Python program or environment with rfgs; empty: the one of the preferences",
         subtype="FILE_PATH",

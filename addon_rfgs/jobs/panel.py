@@ -23,8 +23,6 @@ _ICONS = {
 class RFGS_UL_jobs(bpy.types.UIList):
     """Jobs in the order in which they run."""
 
-    bl_idname = "RFGS_UL_jobs"
-
     def draw_item(
         self,
         _context: bpy.types.Context,
@@ -44,7 +42,6 @@ class RFGS_UL_jobs(bpy.types.UIList):
 class RFGS_PT_jobs(Tab, bpy.types.Panel):
     """The environment and the list of jobs."""
 
-    bl_idname = "RFGS_PT_jobs"
     bl_label = "Generate and Train"
 
     def draw(self, _context: bpy.types.Context) -> None:
@@ -92,7 +89,6 @@ def _draw_job(layout: bpy.types.UILayout, job: object, row: object) -> None:
 class RFGS_PT_generate(Tab, bpy.types.Panel):
     """What is generated."""
 
-    bl_idname = "RFGS_PT_generate"
     bl_parent_id = "RFGS_PT_jobs"
     bl_label = "Dataset"
 
@@ -123,7 +119,6 @@ class RFGS_PT_generate(Tab, bpy.types.Panel):
 class RFGS_PT_train(Tab, bpy.types.Panel):
     """What is trained."""
 
-    bl_idname = "RFGS_PT_train"
     bl_parent_id = "RFGS_PT_jobs"
     bl_label = "Training"
 

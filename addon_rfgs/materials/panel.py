@@ -17,7 +17,6 @@ from .properties import RFGS_PG_guess
 class RFGS_PT_material(Tab, bpy.types.Panel):
     """Radio meaning of the active object's material."""
 
-    bl_idname = "RFGS_PT_material"
     bl_label = "Radio Materials"
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -85,7 +84,6 @@ class RFGS_UL_guesses(bpy.types.UIList):
 class RFGS_PT_guesses(Tab, bpy.types.Panel):
     """What materials seem to be."""
 
-    bl_idname = "RFGS_PT_guesses"
     bl_label = "Guesses"
     bl_parent_id = "RFGS_PT_material"
     bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012

@@ -9,7 +9,6 @@ from ..tab import Tab
 class RFGS_PT_paths(Tab, bpy.types.Panel):
     """Ray paths as curves."""
 
-    bl_idname = "RFGS_PT_paths"
     bl_label = "Ray Paths"
     bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
 

@@ -5,17 +5,15 @@ import bpy
 from bpy.app.handlers import persistent
 
 from .channels.settings import RFGS_PG_channels
-from .check.settings import RFGS_PG_check, RFGS_PG_finding
+from .check.settings import RFGS_PG_check
 from .devices.properties import RFGS_PG_radio, search_radios
 from .devices.settings import RFGS_PG_devices
 from .export.settings import RFGS_PG_export
 from .gaussians.settings import RFGS_PG_gaussians
 from .jobs.settings import RFGS_PG_jobs
 from .materials.coloring import restore
-from .materials.properties import RFGS_PG_guess, RFGS_PG_guesses, RFGS_PG_material
-from .materials.settings import RFGS_PG_materials
+from .materials.properties import RFGS_PG_guesses, RFGS_PG_material, RFGS_PG_materials
 from .paths.settings import RFGS_PG_paths
-from .removal.stored import prune_properties
 
 ROLES = [
     ("NONE", "None", "Not a radio device", 0),
@@ -86,26 +84,6 @@ class RFGS_PG_window(bpy.types.PropertyGroup):
     guesses: bpy.props.PointerProperty(type=RFGS_PG_guesses)
 
 
-CLASSES_TO_REGISTER = (
-    RFGS_PG_radio,
-    RFGS_PG_object,
-    RFGS_PG_material,
-    RFGS_PG_devices,
-    RFGS_PG_export,
-    RFGS_PG_gaussians,
-    RFGS_PG_channels,
-    RFGS_PG_jobs,
-    RFGS_PG_paths,
-    RFGS_PG_materials,
-    RFGS_PG_scene,
-    RFGS_PG_guess,
-    RFGS_PG_guesses,
-    RFGS_PG_finding,
-    RFGS_PG_check,
-    RFGS_PG_window,
-)
-
-
 @persistent
 def _forget(_path: object) -> None:
     """Empties the lists about a file that is open no more."""
@@ -116,8 +94,6 @@ def _forget(_path: object) -> None:
 
 def register() -> None:
     """Adds `rfgs` to objects, materials and scenes."""
-    for cls in CLASSES_TO_REGISTER:
-        bpy.utils.register_class(cls)
     bpy.types.Object.rfgs = bpy.props.PointerProperty(type=RFGS_PG_object)
     bpy.types.Material.rfgs = bpy.props.PointerProperty(type=RFGS_PG_material)
     bpy.types.Scene.rfgs = bpy.props.PointerProperty(type=RFGS_PG_scene)
@@ -133,6 +109,3 @@ def unregister() -> None:
     del bpy.types.Scene.rfgs
     del bpy.types.Material.rfgs
     del bpy.types.Object.rfgs
-    for cls in reversed(CLASSES_TO_REGISTER):
-        bpy.utils.unregister_class(cls)
-    prune_properties()

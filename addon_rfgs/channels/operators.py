@@ -9,7 +9,7 @@ import bpy
 
 from ..command import Command
 from ..errors import AddonError
-from ..jobs.in_environment import InEnvironment
+from ..jobs.preferences import InEnvironment
 from ..reporting import Progress, Undoable, chosen_path
 from .drawing import Drawing, begin
 from .image import load_image, show_image

@@ -15,9 +15,7 @@ class RFGS_PT_channels(Tab, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows the link and the button."""
-        layout, settings = self.layout, context.scene.rfgs.channels
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout, settings = self.columns(), context.scene.rfgs.channels
         for name in ("run_folder", "tx_device", "rx_device"):
             layout.prop(settings, name)
         layout.operator("rfgs.show_csi", icon="IMAGE_DATA")

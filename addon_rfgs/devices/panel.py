@@ -89,9 +89,7 @@ class RFGS_PT_object(Tab, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows what applies to the type of the active object."""
-        layout, item = self.layout, context.object
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout, item = self.columns(), context.object
         if item is None:
             layout.label(text="No active object", icon="INFO")
             return

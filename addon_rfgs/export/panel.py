@@ -14,11 +14,10 @@ class RFGS_PT_dataset(Tab, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows settings and the two buttons."""
-        layout, settings = self.layout, context.scene.rfgs.export
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout, settings = self.columns(), context.scene.rfgs.export
         for name in ("frames", "overrides", "cameras", "resolution"):
             layout.prop(settings, name)
+        layout.separator()
         for name in ("bundle_folder", "spans", "velocities"):
             layout.prop(settings, name)
         layout.operator("rfgs.export_bundle", icon="EXPORT")

@@ -16,9 +16,7 @@ class RFGS_PT_gaussians(Tab, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows the path and the buttons."""
-        layout, settings = self.layout, context.scene.rfgs.gaussians
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout, settings = self.columns(), context.scene.rfgs.gaussians
         layout.prop(settings, "path")
         layout.operator("rfgs.import_gaussians", icon="IMPORT")
         layout.operator("rfgs.export_gaussians", icon="EXPORT")
@@ -36,10 +34,9 @@ class _Part(Tab):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows the settings `names`."""
-        self.layout.use_property_split = True
-        self.layout.use_property_decorate = False
+        layout = self.columns()
         for name in self.names:
-            self.layout.prop(context.scene.rfgs.gaussians, name)
+            layout.prop(context.scene.rfgs.gaussians, name)
 
 
 class RFGS_PT_gaussians_display(_Part, bpy.types.Panel):

@@ -15,9 +15,8 @@ from ..gaussians.operators import import_shown
 from ..reporting import Progress, Reporting, Undoable, chosen_path
 from . import following
 from .checking import CHECK
-from .in_environment import InEnvironment
 from .plans import KINDS, TrainPlan
-from .preferences import blender_program
+from .preferences import InEnvironment, blender_program
 from .queue import ACTIVE, DONE, RUNNING, WAITING, Job
 from .record import read_record
 from .starting import (

@@ -94,9 +94,7 @@ class RFGS_PT_generate(Tab, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows the settings and the button."""
-        layout, settings = self.layout, context.scene.rfgs.jobs
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout, settings = self.columns(), context.scene.rfgs.jobs
         for name in ("dataset_folder", "radios"):
             layout.prop(settings, name)
         for line, icon in (
@@ -124,9 +122,7 @@ class RFGS_PT_train(Tab, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows the settings and the buttons."""
-        layout, settings = self.layout, context.scene.rfgs.jobs
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout, settings = self.columns(), context.scene.rfgs.jobs
         for name in ("run_folder", "train_radio", "train_frames", "iterations", "gaussians"):
             layout.prop(settings, name)
         layout.operator("rfgs.train_gaussians", icon="PLAY")

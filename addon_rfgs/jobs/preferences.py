@@ -5,10 +5,13 @@ from __future__ import annotations
 
 import os
 import textwrap
+from pathlib import Path
 
 import bpy
 
+from ..reporting import Reporting
 from .checking import CHECK
+from .environment import interpreter
 
 #: The add-on's own name; Blender keeps its preferences under it.
 ADDON = __package__.rpartition(".")[0]
@@ -105,3 +108,22 @@ def blender_program() -> str:
     if chosen and chosen.blender:
         return bpy.path.abspath(chosen.blender)
     return os.environ.get("BLENDER") or bpy.app.binary_path
+
+
+class InEnvironment(Reporting):
+    """Mixed into operators that run programs of the Python environment."""
+
+    python: bpy.props.StringProperty(
+        name="Python",
+        description="Python program or environment with rfgs; empty: the one of the preferences",
+        subtype="FILE_PATH",
+        options={"SKIP_SAVE"},
+    )
+
+    def interpreter(self) -> Path:
+        """Its Python program.
+
+        Raises:
+            AddonError: None is chosen, or there is none.
+        """
+        return interpreter(self.python or environment_path())

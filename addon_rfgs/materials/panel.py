@@ -21,9 +21,7 @@ class RFGS_PT_material(Tab, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows the carrier, the electrical model and what replaces its defaults."""
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = self.columns()
         settings = context.scene.rfgs.materials
         layout.prop(settings, "carrier_ghz")
         bands = used_bands(context.scene)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The radio meaning of a material, and the table of guesses."""
+"""The radio meaning of a material, what it is checked against, and the table of guesses."""
 
 from __future__ import annotations
 
@@ -95,3 +95,16 @@ class RFGS_PG_guesses(bpy.types.PropertyGroup):
         type=RFGS_PG_guess, name="Guesses", description="One row for each unlabelled material"
     )
     active: bpy.props.IntProperty(name="Guess", description="The active row of the table", min=0)
+
+
+class RFGS_PG_materials(bpy.types.PropertyGroup):
+    """What materials are checked against."""
+
+    carrier_ghz: bpy.props.FloatProperty(
+        name="Carrier [GHz]",
+        description="Frequency at which materials must be known; 0: the bands of the scene's "
+        "radio devices",
+        min=0.0,
+        max=100.0,
+        precision=3,
+    )

@@ -15,7 +15,7 @@ from .devices import overlay
 from .gaussians import file_menu
 from .jobs import following
 
-_MODULES = (properties, registration, overlay, command, following, waiting, aging, file_menu)
+_MODULES = (registration, properties, overlay, command, following, waiting, aging, file_menu)
 
 
 def register() -> None:

@@ -5,17 +5,15 @@ import bpy
 from bpy.app.handlers import persistent
 
 from .channels.settings import RFGS_PG_channels
-from .check.settings import RFGS_PG_check, RFGS_PG_finding
+from .check.settings import RFGS_PG_check
 from .devices.properties import RFGS_PG_radio, search_radios
 from .devices.settings import RFGS_PG_devices
 from .export.settings import RFGS_PG_export
 from .gaussians.settings import RFGS_PG_gaussians
 from .jobs.settings import RFGS_PG_jobs
 from .materials.coloring import restore
-from .materials.properties import RFGS_PG_guess, RFGS_PG_guesses, RFGS_PG_material
-from .materials.settings import RFGS_PG_materials
+from .materials.properties import RFGS_PG_guesses, RFGS_PG_material, RFGS_PG_materials
 from .paths.settings import RFGS_PG_paths
-from .removal.stored import prune_properties
 
 ROLES = [
     ("NONE", "None", "Not a radio device", 0),
@@ -36,36 +34,31 @@ CLASSES = [
 class RFGS_PG_object(bpy.types.PropertyGroup):
     """Radio meaning of an object."""
 
-    role: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    role: bpy.props.EnumProperty(
         name="Role",
         description="What this Empty is in the radio scene; its local +X is the boresight",
         items=ROLES,
         default="NONE",
     )
-    radio: bpy.props.StringProperty(  # type: ignore[valid-type]
+    radio: bpy.props.StringProperty(
         name="Radio",
         description="Preset this device belongs to, 'any' for every radio, or 'scene' for the one "
         "described below",
         default="any",
         search=search_radios,
     )
-    rf: bpy.props.PointerProperty(type=RFGS_PG_radio)  # type: ignore[valid-type]
-    object_class: bpy.props.EnumProperty(  # type: ignore[valid-type]
-        name="Class",
-        description="What this mesh is to the radio",
-        items=CLASSES,
-        default="AUTO",
+    rf: bpy.props.PointerProperty(type=RFGS_PG_radio)
+    object_class: bpy.props.EnumProperty(
+        name="Class", description="What this mesh is to the radio", items=CLASSES, default="AUTO"
     )
-    instance: bpy.props.StringProperty(  # type: ignore[valid-type]
+    instance: bpy.props.StringProperty(
         name="Instance",
         description="Objects of one name form one instance in masks; empty: the object itself",
-        default="",
     )
-    surface_m2: bpy.props.FloatProperty(  # type: ignore[valid-type]
+    surface_m2: bpy.props.FloatProperty(
         name="Nominal surface",
         description="Outer surface of its whole instance [m²], by which evaluation sizes "
         "predictions; 0: the standard body for people, the box around it for vehicles",
-        default=0.0,
         min=0.0,
         soft_max=100.0,
         precision=1,
@@ -75,40 +68,20 @@ class RFGS_PG_object(bpy.types.PropertyGroup):
 class RFGS_PG_scene(bpy.types.PropertyGroup):
     """Settings of the panels, a group for each."""
 
-    devices: bpy.props.PointerProperty(type=RFGS_PG_devices)  # type: ignore[valid-type]
-    export: bpy.props.PointerProperty(type=RFGS_PG_export)  # type: ignore[valid-type]
-    gaussians: bpy.props.PointerProperty(type=RFGS_PG_gaussians)  # type: ignore[valid-type]
-    channels: bpy.props.PointerProperty(type=RFGS_PG_channels)  # type: ignore[valid-type]
-    jobs: bpy.props.PointerProperty(type=RFGS_PG_jobs)  # type: ignore[valid-type]
-    paths: bpy.props.PointerProperty(type=RFGS_PG_paths)  # type: ignore[valid-type]
-    materials: bpy.props.PointerProperty(type=RFGS_PG_materials)  # type: ignore[valid-type]
+    devices: bpy.props.PointerProperty(type=RFGS_PG_devices)
+    export: bpy.props.PointerProperty(type=RFGS_PG_export)
+    gaussians: bpy.props.PointerProperty(type=RFGS_PG_gaussians)
+    channels: bpy.props.PointerProperty(type=RFGS_PG_channels)
+    jobs: bpy.props.PointerProperty(type=RFGS_PG_jobs)
+    paths: bpy.props.PointerProperty(type=RFGS_PG_paths)
+    materials: bpy.props.PointerProperty(type=RFGS_PG_materials)
 
 
 class RFGS_PG_window(bpy.types.PropertyGroup):
     """What lasts as long as the file is open, and is not saved in it."""
 
-    check: bpy.props.PointerProperty(type=RFGS_PG_check)  # type: ignore[valid-type]
-    guesses: bpy.props.PointerProperty(type=RFGS_PG_guesses)  # type: ignore[valid-type]
-
-
-CLASSES_TO_REGISTER = (
-    RFGS_PG_radio,
-    RFGS_PG_object,
-    RFGS_PG_material,
-    RFGS_PG_devices,
-    RFGS_PG_export,
-    RFGS_PG_gaussians,
-    RFGS_PG_channels,
-    RFGS_PG_jobs,
-    RFGS_PG_paths,
-    RFGS_PG_materials,
-    RFGS_PG_scene,
-    RFGS_PG_guess,
-    RFGS_PG_guesses,
-    RFGS_PG_finding,
-    RFGS_PG_check,
-    RFGS_PG_window,
-)
+    check: bpy.props.PointerProperty(type=RFGS_PG_check)
+    guesses: bpy.props.PointerProperty(type=RFGS_PG_guesses)
 
 
 @persistent
@@ -121,8 +94,6 @@ def _forget(_path: object) -> None:
 
 def register() -> None:
     """Adds `rfgs` to objects, materials and scenes."""
-    for cls in CLASSES_TO_REGISTER:
-        bpy.utils.register_class(cls)
     bpy.types.Object.rfgs = bpy.props.PointerProperty(type=RFGS_PG_object)
     bpy.types.Material.rfgs = bpy.props.PointerProperty(type=RFGS_PG_material)
     bpy.types.Scene.rfgs = bpy.props.PointerProperty(type=RFGS_PG_scene)
@@ -138,6 +109,3 @@ def unregister() -> None:
     del bpy.types.Scene.rfgs
     del bpy.types.Material.rfgs
     del bpy.types.Object.rfgs
-    for cls in reversed(CLASSES_TO_REGISTER):
-        bpy.utils.unregister_class(cls)
-    prune_properties()

@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Adds the operators and panels of every folder to Blender and takes them away again."""
+"""Adds the classes of every folder to Blender and takes them away again."""
 
 import inspect
 from importlib import import_module
 
 import bpy
 
+from .removal.stored import prune_properties
+
 #: Modules that hold classes for Blender; panels appear in this order.
 _MODULES = (
+    *("channels.settings", "check.settings", "devices.properties", "devices.settings"),
+    *("export.settings", "gaussians.settings", "jobs.settings", "materials.properties"),
+    *("paths.settings", "properties"),
     *("devices.operators", "devices.panel", "materials.operators", "materials.panel"),
     *("check.operators", "check.panel", "export.operators", "export.panel"),
     *("jobs.preferences", "jobs.operators", "jobs.panel"),
@@ -25,7 +30,7 @@ CLASSES = [
 
 
 def register() -> None:
-    """Adds the operators and panels."""
+    """Adds them."""
     for cls in CLASSES:
         if issubclass(cls, bpy.types.Operator) and "bl_description" not in vars(cls):
             cls.bl_description = tooltip(cls.__doc__ or "")
@@ -33,9 +38,10 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Removes the operators and panels."""
+    """Removes them, and what they only looked at in the file."""
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
+    prune_properties()
 
 
 def tooltip(docstring: str) -> str:

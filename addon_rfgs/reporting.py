@@ -76,6 +76,12 @@ def call(operator: str, out: TextIO, **values: Any) -> str:
 class Reporting:
     """Runs `work(context, progress)` and reports its one line, or the user's mistake."""
 
+    def __init_subclass__(cls) -> None:
+        """Names an operator after its class: `RFGS_OT_add_device` is `rfgs.add_device`."""
+        super().__init_subclass__()
+        if cls.__name__.startswith("RFGS_OT_"):
+            cls.bl_idname = f"rfgs.{cls.__name__.removeprefix('RFGS_OT_')}"
+
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Whether the button can be pressed; a command is told by `work` why it cannot be done."""
@@ -123,3 +129,9 @@ class Reporting:
     @staticmethod
     def _progress(manager: bpy.types.WindowManager) -> Progress:
         return lambda done, total: manager.progress_update(done / max(total, 1))
+
+
+class Undoable(Reporting):
+    """The same of what changes the file."""
+
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012

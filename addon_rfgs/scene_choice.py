@@ -3,7 +3,7 @@
 
 import bpy
 
-from .path_options import RELATIVE_PATH
+from .path_options import path_setting
 from .reporting import chosen_path
 from .scene.override_file import read_overrides
 from .scene.overrides import Overrides
@@ -12,17 +12,14 @@ from .scene.overrides import Overrides
 class SceneChoice:
     """Properties of what looks at a scene, settings or operator."""
 
-    frames: bpy.props.StringProperty(  # type: ignore[valid-type]
+    frames: bpy.props.StringProperty(
         name="Frames",
         description="First:last or first:last:step, both ends included; empty: the whole range",
-        default="",
     )
-    overrides: bpy.props.StringProperty(  # type: ignore[valid-type]
-        name="Overrides",
-        description="JSON file of what is to be taken otherwise than the file has it; may be empty",
-        default="",
-        subtype="FILE_PATH",
-        options=RELATIVE_PATH,
+    overrides: path_setting(
+        "Overrides",
+        "JSON file of what is to be taken otherwise than the file has it; may be empty",
+        kind="FILE_PATH",
     )
 
 

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The RF-GS tab of the 3D view's sidebar, where every panel stands."""
 
+import bpy
+
 
 class Tab:
     """Mixed into each panel."""
@@ -8,3 +10,9 @@ class Tab:
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "RF-GS"
+
+    def columns(self) -> bpy.types.UILayout:
+        """The layout, with names beside values."""
+        self.layout.use_property_split = True
+        self.layout.use_property_decorate = False
+        return self.layout

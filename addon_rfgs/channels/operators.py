@@ -9,22 +9,20 @@ import bpy
 
 from ..command import Command
 from ..errors import AddonError
-from ..jobs.in_environment import InEnvironment
-from ..reporting import Progress, chosen_path
+from ..jobs.preferences import InEnvironment
+from ..reporting import Progress, Undoable, chosen_path
 from .drawing import Drawing, begin
 from .image import load_image, show_image
 from .waiting import begin_waiting, end_waiting, waits
 
 
-class RFGS_OT_show_csi(InEnvironment, bpy.types.Operator):
+class RFGS_OT_show_csi(InEnvironment, Undoable, bpy.types.Operator):
     """Draw what was measured and what a run predicts of a link, and show it in an Image Editor.
 
     Blender goes on meanwhile; Esc gives it up
     """
 
-    bl_idname = "rfgs.show_csi"
     bl_label = "Show CSI"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
 
     command = Command(
         "csi",
@@ -32,7 +30,7 @@ class RFGS_OT_show_csi(InEnvironment, bpy.types.Operator):
         words={"run_folder": "--run", "filepath": "--out"},
     )
 
-    filepath: bpy.props.StringProperty(  # type: ignore[valid-type]
+    filepath: bpy.props.StringProperty(
         name="File",
         description="PNG to write; empty: link_TX_RX.png in the predictions of the run",
         subtype="FILE_PATH",

@@ -9,16 +9,13 @@ from ..tab import Tab
 class RFGS_PT_channels(Tab, bpy.types.Panel):
     """Measured and predicted channels of a link."""
 
-    bl_idname = "RFGS_PT_channels"
     bl_parent_id = "RFGS_PT_gaussians"
     bl_label = "Channels"
     bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows the link and the button."""
-        layout, settings = self.layout, context.scene.rfgs.channels
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout, settings = self.columns(), context.scene.rfgs.channels
         for name in ("run_folder", "tx_device", "rx_device"):
             layout.prop(settings, name)
         layout.operator("rfgs.show_csi", icon="IMAGE_DATA")

@@ -3,26 +3,19 @@
 
 import bpy
 
-from ..path_options import RELATIVE_PATH
+from ..path_options import path_setting
 
 
 class RFGS_PG_channels(bpy.types.PropertyGroup):
     """Which link is drawn."""
 
-    run_folder: bpy.props.StringProperty(  # type: ignore[valid-type]
-        name="Run",
-        description="Folder of a training; empty: the one whose Gaussians are imported",
-        default="",
-        subtype="DIR_PATH",
-        options=RELATIVE_PATH,
+    run_folder: path_setting(
+        "Run", "Folder of a training; empty: the one whose Gaussians are imported"
     )
-    tx_device: bpy.props.IntProperty(  # type: ignore[valid-type]
-        name="From device",
-        description="Transmitting device, counted from 0",
-        default=0,
-        min=0,
+    tx_device: bpy.props.IntProperty(
+        name="From device", description="Transmitting device, counted from 0", min=0
     )
-    rx_device: bpy.props.IntProperty(  # type: ignore[valid-type]
+    rx_device: bpy.props.IntProperty(
         name="To device",
         description="Receiving device, counted from 0; -1: the first that hears the transmitter",
         default=-1,

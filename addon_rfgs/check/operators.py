@@ -7,7 +7,7 @@ import bpy
 
 from ..command import Command
 from ..errors import AddonError
-from ..reporting import Progress, Reporting
+from ..reporting import Progress, Reporting, Undoable
 from ..scene.findings import SEVERITIES, Finding
 from ..scene_choice import SceneChoice, chosen_overrides
 from . import commands, repairs, scene_repairs
@@ -45,10 +45,10 @@ def _row(context: bpy.types.Context, index: int) -> RFGS_PG_finding:
     return check.rows[index]
 
 
-class _OnFinding(Reporting):
+class _OnFinding(Undoable):
     """Acts on a row of the list."""
 
-    index: bpy.props.IntProperty(  # type: ignore[valid-type]
+    index: bpy.props.IntProperty(
         name="Finding",
         description="Row of the list; -1 for the active one",
         default=-1,
@@ -66,7 +66,6 @@ class _OnFinding(Reporting):
 class RFGS_OT_check_scene(SceneChoice, Reporting, bpy.types.Operator):
     """List what would go wrong with this scene: units, walls, people, materials, devices."""
 
-    bl_idname = "rfgs.check_scene"
     bl_label = "Check Scene"
     command = Command("check", add=commands.add_check, work=commands.check)
 
@@ -79,9 +78,7 @@ class RFGS_OT_check_scene(SceneChoice, Reporting, bpy.types.Operator):
 class RFGS_OT_select_finding(_OnFinding, bpy.types.Operator):
     """Select the object that a finding is about, and show it."""
 
-    bl_idname = "rfgs.select_finding"
     bl_label = "Select"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
 
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
         """Selects and frames."""
@@ -93,9 +90,7 @@ class RFGS_OT_select_finding(_OnFinding, bpy.types.Operator):
 class RFGS_OT_repair_finding(_OnFinding, bpy.types.Operator):
     """Do what is safe about a finding, and check the scene again."""
 
-    bl_idname = "rfgs.repair_finding"
     bl_label = "Fix"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
 
     @classmethod
     def ready(cls, context: bpy.types.Context) -> bool:

@@ -38,7 +38,6 @@ class RFGS_UL_findings(bpy.types.UIList):
 class RFGS_PT_check(Tab, bpy.types.Panel):
     """What would go wrong."""
 
-    bl_idname = "RFGS_PT_check"
     bl_label = "Scene Check"
 
     def draw(self, context: bpy.types.Context) -> None:

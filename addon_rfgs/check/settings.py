@@ -11,27 +11,17 @@ from ..scene.findings import SEVERITIES, Finding
 class RFGS_PG_finding(bpy.types.PropertyGroup):
     """One thing that a user should know about the scene."""
 
-    severity: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    severity: bpy.props.EnumProperty(
         name="Severity",
         description="How bad it is",
         items=[(name.upper(), name.capitalize(), "") for name in SEVERITIES],
     )
-    object: bpy.props.StringProperty(  # type: ignore[valid-type]
-        name="Object", description="What it is about"
-    )
-    message: bpy.props.StringProperty(  # type: ignore[valid-type]
-        name="Finding", description="What was found"
-    )
-    remedy: bpy.props.StringProperty(  # type: ignore[valid-type]
-        name="Remedy", description="What to do about it"
-    )
-    kind: bpy.props.StringProperty(  # type: ignore[valid-type]
-        name="Kind", description="Which kind of finding it is"
-    )
-    material: bpy.props.StringProperty(  # type: ignore[valid-type]
-        name="Material", description="The material it is about"
-    )
-    repairable: bpy.props.BoolProperty(  # type: ignore[valid-type]
+    object: bpy.props.StringProperty(name="Object", description="What it is about")
+    message: bpy.props.StringProperty(name="Finding", description="What was found")
+    remedy: bpy.props.StringProperty(name="Remedy", description="What to do about it")
+    kind: bpy.props.StringProperty(name="Kind", description="Which kind of finding it is")
+    material: bpy.props.StringProperty(name="Material", description="The material it is about")
+    repairable: bpy.props.BoolProperty(
         name="Repairable", description="Whether there is a safe repair"
     )
 
@@ -44,15 +34,13 @@ class RFGS_PG_finding(bpy.types.PropertyGroup):
 class RFGS_PG_check(bpy.types.PropertyGroup):
     """The last scene check."""
 
-    rows: bpy.props.CollectionProperty(  # type: ignore[valid-type]
+    rows: bpy.props.CollectionProperty(
         type=RFGS_PG_finding, name="Findings", description="What was found, the worst first"
     )
-    active: bpy.props.IntProperty(  # type: ignore[valid-type]
-        name="Finding", description="The active row of the list", default=0, min=0
-    )
-    summary: bpy.props.StringProperty(  # type: ignore[valid-type]
+    active: bpy.props.IntProperty(name="Finding", description="The active row of the list", min=0)
+    summary: bpy.props.StringProperty(
         name="Summary", description="How many findings of each kind there are"
     )
-    outdated: bpy.props.BoolProperty(  # type: ignore[valid-type]
+    outdated: bpy.props.BoolProperty(
         name="Out of Date", description="Whether Undo or Redo changed the scene since the check"
     )

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..command import Command
 from ..errors import AddonError
-from ..reporting import Progress, Reporting
+from ..reporting import Progress, Undoable
 from ..scene.bounds import MARGIN_M
 from ..scene.frames import named, unit_scale
 from ..scene.override_file import boresight
@@ -83,15 +83,13 @@ def _show(context: bpy.types.Context, items: list[bpy.types.Object]) -> None:
     context.view_layer.objects.active = items[0] if items else None
 
 
-class RFGS_OT_add_device(RadioFields, Reporting, bpy.types.Operator):
+class RFGS_OT_add_device(RadioFields, Undoable, bpy.types.Operator):
     """Add an Empty that transmits, receives or does both.
 
     It looks along its local X; new devices of the scene's own radio are like those that are there
     """
 
-    bl_idname = "rfgs.add_device"
     bl_label = "Add Radio Device"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
     command = Command(
         "devices add",
         words={
@@ -110,28 +108,28 @@ class RFGS_OT_add_device(RadioFields, Reporting, bpy.types.Operator):
         saves=True,
     )
 
-    device: bpy.props.StringProperty(  # type: ignore[valid-type]
+    device: bpy.props.StringProperty(
         name="Name", description="Name of the device; empty: its role", options={"SKIP_SAVE"}
     )
-    role: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    role: bpy.props.EnumProperty(
         name="Role", description="What the device does", items=ROLES, default="ACCESS_POINT"
     )
-    radio: bpy.props.StringProperty(  # type: ignore[valid-type]
+    radio: bpy.props.StringProperty(
         name="Radio",
         description="'scene' for the radio described below, 'any', or the name of a preset",
         default="scene",
         search=search_radios,
     )
-    location: bpy.props.FloatVectorProperty(  # type: ignore[valid-type]
+    location: bpy.props.FloatVectorProperty(
         name="Location", description="Where the device stands", subtype="TRANSLATION", size=3
     )
-    rotation: bpy.props.FloatVectorProperty(  # type: ignore[valid-type]
+    rotation: bpy.props.FloatVectorProperty(
         name="Rotation",
         description="How the device is turned; unturned it looks along X",
         subtype="EULER",
         size=3,
     )
-    look_at: bpy.props.FloatVectorProperty(  # type: ignore[valid-type]
+    look_at: bpy.props.FloatVectorProperty(
         name="Look At",
         description="Point that the device looks at, in place of a rotation",
         subtype="TRANSLATION",
@@ -190,15 +188,13 @@ class RFGS_OT_add_device(RadioFields, Reporting, bpy.types.Operator):
         return {name: row[name] for name in row if self.properties.is_property_set(spelt[name])}
 
 
-class RFGS_OT_place_radio(Reporting, bpy.types.Operator):
+class RFGS_OT_place_radio(Undoable, bpy.types.Operator):
     """Place all devices of a preset in the scene, as a dataset without devices would have them.
 
     Devices of the same preset that are there already are replaced
     """
 
-    bl_idname = "rfgs.place_radio"
     bl_label = "Place Radio"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
     command = Command(
         "devices preset",
         words={"radio": "radio", "objects": "--around"},
@@ -206,12 +202,12 @@ class RFGS_OT_place_radio(Reporting, bpy.types.Operator):
         saves=True,
     )
 
-    radio: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    radio: bpy.props.EnumProperty(
         name="Radio",
         description="Which preset",
         items=[(name, name, text) for name, text in RADIOS.items()],
     )
-    around: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    around: bpy.props.EnumProperty(
         name="Around",
         description="What the devices surround",
         items=[
@@ -219,23 +215,21 @@ class RFGS_OT_place_radio(Reporting, bpy.types.Operator):
             ("SELECTION", "Selection", "A box around what is selected, wider by the margin"),
         ],
     )
-    objects: bpy.props.CollectionProperty(  # type: ignore[valid-type]
+    objects: bpy.props.CollectionProperty(
         type=bpy.types.OperatorFileListElement,
         name="Objects",
         description="Names of objects to surround, in place of the selection",
         options={"SKIP_SAVE"},
     )
-    margin_m: bpy.props.FloatProperty(  # type: ignore[valid-type]
+    margin_m: bpy.props.FloatProperty(
         name="Margin",
         description="Free space on each side of the selection [m]",
         default=MARGIN_M,
         min=0.0,
         soft_max=10.0,
     )
-    keep: bpy.props.BoolProperty(  # type: ignore[valid-type]
-        name="Keep Others",
-        description="Leave devices of this preset that are there already",
-        default=False,
+    keep: bpy.props.BoolProperty(
+        name="Keep Others", description="Leave devices of this preset that are there already"
     )
 
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
@@ -252,16 +246,14 @@ class RFGS_OT_place_radio(Reporting, bpy.types.Operator):
         return f"Placed {len(placed)} devices of {self.radio}{more}"
 
 
-class RFGS_OT_duplicate_device(Reporting, bpy.types.Operator):
+class RFGS_OT_duplicate_device(Undoable, bpy.types.Operator):
     """Copy radio devices in place, with their radio."""
 
-    bl_idname = "rfgs.duplicate_device"
     bl_label = "Duplicate Device"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
     command = Command("devices duplicate", words={"device": "device"}, saves=True)
 
-    device: _device_name()  # type: ignore[valid-type]
-    offset: bpy.props.FloatVectorProperty(  # type: ignore[valid-type]
+    device: _device_name()
+    offset: bpy.props.FloatVectorProperty(
         name="Offset",
         description="From the device to its copy, along the scene's axes",
         default=(0.0, 0.0, 0.5),
@@ -281,12 +273,10 @@ class RFGS_OT_duplicate_device(Reporting, bpy.types.Operator):
         return f"Added {', '.join(twin.name for twin in twins)}"
 
 
-class RFGS_OT_mirror_device(Reporting, bpy.types.Operator):
+class RFGS_OT_mirror_device(Undoable, bpy.types.Operator):
     """Mirror radio devices at the middle of the scene's bounds."""
 
-    bl_idname = "rfgs.mirror_device"
     bl_label = "Mirror Device"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
     command = Command(
         "devices mirror",
         words={"device": "device"},
@@ -295,11 +285,11 @@ class RFGS_OT_mirror_device(Reporting, bpy.types.Operator):
         saves=True,
     )
 
-    device: _device_name()  # type: ignore[valid-type]
-    axis: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    device: _device_name()
+    axis: bpy.props.EnumProperty(
         name="Axis", description="Coordinate that changes its sign", items=AXES
     )
-    copy: bpy.props.BoolProperty(  # type: ignore[valid-type]
+    copy: bpy.props.BoolProperty(
         name="Copy", description="Mirror a copy and leave the device", default=True
     )
 
@@ -313,15 +303,13 @@ class RFGS_OT_mirror_device(Reporting, bpy.types.Operator):
         return f"Mirrored {', '.join(item.name for item in twins)}"
 
 
-class RFGS_OT_remove_device(Reporting, bpy.types.Operator):
+class RFGS_OT_remove_device(Undoable, bpy.types.Operator):
     """Remove radio devices from the file."""
 
-    bl_idname = "rfgs.remove_device"
     bl_label = "Remove Device"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
     command = Command("devices remove", words={"device": "device"}, saves=True)
 
-    device: _device_name()  # type: ignore[valid-type]
+    device: _device_name()
 
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
         """Removes what is chosen."""
@@ -331,15 +319,13 @@ class RFGS_OT_remove_device(Reporting, bpy.types.Operator):
         return f"Removed {names}"
 
 
-class RFGS_OT_match_devices(Reporting, bpy.types.Operator):
+class RFGS_OT_match_devices(Undoable, bpy.types.Operator):
     """Give every device of the scene's own radio the band, arrays and power of this one."""
 
-    bl_idname = "rfgs.match_devices"
     bl_label = "Copy Radio to All"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
     command = Command("devices match", words={"device": "device"}, saves=True)
 
-    device: _device_name()  # type: ignore[valid-type]
+    device: _device_name()
 
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
         """Copies the properties."""

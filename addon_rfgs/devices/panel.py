@@ -58,7 +58,6 @@ class RFGS_UL_devices(bpy.types.UIList):
 class RFGS_PT_devices(Tab, bpy.types.Panel):
     """Radio devices of the scene."""
 
-    bl_idname = "RFGS_PT_devices"
     bl_label = "Radio Devices"
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -85,15 +84,12 @@ class RFGS_PT_devices(Tab, bpy.types.Panel):
 class RFGS_PT_object(Tab, bpy.types.Panel):
     """Radio meaning of the active object."""
 
-    bl_idname = "RFGS_PT_object"
     bl_label = "Active Object"
     bl_parent_id = "RFGS_PT_devices"
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows what applies to the type of the active object."""
-        layout, item = self.layout, context.object
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout, item = self.columns(), context.object
         if item is None:
             layout.label(text="No active object", icon="INFO")
             return

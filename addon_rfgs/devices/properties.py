@@ -94,41 +94,35 @@ def _edge_ghz(name: str, label: str) -> Any:
 class RadioFields:
     """Fields of a radio as properties, of Empties and of the operator that adds them."""
 
-    freq_min_ghz: _edge_ghz("freq_min_hz", "From [GHz]")  # type: ignore[valid-type]
-    freq_max_ghz: _edge_ghz("freq_max_hz", "To [GHz]")  # type: ignore[valid-type]
-    num_subcarriers: _count(  # type: ignore[valid-type]
+    freq_min_ghz: _edge_ghz("freq_min_hz", "From [GHz]")
+    freq_max_ghz: _edge_ghz("freq_max_hz", "To [GHz]")
+    num_subcarriers: _count(
         "num_subcarriers", "Subcarriers", "Tones at the centres of equal slices of the band", min=2
     )
-    tx_rows: _elements("tx_rows", "TX rows", "z")  # type: ignore[valid-type]
-    tx_cols: _elements("tx_cols", "TX columns", "y")  # type: ignore[valid-type]
-    rx_rows: _elements("rx_rows", "RX rows", "z")  # type: ignore[valid-type]
-    rx_cols: _elements("rx_cols", "RX columns", "y")  # type: ignore[valid-type]
-    tx_spacing_m: _spacing_m("tx_spacing_m", "TX spacing")  # type: ignore[valid-type]
-    rx_spacing_m: _spacing_m("rx_spacing_m", "RX spacing")  # type: ignore[valid-type]
-    tx_spacing_wavelengths: _spacing_wavelengths(  # type: ignore[valid-type]
-        "tx", "TX spacing [λ]"
-    )
-    rx_spacing_wavelengths: _spacing_wavelengths(  # type: ignore[valid-type]
-        "rx", "RX spacing [λ]"
-    )
-    tx_offset_m: bpy.props.FloatVectorProperty(  # type: ignore[valid-type]
+    tx_rows: _elements("tx_rows", "TX rows", "z")
+    tx_cols: _elements("tx_cols", "TX columns", "y")
+    rx_rows: _elements("rx_rows", "RX rows", "z")
+    rx_cols: _elements("rx_cols", "RX columns", "y")
+    tx_spacing_m: _spacing_m("tx_spacing_m", "TX spacing")
+    rx_spacing_m: _spacing_m("rx_spacing_m", "RX spacing")
+    tx_spacing_wavelengths: _spacing_wavelengths("tx", "TX spacing [λ]")
+    rx_spacing_wavelengths: _spacing_wavelengths("rx", "RX spacing [λ]")
+    tx_offset_m: bpy.props.FloatVectorProperty(
         name="TX offset",
         description="Centre of the TX array in the Empty's axes [m]; the RX array is at its origin",
         size=3,
         default=RADIO_DEFAULTS["tx_offset_m"],
     )
-    own_device_links: _choice(  # type: ignore[valid-type]
+    own_device_links: _choice(
         "own_device_links", "Own links", "Whether a device hears its own transmitter"
     )
-    isolation_db: _number(  # type: ignore[valid-type]
+    isolation_db: _number(
         "isolation_db", "Isolation", "Of a device's receiver from its transmitter [dB]", min=0.0
     )
-    power_dbm: _number("power_dbm", "Power", "Transmit power [dBm]")  # type: ignore[valid-type]
-    noise_figure_db: _number(  # type: ignore[valid-type]
-        "noise_figure_db", "Noise figure", "Of the receiver [dB]"
-    )
-    pattern: _choice("pattern", "Pattern", "Antenna pattern")  # type: ignore[valid-type]
-    polarization: _choice(  # type: ignore[valid-type]
+    power_dbm: _number("power_dbm", "Power", "Transmit power [dBm]")
+    noise_figure_db: _number("noise_figure_db", "Noise figure", "Of the receiver [dB]")
+    pattern: _choice("pattern", "Pattern", "Antenna pattern")
+    polarization: _choice(
         "polarization", "Polarisation", "V, H, or two ports per element: VH, cross"
     )
 

@@ -27,17 +27,17 @@ def _activate(_self: bpy.types.PropertyGroup, index: int) -> None:
 class RFGS_PG_devices(bpy.types.PropertyGroup):
     """How devices are listed and drawn."""
 
-    active: bpy.props.IntProperty(  # type: ignore[valid-type]
+    active: bpy.props.IntProperty(
         name="Device",
         description="The active radio device; choosing another selects it",
         get=_active,
         set=_activate,
     )
-    overlay: bpy.props.BoolProperty(  # type: ignore[valid-type]
+    overlay: bpy.props.BoolProperty(
         name="Show Antennas",
         description="Draw antenna elements, boresight and names of devices in the 3D view",
         default=True,
     )
-    names: bpy.props.BoolProperty(  # type: ignore[valid-type]
+    names: bpy.props.BoolProperty(
         name="Names", description="Write the name beside each device", default=True
     )

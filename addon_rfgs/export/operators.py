@@ -16,7 +16,6 @@ _BOTH = ("frames", "overrides", "cameras", "resolution")
 class RFGS_OT_export_bundle(Reporting, bpy.types.Operator):
     """Write the scene as a bundle for the dataset factory."""
 
-    bl_idname = "rfgs.export_bundle"
     bl_label = "Export Bundle"
     command = Command(
         "export",
@@ -49,7 +48,6 @@ class RFGS_OT_export_bundle(Reporting, bpy.types.Operator):
 class RFGS_OT_render_groundtruth(Reporting, bpy.types.Operator):
     """Render pictures, and passes if wanted, from every camera with Cycles."""
 
-    bl_idname = "rfgs.render_groundtruth"
     bl_label = "Render Ground Truth"
     command = Command(
         "groundtruth",

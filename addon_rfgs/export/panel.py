@@ -9,17 +9,15 @@ from ..tab import Tab
 class RFGS_PT_dataset(Tab, bpy.types.Panel):
     """Bundle and ground truth."""
 
-    bl_idname = "RFGS_PT_dataset"
     bl_label = "Bundle and Ground Truth"
     bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows settings and the two buttons."""
-        layout, settings = self.layout, context.scene.rfgs.export
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout, settings = self.columns(), context.scene.rfgs.export
         for name in ("frames", "overrides", "cameras", "resolution"):
             layout.prop(settings, name)
+        layout.separator()
         for name in ("bundle_folder", "spans", "velocities"):
             layout.prop(settings, name)
         layout.operator("rfgs.export_bundle", icon="EXPORT")

@@ -7,27 +7,25 @@ from typing import Any
 
 import bpy
 
-from ..reporting import Progress, Reporting, chosen_path
+from ..reporting import Progress, Undoable, chosen_path
 from .operators import import_shown
 
 _LABEL = "RF Gaussians (.ply)"
 
 
-class RFGS_OT_import_ply(Reporting, bpy.types.Operator):
+class RFGS_OT_import_ply(Undoable, bpy.types.Operator):
     """Bring the Gaussians of a PLY into the scene, shown as the Gaussians panel says."""
 
-    bl_idname = "rfgs.import_ply"
     bl_label = "Import RF Gaussians"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
 
     # Not remembered: a path that is there was dropped, and nobody has to be asked.
-    filepath: bpy.props.StringProperty(  # type: ignore[valid-type]
+    filepath: bpy.props.StringProperty(
         name="File",
         description="PLY in the 3DGS convention, or the folder of a run",
         subtype="FILE_PATH",
         options={"SKIP_SAVE"},
     )
-    filter_glob: bpy.props.StringProperty(  # type: ignore[valid-type]
+    filter_glob: bpy.props.StringProperty(
         name="Filter", description="Which files are listed", default="*.ply", options={"HIDDEN"}
     )
 
@@ -49,7 +47,6 @@ class RFGS_OT_import_ply(Reporting, bpy.types.Operator):
 class RFGS_FH_gaussians(bpy.types.FileHandler):
     """Takes a PLY that is dropped; Blender asks which importer is meant if there are several."""
 
-    bl_idname = "RFGS_FH_gaussians"
     bl_label = "RF Gaussians"
     bl_import_operator = "rfgs.import_ply"
     bl_file_extensions = ".ply"

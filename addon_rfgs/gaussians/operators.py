@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 
 from ..command import Command
-from ..reporting import Progress, Reporting, chosen_path
+from ..reporting import Progress, Undoable, chosen_path
 from ..scene.frames import named
 from . import commands
 from .clouds import chosen_clouds, clouds_of, import_gaussians
@@ -17,12 +17,10 @@ from .export_ply import export_gaussians
 from .with_clouds import WithClouds
 
 
-class RFGS_OT_import_gaussians(Reporting, bpy.types.Operator):
+class RFGS_OT_import_gaussians(Undoable, bpy.types.Operator):
     """Bring the Gaussians of a run, or of one PLY, into the scene."""
 
-    bl_idname = "rfgs.import_gaussians"
     bl_label = "Import Gaussians"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
     command = Command(
         "import",
         "Bring Gaussians back beside the scene\n\nBrings the Gaussians of a run, a folder of "
@@ -69,7 +67,6 @@ def import_shown(scene: bpy.types.Scene, path: Path) -> str:
 class RFGS_OT_export_gaussians(WithClouds, bpy.types.Operator):
     """Write the selected clouds, or those seen at this frame, as one 3DGS PLY."""
 
-    bl_idname = "rfgs.export_gaussians"
     bl_label = "Export Gaussians"
     bl_options = {"REGISTER"}  # noqa: RUF012
     command = Command(
@@ -79,23 +76,19 @@ class RFGS_OT_export_gaussians(WithClouds, bpy.types.Operator):
         frame=True,
     )
 
-    filepath: bpy.props.StringProperty(  # type: ignore[valid-type]
-        name="File", description="PLY to write", subtype="FILE_PATH"
-    )
-    filter_glob: bpy.props.StringProperty(  # type: ignore[valid-type]
+    filepath: bpy.props.StringProperty(name="File", description="PLY to write", subtype="FILE_PATH")
+    filter_glob: bpy.props.StringProperty(
         name="Filter", description="Which files are listed", default="*.ply", options={"HIDDEN"}
     )
 
-    objects: bpy.props.CollectionProperty(  # type: ignore[valid-type]
+    objects: bpy.props.CollectionProperty(
         type=bpy.types.OperatorFileListElement,
         name="Objects",
         description="Names of the clouds, in place of those that are selected or seen",
         options={"SKIP_SAVE"},
     )
-    prefer_selected: bpy.props.BoolProperty(  # type: ignore[valid-type]
-        name="Selected",
-        description="Only the clouds that are selected, if any is",
-        default=True,
+    prefer_selected: bpy.props.BoolProperty(
+        name="Selected", description="Only the clouds that are selected, if any is", default=True
     )
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[Any]:
@@ -117,14 +110,11 @@ class RFGS_OT_export_gaussians(WithClouds, bpy.types.Operator):
 class RFGS_OT_compare_gaussians(WithClouds, bpy.types.Operator):
     """Colour Gaussians by their distance to the true meshes, and report its mean and median."""
 
-    bl_idname = "rfgs.compare_gaussians"
     bl_label = "Compare with Mesh"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
 
-    every_frame: bpy.props.BoolProperty(  # type: ignore[valid-type]
+    every_frame: bpy.props.BoolProperty(
         name="All frames",
         description="Compare the cloud of every frame, not only what is seen now; takes a while",
-        default=False,
     )
 
     def work(self, context: bpy.types.Context, progress: Progress) -> str:

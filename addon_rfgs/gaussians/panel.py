@@ -12,14 +12,11 @@ from .coloring import RAMPED, missing
 class RFGS_PT_gaussians(Tab, bpy.types.Panel):
     """Gaussians back into the scene."""
 
-    bl_idname = "RFGS_PT_gaussians"
     bl_label = "Gaussians"
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows the path and the buttons."""
-        layout, settings = self.layout, context.scene.rfgs.gaussians
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout, settings = self.columns(), context.scene.rfgs.gaussians
         layout.prop(settings, "path")
         layout.operator("rfgs.import_gaussians", icon="IMPORT")
         layout.operator("rfgs.export_gaussians", icon="EXPORT")
@@ -37,16 +34,14 @@ class _Part(Tab):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows the settings `names`."""
-        self.layout.use_property_split = True
-        self.layout.use_property_decorate = False
+        layout = self.columns()
         for name in self.names:
-            self.layout.prop(context.scene.rfgs.gaussians, name)
+            layout.prop(context.scene.rfgs.gaussians, name)
 
 
 class RFGS_PT_gaussians_display(_Part, bpy.types.Panel):
     """How Gaussians are shown; acts at once."""
 
-    bl_idname = "RFGS_PT_gaussians_display"
     bl_label = "Display"
     bl_options = set()  # noqa: RUF012
     names = ("display_mode", "size", "opacity_threshold", "power_threshold_db", "solid_view")
@@ -61,7 +56,6 @@ class RFGS_PT_gaussians_display(_Part, bpy.types.Panel):
 class RFGS_PT_gaussians_color(_Part, bpy.types.Panel):
     """What the colour of Gaussians says."""
 
-    bl_idname = "RFGS_PT_gaussians_color"
     bl_label = "Colour"
     bl_options = set()  # noqa: RUF012
     names = ("color_by",)
@@ -86,7 +80,6 @@ class RFGS_PT_gaussians_color(_Part, bpy.types.Panel):
 class RFGS_PT_gaussians_crop(_Part, bpy.types.Panel):
     """Only the Gaussians inside a box."""
 
-    bl_idname = "RFGS_PT_gaussians_crop"
     bl_label = "Crop"
     names = ("crop_box",)
 
@@ -103,7 +96,6 @@ class RFGS_PT_gaussians_crop(_Part, bpy.types.Panel):
 class RFGS_PT_gaussians_timing(_Part, bpy.types.Panel):
     """When each cloud is seen."""
 
-    bl_idname = "RFGS_PT_gaussians_timing"
     bl_label = "Timeline"
     names = ("frame_offset", "interpolation")
 
@@ -111,7 +103,6 @@ class RFGS_PT_gaussians_timing(_Part, bpy.types.Panel):
 class RFGS_PT_gaussians_compare(_Part, bpy.types.Panel):
     """How far Gaussians are from the true surface."""
 
-    bl_idname = "RFGS_PT_gaussians_compare"
     bl_label = "Compare with Mesh"
     names = ("compare_with",)
 

@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 
 from ..errors import AddonError
-from ..path_options import RELATIVE_PATH
+from ..path_options import path_setting
 from .clouds import Inspection, clouds_here, time_clouds
 from .coloring import Coloring, color_clouds
 from .display import Display, set_display
@@ -84,21 +84,17 @@ def _is_empty(_settings: Any, item: bpy.types.Object) -> bool:
 class RFGS_PG_gaussians(bpy.types.PropertyGroup):
     """Which Gaussians are shown, and how."""
 
-    path: bpy.props.StringProperty(  # type: ignore[valid-type]
-        name="Gaussians",
-        description="A run folder, its gaussians folder or one 3DGS PLY",
-        default="",
-        subtype="FILE_PATH",
-        options=RELATIVE_PATH,
+    path: path_setting(
+        "Gaussians", "A run folder, its gaussians folder or one 3DGS PLY", kind="FILE_PATH"
     )
-    display_mode: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    display_mode: bpy.props.EnumProperty(
         name="Show as",
         description="What stands for a Gaussian",
         items=DISPLAY_MODES,
         default="points",
         update=_show,
     )
-    opacity_threshold: bpy.props.FloatProperty(  # type: ignore[valid-type]
+    opacity_threshold: bpy.props.FloatProperty(
         name="Min opacity",
         description="Gaussians below this opacity are hidden",
         default=0.005,
@@ -108,7 +104,7 @@ class RFGS_PG_gaussians(bpy.types.PropertyGroup):
         subtype="FACTOR",
         update=_show,
     )
-    power_threshold_db: bpy.props.FloatProperty(  # type: ignore[valid-type]
+    power_threshold_db: bpy.props.FloatProperty(
         name="Min power",
         description="Gaussians known to reflect less power [dB] are hidden",
         default=NO_POWER_DB,
@@ -119,7 +115,7 @@ class RFGS_PG_gaussians(bpy.types.PropertyGroup):
         precision=1,
         update=_show,
     )
-    size: bpy.props.FloatProperty(  # type: ignore[valid-type]
+    size: bpy.props.FloatProperty(
         name="Size",
         description="Size of points, or how many standard deviations ellipsoids reach",
         default=1.0,
@@ -128,72 +124,65 @@ class RFGS_PG_gaussians(bpy.types.PropertyGroup):
         soft_max=5.0,
         update=_show,
     )
-    solid_view: bpy.props.BoolProperty(  # type: ignore[valid-type]
+    solid_view: bpy.props.BoolProperty(
         name="Real meshes",
         description="Make real meshes of the Gaussians, which the Solid view can colour; slower",
-        default=False,
         update=_show,
     )
-    use_crop: bpy.props.BoolProperty(  # type: ignore[valid-type]
-        name="Crop",
-        description="Hide Gaussians outside the crop box",
-        default=False,
-        update=_show,
+    use_crop: bpy.props.BoolProperty(
+        name="Crop", description="Hide Gaussians outside the crop box", update=_show
     )
-    crop_box: bpy.props.PointerProperty(  # type: ignore[valid-type]
+    crop_box: bpy.props.PointerProperty(
         name="Box",
         description="Empty whose cube of half edge one, turned and scaled with it, is the box",
         type=bpy.types.Object,
         poll=_is_empty,
         update=_show,
     )
-    color_by: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    color_by: bpy.props.EnumProperty(
         name="Colour by",
         description="What the colour of a Gaussian says",
         items=COLOR_MODES,
         default="AUTO",
         update=_color,
     )
-    color_attribute: bpy.props.StringProperty(  # type: ignore[valid-type]
+    color_attribute: bpy.props.StringProperty(
         name="Attribute",
         description="Name of a property of the PLY, or of an attribute of the points",
-        default="",
         update=_color,
     )
-    use_range: bpy.props.BoolProperty(  # type: ignore[valid-type]
+    use_range: bpy.props.BoolProperty(
         name="Fixed range",
         description="Give the ends of the colour ramp instead of finding them from the values",
-        default=False,
         update=_fix_range,
     )
-    range_low: bpy.props.FloatProperty(  # type: ignore[valid-type]
+    range_low: bpy.props.FloatProperty(
         name="From",
         description="Value of the first colour: dB for power, metres for distance",
         default=-20.0,
         update=_color,
     )
-    range_high: bpy.props.FloatProperty(  # type: ignore[valid-type]
+    range_high: bpy.props.FloatProperty(
         name="To",
         description="Value of the last colour: dB for power, metres for distance",
         default=20.0,
         update=_color,
     )
-    frame_offset: bpy.props.IntProperty(  # type: ignore[valid-type]
+    frame_offset: bpy.props.IntProperty(
         name="Frame offset",
         description="The cloud of frame f is shown at frame f + offset",
-        default=0,
         min=-500_000,
         max=500_000,
         update=_time,
     )
-    interpolation: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    interpolation: bpy.props.EnumProperty(
         name="Between frames",
         description="What is seen between recorded frames",
         items=INTERPOLATIONS,
         default="HOLD",
         update=_time,
     )
-    compare_with: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    compare_with: bpy.props.EnumProperty(
         name="True mesh",
         description="Surfaces that Gaussians are compared with",
         items=TRUE_MESHES,

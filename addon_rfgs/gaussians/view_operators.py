@@ -20,9 +20,7 @@ _MARGIN = 0.02
 class RFGS_OT_update_display(WithClouds, bpy.types.Operator):
     """Apply all settings of display, colour and timing to Gaussians that are already here."""
 
-    bl_idname = "rfgs.update_display"
     bl_label = "Update Display"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
 
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
         """Writes the panel's settings into every cloud."""
@@ -38,9 +36,7 @@ class RFGS_OT_update_display(WithClouds, bpy.types.Operator):
 class RFGS_OT_color_solid_view(WithClouds, bpy.types.Operator):
     """Make real meshes of the Gaussians and colour them in this Solid view, no other view."""
 
-    bl_idname = "rfgs.color_solid_view"
     bl_label = "Colour in Solid View"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
 
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
         """Sets the clouds, and the view the button was pressed in."""
@@ -56,9 +52,7 @@ class RFGS_OT_color_solid_view(WithClouds, bpy.types.Operator):
 class RFGS_OT_add_crop_box(WithClouds, bpy.types.Operator):
     """Add an Empty around the visible Gaussians and show only what is inside its cube."""
 
-    bl_idname = "rfgs.add_crop_box"
     bl_label = "Add Crop Box"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
 
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
         """Fits the box and crops with it."""

@@ -3,11 +3,11 @@
 
 import bpy
 
-from ..reporting import Reporting
+from ..reporting import Undoable
 from .clouds import clouds_here
 
 
-class WithClouds(Reporting):
+class WithClouds(Undoable):
     """Mixed into operators that need imported Gaussians."""
 
     @classmethod

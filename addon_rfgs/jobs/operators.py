@@ -12,12 +12,11 @@ import bpy
 from ..command import Command
 from ..errors import AddonError
 from ..gaussians.operators import import_shown
-from ..reporting import Progress, Reporting, chosen_path
+from ..reporting import Progress, Reporting, Undoable, chosen_path
 from . import following
 from .checking import CHECK
-from .in_environment import InEnvironment
 from .plans import KINDS, TrainPlan
-from .preferences import blender_program
+from .preferences import InEnvironment, blender_program
 from .queue import ACTIVE, DONE, RUNNING, WAITING, Job
 from .record import read_record
 from .starting import (
@@ -33,7 +32,6 @@ from .starting import (
 class RFGS_OT_test_environment(InEnvironment, bpy.types.Operator):
     """Ask the Python environment for its versions and for what is wrong with it."""
 
-    bl_idname = "rfgs.test_environment"
     bl_label = "Test Environment"
     command = Command("environment")
 
@@ -52,7 +50,6 @@ class RFGS_OT_generate_dataset(InEnvironment, bpy.types.Operator):
     Blender goes on meanwhile; the same settings continue what was stopped
     """
 
-    bl_idname = "rfgs.generate_dataset"
     bl_label = "Generate Dataset"
     command = Command(
         "generate",
@@ -65,7 +62,7 @@ class RFGS_OT_generate_dataset(InEnvironment, bpy.types.Operator):
         words={"dataset_folder": "--out", "radios": "--radio"},
     )
 
-    blender: bpy.props.StringProperty(  # type: ignore[valid-type]
+    blender: bpy.props.StringProperty(
         name="Blender",
         description="Blender that opens the file; empty: that of the preferences, else this one",
         subtype="FILE_PATH",
@@ -94,7 +91,6 @@ class RFGS_OT_train_gaussians(InEnvironment, bpy.types.Operator):
     Blender goes on meanwhile; the same settings continue what was stopped
     """
 
-    bl_idname = "rfgs.train_gaussians"
     bl_label = "Train"
     command = Command(
         "train",
@@ -120,7 +116,6 @@ class RFGS_OT_train_gaussians(InEnvironment, bpy.types.Operator):
 class RFGS_OT_evaluate_run(InEnvironment, bpy.types.Operator):
     """Measure the training beside its controls, in the background; writes metrics.json."""
 
-    bl_idname = "rfgs.evaluate_run"
     bl_label = "Evaluate"
     command = Command("evaluate", reads={"jobs": ("run_folder",)}, words={"run_folder": "--run"})
 
@@ -149,13 +144,13 @@ class _OnChosenJob(Reporting):
 class _OnJob(_OnChosenJob):
     """Mixed into operators on a job that may also be one of another Blender."""
 
-    folder: bpy.props.StringProperty(  # type: ignore[valid-type]
+    folder: bpy.props.StringProperty(
         name="Folder",
         description="Folder of the job's dataset or run; empty: of the one chosen in the list",
         subtype="DIR_PATH",
         options={"SKIP_SAVE"},
     )
-    kind: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    kind: bpy.props.EnumProperty(
         name="Kind",
         description="Which job of that folder, needed if there are several",
         items=[("ANY", "Any", "The only one"), *((k.upper(), k.capitalize(), "") for k in KINDS)],
@@ -183,7 +178,6 @@ class _OnJob(_OnChosenJob):
 class RFGS_OT_stop_job(_OnJob, bpy.types.Operator):
     """Stop a job; finished work is kept, and Resume continues."""
 
-    bl_idname = "rfgs.stop_job"
     bl_label = "Stop"
     command = Command("stop", words={"folder": "folder"})
     states = (WAITING, RUNNING)
@@ -204,7 +198,6 @@ class RFGS_OT_stop_job(_OnJob, bpy.types.Operator):
 class RFGS_OT_resume_job(_OnJob, InEnvironment, bpy.types.Operator):
     """Continue a job where it stopped."""
 
-    bl_idname = "rfgs.resume_job"
     bl_label = "Resume"
     command = Command("resume", words={"folder": "folder"})
 
@@ -221,7 +214,6 @@ class RFGS_OT_resume_job(_OnJob, InEnvironment, bpy.types.Operator):
 class RFGS_OT_forget_job(_OnJob, bpy.types.Operator):
     """Take a job that is over off the list; its files stay."""
 
-    bl_idname = "rfgs.forget_job"
     bl_label = "Remove from List"
     command = Command("forget", words={"folder": "folder"})
 
@@ -238,12 +230,10 @@ class RFGS_OT_forget_job(_OnJob, bpy.types.Operator):
         return f"{job.title} is off the list; its files stay"
 
 
-class RFGS_OT_import_result(_OnChosenJob, bpy.types.Operator):
+class RFGS_OT_import_result(_OnChosenJob, Undoable, bpy.types.Operator):
     """Bring the Gaussians of the chosen training into the scene."""
 
-    bl_idname = "rfgs.import_result"
     bl_label = "Import Result"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
 
     @classmethod
     def suits(cls, job: Job) -> bool:

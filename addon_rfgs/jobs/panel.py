@@ -23,8 +23,6 @@ _ICONS = {
 class RFGS_UL_jobs(bpy.types.UIList):
     """Jobs in the order in which they run."""
 
-    bl_idname = "RFGS_UL_jobs"
-
     def draw_item(
         self,
         _context: bpy.types.Context,
@@ -44,7 +42,6 @@ class RFGS_UL_jobs(bpy.types.UIList):
 class RFGS_PT_jobs(Tab, bpy.types.Panel):
     """The environment and the list of jobs."""
 
-    bl_idname = "RFGS_PT_jobs"
     bl_label = "Generate and Train"
 
     def draw(self, _context: bpy.types.Context) -> None:
@@ -92,15 +89,12 @@ def _draw_job(layout: bpy.types.UILayout, job: object, row: object) -> None:
 class RFGS_PT_generate(Tab, bpy.types.Panel):
     """What is generated."""
 
-    bl_idname = "RFGS_PT_generate"
     bl_parent_id = "RFGS_PT_jobs"
     bl_label = "Dataset"
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows the settings and the button."""
-        layout, settings = self.layout, context.scene.rfgs.jobs
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout, settings = self.columns(), context.scene.rfgs.jobs
         for name in ("dataset_folder", "radios"):
             layout.prop(settings, name)
         for line, icon in (
@@ -123,15 +117,12 @@ class RFGS_PT_generate(Tab, bpy.types.Panel):
 class RFGS_PT_train(Tab, bpy.types.Panel):
     """What is trained."""
 
-    bl_idname = "RFGS_PT_train"
     bl_parent_id = "RFGS_PT_jobs"
     bl_label = "Training"
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows the settings and the buttons."""
-        layout, settings = self.layout, context.scene.rfgs.jobs
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout, settings = self.columns(), context.scene.rfgs.jobs
         for name in ("run_folder", "train_radio", "train_frames", "iterations", "gaussians"):
             layout.prop(settings, name)
         layout.operator("rfgs.train_gaussians", icon="PLAY")

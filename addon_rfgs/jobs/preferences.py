@@ -5,10 +5,13 @@ from __future__ import annotations
 
 import os
 import textwrap
+from pathlib import Path
 
 import bpy
 
+from ..reporting import Reporting
 from .checking import CHECK
+from .environment import interpreter
 
 #: The add-on's own name; Blender keeps its preferences under it.
 ADDON = __package__.rpartition(".")[0]
@@ -19,16 +22,16 @@ _LINE = 40
 class RFGS_PG_job(bpy.types.PropertyGroup):
     """One row of the job list; the job itself lives in `queue.py`."""
 
-    title: bpy.props.StringProperty(  # type: ignore[valid-type]
+    title: bpy.props.StringProperty(
         name="Job", description="What the job does, and where", options={"SKIP_SAVE"}
     )
-    state: bpy.props.StringProperty(  # type: ignore[valid-type]
+    state: bpy.props.StringProperty(
         name="State", description="Whether it waits, runs or has ended", options={"SKIP_SAVE"}
     )
-    message: bpy.props.StringProperty(  # type: ignore[valid-type]
+    message: bpy.props.StringProperty(
         name="Message", description="How far it is, or why it ended", options={"SKIP_SAVE"}
     )
-    share: bpy.props.FloatProperty(  # type: ignore[valid-type]
+    share: bpy.props.FloatProperty(
         name="Progress",
         description="Share of its stage that is done",
         min=0.0,
@@ -43,28 +46,23 @@ class RFGS_AP_preferences(bpy.types.AddonPreferences):
 
     bl_idname = ADDON
 
-    python: bpy.props.StringProperty(  # type: ignore[valid-type]
+    python: bpy.props.StringProperty(
         name="Python Environment",
         description="Python program, or folder of a virtual environment, that has rfgs and "
         "rfgs-factory; jobs run there",
-        default="",
         subtype="FILE_PATH",
     )
-    blender: bpy.props.StringProperty(  # type: ignore[valid-type]
+    blender: bpy.props.StringProperty(
         name="Blender",
         description="Blender program, with this add-on, that jobs open the file with; empty: this "
         "one",
-        default="",
         subtype="FILE_PATH",
     )
-    jobs: bpy.props.CollectionProperty(  # type: ignore[valid-type]
+    jobs: bpy.props.CollectionProperty(
         name="Jobs", description="Rows of the job list", type=RFGS_PG_job, options={"SKIP_SAVE"}
     )
-    active_job: bpy.props.IntProperty(  # type: ignore[valid-type]
-        name="Active job",
-        description="Which row of the job list is chosen",
-        default=0,
-        options={"SKIP_SAVE"},
+    active_job: bpy.props.IntProperty(
+        name="Active job", description="Which row of the job list is chosen", options={"SKIP_SAVE"}
     )
 
     def draw(self, _context: bpy.types.Context) -> None:
@@ -110,3 +108,22 @@ def blender_program() -> str:
     if chosen and chosen.blender:
         return bpy.path.abspath(chosen.blender)
     return os.environ.get("BLENDER") or bpy.app.binary_path
+
+
+class InEnvironment(Reporting):
+    """Mixed into operators that run programs of the Python environment."""
+
+    python: bpy.props.StringProperty(
+        name="Python",
+        description="Python program or environment with rfgs; empty: the one of the preferences",
+        subtype="FILE_PATH",
+        options={"SKIP_SAVE"},
+    )
+
+    def interpreter(self) -> Path:
+        """Its Python program.
+
+        Raises:
+            AddonError: None is chosen, or there is none.
+        """
+        return interpreter(self.python or environment_path())

@@ -7,18 +7,16 @@ import bpy
 
 from ..command import Command
 from ..errors import AddonError
-from ..reporting import Progress, Reporting
+from ..reporting import Progress, Reporting, Undoable
 from . import coloring, commands
 from .guesses import assign, guesses, materials_in_use, named_material, settable
 from .properties import material_items
 
 
-class RFGS_OT_assign_material(Reporting, bpy.types.Operator):
+class RFGS_OT_assign_material(Undoable, bpy.types.Operator):
     """Make materials a building material of ITU-R P.2040, or skin, with its own thickness."""
 
-    bl_idname = "rfgs.assign_material"
     bl_label = "Assign Radio Material"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
     command = Command(
         "materials apply",
         reads={"materials": ("carrier_ghz",)},
@@ -28,12 +26,10 @@ class RFGS_OT_assign_material(Reporting, bpy.types.Operator):
         saves=True,
     )
 
-    radio_material: bpy.props.EnumProperty(  # type: ignore[valid-type]
-        name="Radio Material",
-        description="Electrical model",
-        items=material_items(guess=False),
+    radio_material: bpy.props.EnumProperty(
+        name="Radio Material", description="Electrical model", items=material_items(guess=False)
     )
-    to: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    to: bpy.props.EnumProperty(
         name="To",
         description="Which materials are set",
         items=[
@@ -42,25 +38,23 @@ class RFGS_OT_assign_material(Reporting, bpy.types.Operator):
             ("NAMED", "Named", "Those that are named"),
         ],
     )
-    materials: bpy.props.CollectionProperty(  # type: ignore[valid-type]
+    materials: bpy.props.CollectionProperty(
         type=bpy.types.OperatorFileListElement,
         name="Materials",
         description="Names of materials in the file",
         options={"SKIP_SAVE"},
     )
-    thickness_m: bpy.props.FloatProperty(  # type: ignore[valid-type]
+    thickness_m: bpy.props.FloatProperty(
         name="Thickness",
         description="Of the slab behind the surface [m]; 0 takes the material's own",
-        default=0.0,
         min=0.0,
         max=10.0,
         soft_max=1.0,
         precision=4,
     )
-    scattering: bpy.props.FloatProperty(  # type: ignore[valid-type]
+    scattering: bpy.props.FloatProperty(
         name="Scattering",
         description="Share of the reflected field's amplitude that is scattered diffusely",
-        default=0.0,
         min=0.0,
         max=1.0,
     )
@@ -85,7 +79,6 @@ class RFGS_OT_assign_material(Reporting, bpy.types.Operator):
 class RFGS_OT_guess_materials(Reporting, bpy.types.Operator):
     """List what the names and shapes of unlabelled materials suggest, to be confirmed."""
 
-    bl_idname = "rfgs.guess_materials"
     bl_label = "Guess from Names"
     command = Command("materials guess", add=commands.add_guess, work=commands.guess)
 
@@ -105,12 +98,10 @@ class RFGS_OT_guess_materials(Reporting, bpy.types.Operator):
         return f"{len(found)} guesses to confirm" if found else "Every material in use is labelled"
 
 
-class RFGS_OT_apply_guesses(Reporting, bpy.types.Operator):
+class RFGS_OT_apply_guesses(Undoable, bpy.types.Operator):
     """Set the materials that are ticked in the table, and clear it."""
 
-    bl_idname = "rfgs.apply_guesses"
     bl_label = "Apply Guesses"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
 
     @classmethod
     def ready(cls, context: bpy.types.Context) -> bool:
@@ -128,15 +119,13 @@ class RFGS_OT_apply_guesses(Reporting, bpy.types.Operator):
         return f"Set {count} materials"
 
 
-class RFGS_OT_color_materials(Reporting, bpy.types.Operator):
+class RFGS_OT_color_materials(Undoable, bpy.types.Operator):
     """Colour materials in the viewport by what they are to the radio, or put their own back.
 
     Seen in solid view with the colour Material; grey is what would be guessed
     """
 
-    bl_idname = "rfgs.color_materials"
     bl_label = "Colour by Radio Material"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
     command = Command(
         "materials color",
         unsaid={"action": "COLOR"},
@@ -144,7 +133,7 @@ class RFGS_OT_color_materials(Reporting, bpy.types.Operator):
         saves=True,
     )
 
-    action: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    action: bpy.props.EnumProperty(
         name="Action",
         description="What to do",
         items=[

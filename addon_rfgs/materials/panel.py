@@ -17,14 +17,11 @@ from .properties import RFGS_PG_guess
 class RFGS_PT_material(Tab, bpy.types.Panel):
     """Radio meaning of the active object's material."""
 
-    bl_idname = "RFGS_PT_material"
     bl_label = "Radio Materials"
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows the carrier, the electrical model and what replaces its defaults."""
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = self.columns()
         settings = context.scene.rfgs.materials
         layout.prop(settings, "carrier_ghz")
         bands = used_bands(context.scene)
@@ -85,7 +82,6 @@ class RFGS_UL_guesses(bpy.types.UIList):
 class RFGS_PT_guesses(Tab, bpy.types.Panel):
     """What materials seem to be."""
 
-    bl_idname = "RFGS_PT_guesses"
     bl_label = "Guesses"
     bl_parent_id = "RFGS_PT_material"
     bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012

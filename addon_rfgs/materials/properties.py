@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The radio meaning of a material, and the table of guesses."""
+"""The radio meaning of a material, what it is checked against, and the table of guesses."""
 
 from __future__ import annotations
 
@@ -37,36 +37,33 @@ def _changed(self: RFGS_PG_material, _context: bpy.types.Context) -> None:
 class RFGS_PG_material(bpy.types.PropertyGroup):
     """Radio meaning of a material."""
 
-    radio_material: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    radio_material: bpy.props.EnumProperty(
         name="Radio material",
         description="Electrical model of this surface",
         items=material_items(guess=True),
         default="AUTO",
         update=_changed,
     )
-    thickness_m: bpy.props.FloatProperty(  # type: ignore[valid-type]
+    thickness_m: bpy.props.FloatProperty(
         name="Thickness",
         description="Thickness of the slab behind this surface [m]; 0 takes the material's own",
-        default=0.0,
         min=0.0,
         soft_max=1.0,
         precision=4,
         step=0.1,
     )
-    scattering_coefficient: bpy.props.FloatProperty(  # type: ignore[valid-type]
+    scattering_coefficient: bpy.props.FloatProperty(
         name="Scattering",
         description="Share of the reflected field's amplitude that is scattered diffusely, 0 to 1",
-        default=0.0,
         min=0.0,
         max=1.0,
     )
-    colored: bpy.props.BoolProperty(  # type: ignore[valid-type]
+    colored: bpy.props.BoolProperty(
         name="Coloured",
         description="Whether the viewport colour shows the radio material for the time being",
-        default=False,
         options={"HIDDEN"},
     )
-    own_color: bpy.props.FloatVectorProperty(  # type: ignore[valid-type]
+    own_color: bpy.props.FloatVectorProperty(
         name="Own Colour",
         description="Viewport colour to be put back",
         size=4,
@@ -79,18 +76,14 @@ class RFGS_PG_material(bpy.types.PropertyGroup):
 class RFGS_PG_guess(bpy.types.PropertyGroup):
     """One material and what its name suggests."""
 
-    material: bpy.props.StringProperty(  # type: ignore[valid-type]
-        name="Material", description="Name of the material"
-    )
-    radio_material: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    material: bpy.props.StringProperty(name="Material", description="Name of the material")
+    radio_material: bpy.props.EnumProperty(
         name="Radio material",
         description="What it becomes when the table is applied",
         items=material_items(guess=False),
     )
-    why: bpy.props.StringProperty(  # type: ignore[valid-type]
-        name="Why", description="What the guess rests on"
-    )
-    use: bpy.props.BoolProperty(  # type: ignore[valid-type]
+    why: bpy.props.StringProperty(name="Why", description="What the guess rests on")
+    use: bpy.props.BoolProperty(
         name="Apply", description="Set this material when the table is applied", default=True
     )
 
@@ -98,9 +91,20 @@ class RFGS_PG_guess(bpy.types.PropertyGroup):
 class RFGS_PG_guesses(bpy.types.PropertyGroup):
     """The table of guesses that waits to be confirmed."""
 
-    rows: bpy.props.CollectionProperty(  # type: ignore[valid-type]
+    rows: bpy.props.CollectionProperty(
         type=RFGS_PG_guess, name="Guesses", description="One row for each unlabelled material"
     )
-    active: bpy.props.IntProperty(  # type: ignore[valid-type]
-        name="Guess", description="The active row of the table", default=0, min=0
+    active: bpy.props.IntProperty(name="Guess", description="The active row of the table", min=0)
+
+
+class RFGS_PG_materials(bpy.types.PropertyGroup):
+    """What materials are checked against."""
+
+    carrier_ghz: bpy.props.FloatProperty(
+        name="Carrier [GHz]",
+        description="Frequency at which materials must be known; 0: the bands of the scene's "
+        "radio devices",
+        min=0.0,
+        max=100.0,
+        precision=3,
     )

@@ -9,17 +9,15 @@ import numpy as np
 from ..command import Command
 from ..errors import AddonError
 from ..ownership import collections_of
-from ..reporting import Progress, Reporting, chosen_path
+from ..reporting import Progress, Undoable, chosen_path
 from .curves import COLLECTION, LINK, Choice, chosen, clear_paths, show_paths
 from .dataset import open_path_dataset, read_paths, recorded_frames
 
 
-class RFGS_OT_show_paths(Reporting, bpy.types.Operator):
+class RFGS_OT_show_paths(Undoable, bpy.types.Operator):
     """Show the traced paths of a link as curves coloured by power, frame by frame."""
 
-    bl_idname = "rfgs.show_paths"
     bl_label = "Show Paths"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
     command = Command(
         "paths",
         reads={
@@ -40,12 +38,10 @@ class RFGS_OT_show_paths(Reporting, bpy.types.Operator):
         return show_settings(context.scene, progress)
 
 
-class RFGS_OT_clear_paths(Reporting, bpy.types.Operator):
+class RFGS_OT_clear_paths(Undoable, bpy.types.Operator):
     """Remove every ray path from the file."""
 
-    bl_idname = "rfgs.clear_paths"
     bl_label = "Clear Paths"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
 
     @classmethod
     def ready(cls, _context: bpy.types.Context) -> bool:

@@ -9,15 +9,12 @@ from ..tab import Tab
 class RFGS_PT_paths(Tab, bpy.types.Panel):
     """Ray paths as curves."""
 
-    bl_idname = "RFGS_PT_paths"
     bl_label = "Ray Paths"
     bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows settings and the two buttons."""
-        layout, settings = self.layout, context.scene.rfgs.paths
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout, settings = self.columns(), context.scene.rfgs.paths
         for name in type(settings).bl_rna.properties.keys():
             if name not in {"rna_type", "name"}:
                 row = layout.row()

@@ -4,16 +4,14 @@
 import bpy
 
 from ..command import Command
-from ..reporting import Progress, Reporting
+from ..reporting import Progress, Undoable
 from .contents import remove_data
 
 
-class RFGS_OT_remove_data(Reporting, bpy.types.Operator):
+class RFGS_OT_remove_data(Undoable, bpy.types.Operator):
     """Remove devices, Gaussians, ray paths and every RF-GS setting from this file."""
 
-    bl_idname = "rfgs.remove_data"
     bl_label = "Remove RF-GS Data from File"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
     command = Command("remove-data", saves=True)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:

@@ -9,7 +9,6 @@ from ..tab import Tab
 class RFGS_PT_file(Tab, bpy.types.Panel):
     """What this file holds."""
 
-    bl_idname = "RFGS_PT_file"
     bl_label = "This File"
     bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
 

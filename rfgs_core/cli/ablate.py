@@ -66,7 +66,7 @@ def run(args: AblateArgs) -> int:
                 call("rfgs_core.cli", "eval", str(folder))
             done = open_run(folder)
             count = len(done.moving(done.frames[0]))
-            metrics = {**read_json(folder / "metrics.json"), "train_s": done.config["train_s"]}
+            metrics = {**read_json(folder / "metrics.json"), "train_s": done.config.train_s}
             rows.append(ablation_row(variant, metrics, count))
             write_text(args.out / "ablation.md", ablation_table(rows))
     sys.stdout.write(f"{ablation_table(rows)}\n{args.out / 'ablation.md'} written\n")

@@ -43,7 +43,7 @@ def run(args: CsiArgs) -> int:
     trained.need_frames()
     rx_device = args.rx_device
     if rx_device is None:
-        pairs = trained.sequence.layout(trained.config["radio"]).device_pairs
+        pairs = trained.sequence.layout(trained.config.radio).device_pairs
         rx_device = next((rx for tx, rx in pairs if tx == args.tx_device), None)
         if rx_device is None:
             senders = ", ".join(str(tx) for tx in sorted({tx for tx, _ in pairs}))

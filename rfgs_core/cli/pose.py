@@ -36,7 +36,7 @@ def run(args: PoseArgs) -> int:
 
     trained = open_run(args.run)
     trained.need_frames()
-    with tqdm(total=len(trained.frames) * trained.config["bodies"], desc="pose") as bar:
+    with tqdm(total=len(trained.frames) * trained.config.settings.bodies, desc="pose") as bar:
         estimate = estimate_poses(trained, bar.update)
     scores = score_poses(estimate, trained.sequence)
     arrays = {name: getattr(estimate, name) for name in ("time_s", "centroid", "joints")}

@@ -94,7 +94,7 @@ def _predict(
     from rfgs_core.predict.places import check_in_scene
     from rfgs_core.predict.prediction import predict_channel
 
-    name = trained.config["radio"]
+    name = trained.config.radio
     radio = trained.sequence.radio_spec(name)
     devices = np.array([device.position_m for device in trained.sequence.devices(name)])
     named = [("--tx", tx_xyz), *(("--rx", place) for place in rx_xyz)]
@@ -194,7 +194,7 @@ def _material(trained: Run, frame: int, args: PredictArgs) -> str:
     for other in runs:
         if other.sequence.path != trained.sequence.path:
             raise RfgsError(f"--also {other.path}: trained on another sequence; expected the same")
-        name = other.config["radio"]
+        name = other.config.radio
         radio, layout = other.sequence.radio_spec(name), other.sequence.layout(name)
         gaussians = other.head.radio_gaussians(other.moving(frame))
         parts.append(levels_of(gaussians, layout, radio.freq_hz))

@@ -164,7 +164,7 @@ def run(args: TrainArgs) -> int:
         fit_run_shader(trained, ShaderConfig.for_recipe(args.recipe, seed))
     sys.stdout.write(
         f"{args.out}: {len(frames)} frames, {len(trained.moving(frames[0]))} Gaussians, "
-        f"{trained.config['train_s']:.0f} s; next: rfgs eval {args.out}\n"
+        f"{trained.config.train_s:.0f} s; next: rfgs eval {args.out}\n"
     )
     return 0
 

@@ -60,7 +60,7 @@ class Backgrounds:
             return None
         static, seen = read_static_set(run.path), run.observations(run.frames[0])
         turn = np.ones((), dtype=np.complex64)
-        if run.config.get("calibrate", "none") != "none":
+        if run.config.settings.calibrate != "none":
             # As devices with the offsets of the capture hear it, like `Run.predict`.
             turn = read_calibration(run.path, run.frames[0]).capture.turn(layout, freq_hz)
         visible = np.where(seen.links[..., None] & seen.tones, seen.static * turn, np.nan)

@@ -79,7 +79,7 @@ def _circumstances(scene: Scene) -> dict[str, Any]:
         "limits": limits(scene),
         "trace_depth": run.sequence.trace_depth(scene.radio.name),
         "n_gaussians": len(run.gaussians(run.frames[0])),
-        "train_s": run.config.get("train_s"),
+        "train_s": run.config.train_s,
         "conditions": conditions(scene),
         "hardware": hardware(),
         "versions": versions(),

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
-
 import numpy as np
 import torch
 from jaxtyping import Float32
@@ -12,7 +10,6 @@ from tqdm import tqdm
 
 from rfgs_core.bodies.tracks import Tracks
 from rfgs_core.encode import Encoder
-from rfgs_core.errors import RfgsFormatError
 from rfgs_core.evaluate.geometry import surface_samples
 from rfgs_core.evaluate.grid import splat_gaussians
 from rfgs_core.evaluate.scene import EvaluatedRun, Scene
@@ -50,15 +47,8 @@ def _fit_from_surface(run: EvaluatedRun, config: TrainConfig, frame: int) -> Fra
 
 def oracle_scores(scene: Scene) -> dict[int, Float32[np.ndarray, "x y z"]]:
     """Score volume of each frame after the run's own fit from the true surface."""
-    names = {field.name for field in fields(TrainConfig)} - {"device"}
     run, grid = scene.run, scene.grid
-    missing = sorted(names - run.config.keys())
-    if missing:
-        raise RfgsFormatError(
-            f"{run.path / 'config.json'}: missing entries {', '.join(missing)}; train again, or "
-            "leave the ceiling out with --no-oracle"
-        )
-    config = TrainConfig(**{name: run.config[name] for name in names})
+    config = run.config.settings
     scores = {}
     for frame in tqdm(run.frames, desc="oracle_init", unit="frame"):
         with one_torch_thread():

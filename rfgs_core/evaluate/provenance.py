@@ -83,13 +83,13 @@ def conditions(scene: Scene) -> dict[str, Any]:
         "num_frames": len(scene.run.frames),
         "voxels_predicted": scene.voxels,
         "voxel_m": scene.grid.voxel_m,
-        "objective": scene.run.config.get("objective"),
+        "objective": scene.run.config.settings.objective,
         "observe": scene.observe,
         "packets": _packets(scene),
         "background": scene.background,
-        "density": scene.run.config.get("density"),
-        "recipe": scene.run.config.get("recipe"),
-        "seed": scene.run.config.get("seed"),
+        "density": scene.run.config.settings.density,
+        "recipe": scene.run.config.settings.recipe,
+        "seed": scene.run.config.settings.seed,
         "prior": "the person's position is not given; search is over the whole scene",
     }
 
@@ -110,7 +110,7 @@ def _packets(scene: Scene) -> str:
 
 def _calibration(scene: Scene) -> str:
     """Offsets of devices that were estimated and taken out."""
-    if scene.run.config.get("calibrate", "none") == "none":
+    if scene.run.config.settings.calibrate == "none":
         return "none"
     return calibration_text(scene.run.path, scene.run.frames)
 

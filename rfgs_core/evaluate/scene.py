@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from jaxtyping import Complex, Float, Float32, Float64
@@ -15,7 +15,6 @@ from rfgs_core.bodies.body_prior import Bodies
 from rfgs_core.dataset.observed import Observed, observed_csi
 from rfgs_core.dataset.sequence import Sequence
 from rfgs_core.dataset.splits import HeldOut
-from rfgs_core.errors import RfgsError
 from rfgs_core.evaluate.baselines.gaussian_process import krige, krige_level
 from rfgs_core.evaluate.baselines.interpolation import fill
 from rfgs_core.evaluate.evidence import Evidence
@@ -28,6 +27,7 @@ from rfgs_core.measure.observations import Kept, Observations
 from rfgs_core.radio import Layout, Radio
 from rfgs_core.radio.levels import power_of
 from rfgs_core.render.view import moving_gaussians
+from rfgs_core.run.config import RunConfig
 from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import Background, Observe, Packets
 
@@ -41,8 +41,8 @@ class EvaluatedRun(Protocol):
         ...
 
     @property
-    def config(self) -> dict[str, Any]:
-        """What was asked for: radio, sequence, frames, objective and seed."""
+    def config(self) -> RunConfig:
+        """What was asked for."""
         ...
 
     @property
@@ -119,11 +119,9 @@ class Scene:
         """Reads what all frames share.
 
         Raises:
-            RfgsError: Training did not name its radio, or nothing that moves has a surface.
+            RfgsError: Nothing that moves has a surface.
         """
-        sequence, name = run.sequence, run.config.get("radio")
-        if not isinstance(name, str):
-            raise RfgsError(f"{run.path / 'config.json'}: expected the name of a radio, got {name}")
+        sequence, name = run.sequence, run.config.radio
         radio, layout = sequence.radio_spec(name), sequence.layout(name)
         held_out = HeldOut.of(sequence.splits["rf"][name], layout, radio.num_subcarriers)
         grid = Grid.over(sequence.bounds_m)
@@ -136,17 +134,17 @@ class Scene:
     @property
     def observe(self) -> Observe:
         """What the radio reports."""
-        return self.run.config.get("observe", "complex")
+        return self.run.config.settings.observe
 
     @property
     def background(self) -> Background:
         """What the moving part was told from."""
-        return self.run.config.get("background", "empty_room")
+        return self.run.config.settings.background
 
     @property
     def packets(self) -> Packets:
         """Which packets of a frame were read."""
-        return self.run.config.get("packets", "first")
+        return self.run.config.settings.packets
 
     def csi(self, frame: int) -> Complex[np.ndarray, "tx rx subcarrier"]:
         """True channel of a frame: predictions are held against it, whatever was observed."""

@@ -83,7 +83,7 @@ def estimate_poses(run: Run, on_step: Callable[[], Any] = lambda: None) -> PoseE
 def _knees(run: Run, frame: int) -> Float64[np.ndarray, "body"]:
     """Where knees of who sits point [rad]; NaN of who stands, or where the run does not tell."""
     bodies = run.bodies(frame)
-    return np.full(run.config["bodies"], np.nan) if bodies is None else bodies.knees_rad
+    return np.full(run.config.settings.bodies, np.nan) if bodies is None else bodies.knees_rad
 
 
 def headings_of(
@@ -114,7 +114,7 @@ def _clouds(run: Run, frame: int, floor_m: float) -> list[Cloud]:
     body, means = attributes["body"], run.moving(frame).means.numpy().astype(np.float64)
     power = power_of(attributes["rf_power_db"].astype(np.float64))
     clouds = []
-    for number in range(run.config["bodies"]):
+    for number in range(run.config.settings.bodies):
         own = body == number
         if not own.any():
             raise RfgsError(

@@ -112,7 +112,7 @@ def _write(
         title=f"RF-GS on {info.scene}",
         lead=(
             f"{len(frames)} frames at {first.sequence.fps:g} frames per second, seen by "
-            f"{', '.join(str(run.config['radio']) for run, _ in runs)}. The Gaussians are fitted "
+            f"{', '.join(str(run.config.radio) for run, _ in runs)}. The Gaussians are fitted "
             "to channel state information alone; colours are added afterwards, for display."
         ),
         scene=_scene_shots(first),

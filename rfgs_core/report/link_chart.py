@@ -60,7 +60,7 @@ def link_channels(run: Run, tx_device: int, rx_device: int) -> LinkChannels:
     Raises:
         RfgsError: The radio does not measure this link.
     """
-    sequence, name = run.sequence, run.config["radio"]
+    sequence, name = run.sequence, run.config.radio
     layout, radio = sequence.layout(name), sequence.radio_spec(name)
     pairs = layout.device_pairs
     if (tx_device, rx_device) not in pairs:

@@ -3,10 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -18,6 +16,7 @@ from rfgs_core.encode.path_features import PathFeatures
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import sha256, write_bytes
 from rfgs_core.radio.path_table import PathTable
+from rfgs_core.run.config import RunConfig
 from rfgs_core.settings import Packets, TrainConfig
 
 #: Name of a learned encoder inside a run.
@@ -65,7 +64,7 @@ def refuse_other_radios(file: Path, sequence: Sequence, radio: str, packets: Pac
     encoder.radio.refuse_others(own, encoder.name)
 
 
-def run_encoder(run: Path, config: Mapping[str, Any], sequence: Sequence, frame: int) -> Encoder:
+def run_encoder(run: Path, config: RunConfig, sequence: Sequence, frame: int) -> Encoder:
     """The encoder of a run with the given settings.
 
     Args:
@@ -78,12 +77,12 @@ def run_encoder(run: Path, config: Mapping[str, Any], sequence: Sequence, frame:
         RfgsError: Its learned encoder is missing, damaged or another one, or the dataset holds no
             paths.
     """
-    if config["encoder"] == "paths":
-        return PathFeatures(moving_paths(sequence, config["radio"], frame))
-    if config["encoder"] != "cnn":
+    if config.settings.encoder == "paths":
+        return PathFeatures(moving_paths(sequence, config.radio, frame))
+    if config.settings.encoder != "cnn":
         return MATCHED_FILTER
     file = run / ENCODER_FILE
-    expected = config["encoder_sha256"]
+    expected = config.settings.encoder_sha256
     if file.is_file() and sha256(file) != expected:
         raise RfgsError(
             f"{file} is not the encoder that this run began with (expected digest "

@@ -7,7 +7,6 @@ import os
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, get_args
 
 import numpy as np
 import torch
@@ -18,7 +17,6 @@ from rfgs_core.bodies.body_prior import Bodies
 from rfgs_core.dataset import Sequence, open_dataset
 from rfgs_core.dataset.observed import Observed
 from rfgs_core.errors import RfgsError, RfgsFormatError
-from rfgs_core.files import read_json
 from rfgs_core.gaussians import FEATURE_DIM, Gaussians
 from rfgs_core.gaussians.ply import read_ply
 from rfgs_core.measure.observations import Kept, Observations, Reported, observe
@@ -28,15 +26,12 @@ from rfgs_core.model.reflectivity import fitted_reflectivities
 from rfgs_core.model.unseen_pairs import levelled
 from rfgs_core.radio.levels import power_of
 from rfgs_core.run.calibration import read_calibration
+from rfgs_core.run.config import RunConfig
 from rfgs_core.run.static import static_gaussians
-from rfgs_core.settings import TrainConfig
 from rfgs_core.threads import one_torch_thread
 
-#: Schema of `config.json`.
-SCHEMA = "rfgs-run/1"
 #: What a learned background is kept in.
 BACKGROUND_FILE = "background.npz"
-_NEEDED = ("dataset", "dataset_fingerprint", "sequence", "radio", "frames")
 _REMEDY = "train this run again"
 _ATTRIBUTES: dict[str, Shape] = {"features": ("M", FEATURE_DIM), "rf_power_db": ("M",)}
 
@@ -47,18 +42,18 @@ class Run:
 
     path: Path
     """The folder."""
-    config: dict[str, Any]
-    """What was asked for, and what training added (`train_s`)."""
+    config: RunConfig
+    """What was asked for, and what it took."""
 
     @property
     def frames(self) -> list[int]:
         """Frames the run was trained on."""
-        return list(self.config["frames"])
+        return list(self.config.frames)
 
     @property
     def channel(self) -> Observed:
         """Which channel the run was fitted to."""
-        return self.config["channel"]
+        return self.config.settings.channel
 
     @property
     def sequence(self) -> Sequence:
@@ -67,15 +62,14 @@ class Run:
         Raises:
             RfgsError: The dataset is gone or is not the one of training.
         """
-        place = (self.path / self.config["dataset"]).resolve()
-        return _sequence(
-            self.path, place, self.config["sequence"], self.config["dataset_fingerprint"]
-        )
+        config = self.config
+        place = (self.path / config.dataset).resolve()
+        return _sequence(self.path, place, config.sequence, config.dataset_fingerprint)
 
     @property
     def calibrated(self) -> bool:
         """Whether offsets of devices are taken out before the fit."""
-        return self.config.get("calibrate", "none") != "none"
+        return self.config.settings.calibrate != "none"
 
     def observations(self, frame: int, kept: Kept | None = None) -> Observations:
         """What the fit sees of a frame: as reported, without the offsets of a calibrated run."""
@@ -86,16 +80,21 @@ class Run:
 
     def as_reported(self, frame: int, kept: Kept | None = None) -> Observations:
         """The channel of a frame as the run's radios report it."""
+        settings = self.config.settings
         return observe(
-            *(self.sequence, self.config["radio"], frame, self.channel),
-            *(self.config.get("observe", "complex"), self._background()),
-            packets=self.config.get("packets", "first"),
+            self.sequence,
+            self.config.radio,
+            frame,
+            channel=settings.channel,
+            kind=settings.observe,
+            empty=self._background(),
+            packets=settings.packets,
             kept=kept,
         )
 
     def _background(self) -> Reported | None:
         """The learned background that training keeps; None with an empty-room capture."""
-        if self.config.get("background", "empty_room") == "empty_room":
+        if self.config.settings.background == "empty_room":
             return None
         shapes = {"empty": ("tx", "rx", "entry")}
         return load_arrays(self.path / BACKGROUND_FILE, _REMEDY, shapes)["empty"]
@@ -197,8 +196,8 @@ class Run:
         with one_torch_thread():
             gamma = fitted_reflectivities(
                 *(observations, head, gaussians, power),
-                self.config.get("unexplained", TrainConfig.unexplained),
-                self.config.get("solver_steps", TrainConfig.solver_steps),
+                self.config.settings.unexplained,
+                self.config.settings.solver_steps,
             )
         assert gamma is not None
         features = head.with_gamma(gaussians.features, gamma)
@@ -279,42 +278,6 @@ def open_run(path: Path) -> Run:
 
     Raises:
         RfgsError: There is no run.
-        RfgsFormatError: It is of a newer version, or damaged.
+        RfgsFormatError: It is of another version, or damaged.
     """
-    if not (path / "config.json").exists():
-        raise RfgsError(f"{path} is not a run: it has no config.json; `rfgs train` makes one")
-    config = read_json(path / "config.json")
-    if not isinstance(config, dict) or config.get("schema") != SCHEMA:
-        found = config.get("schema") if isinstance(config, dict) else type(config).__name__
-        raise RfgsFormatError(
-            f"{path / 'config.json'}: expected schema {SCHEMA}, found {found}; "
-            "use the version of rfgs that made it, or train again"
-        )
-    missing = [name for name in _NEEDED if name not in config]
-    if missing:
-        raise RfgsFormatError(
-            f"{path / 'config.json'}: expected entries {', '.join(missing)}, which are missing; "
-            "train again"
-        )
-    if config.setdefault("channel", "clean") not in get_args(Observed):
-        raise RfgsFormatError(
-            f"{path / 'config.json'}: channel: expected one of {', '.join(get_args(Observed))}, "
-            f"found {config['channel']!r}; train again"
-        )
-    frames = config["frames"]
-    if (
-        not isinstance(frames, list)
-        or not frames
-        or not all(type(number) is int for number in frames)
-    ):
-        raise RfgsFormatError(
-            f"{path / 'config.json'}: frames: expected a list of numbers, found {frames!r}; "
-            "train again"
-        )
-    for name in _NEEDED[:-1]:
-        if not isinstance(config[name], str):
-            raise RfgsFormatError(
-                f"{path / 'config.json'}: {name}: expected a text, found {config[name]!r}; "
-                "train again"
-            )
-    return Run(path, config)
+    return Run(path, RunConfig.read(path))

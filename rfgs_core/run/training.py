@@ -23,7 +23,6 @@ from rfgs_core.bodies.tracks import Tracks
 from rfgs_core.dataset import Dataset, Sequence
 from rfgs_core.device import need_device
 from rfgs_core.errors import RfgsError
-from rfgs_core.files import read_json, write_json
 from rfgs_core.fit.calibrate import calibrate
 from rfgs_core.fit.frame import FrameState, start_frame
 from rfgs_core.fit.parameters import GAUSSIAN_SHAPES
@@ -41,6 +40,7 @@ from rfgs_core.run.calibration import (
     read_calibration,
     write_calibration,
 )
+from rfgs_core.run.config import CONFIG_FILE, RunConfig
 from rfgs_core.run.encoders import (
     ENCODER_FILE,
     keep_encoder,
@@ -49,7 +49,6 @@ from rfgs_core.run.encoders import (
 )
 from rfgs_core.run.folder import (
     BACKGROUND_FILE,
-    SCHEMA,
     Run,
     checkpoint_path,
     open_run,
@@ -125,20 +124,17 @@ def train_sequence(
         refuse_other_radios(encoder_file, sequence, radio, config.packets)
     bodies = sum(1 for row in sequence.instances if row["class"] == "person")
     config = replace(config, bodies=max(bodies, 1))
-    settings: dict[str, Any] = {
-        "schema": SCHEMA,
-        "dataset": relative_dataset(out, dataset.path),
-        "dataset_fingerprint": dataset.fingerprint,
-        "sequence": sequence.name,
-        "radio": radio,
-        "frames": frames,
-        **asdict(config),
-        # As it is read back.
-        "without": list(config.without),
-    }
-    # Not a property of the result: a run may go on elsewhere.
-    del settings["device"]
-    run = _open_or_create(out, settings)
+    run = _open_or_create(
+        out,
+        RunConfig(
+            dataset=relative_dataset(out, dataset.path),
+            dataset_fingerprint=dataset.fingerprint,
+            sequence=sequence.name,
+            radio=radio,
+            frames=frames,
+            settings=config,
+        ),
+    )
     if encoder_file is not None and not (out / ENCODER_FILE).exists():
         keep_encoder(encoder_file, out)
     if config.background == "learned" and not (out / BACKGROUND_FILE).exists():
@@ -146,7 +142,7 @@ def train_sequence(
         if config.static_set:
             empty = without_movers(sequence, radio, empty, config)
         save_arrays(out / BACKGROUND_FILE, {"empty": empty})
-    spent = float(run.config.get("train_s", 0.0))
+    spent = run.config.train_s
     before: FrameState | None = None
     total = len(frames) * (config.iterations + 2)
     with (
@@ -161,7 +157,7 @@ def train_sequence(
                     state = _fit(run, frame, config, before, bar, curves.of_frame(frame))
                 _store(run, frame, state)
                 spent += time.perf_counter() - begin
-                write_json(out / "config.json", {**settings, "train_s": round(spent, 2)})
+                replace(run.config, train_s=round(spent, 2)).write(out)
             else:
                 bar.update(config.iterations + 2)
             before = state
@@ -173,9 +169,9 @@ def train_sequence(
         with one_torch_thread():
             write_static_set(out, fit_static_set(observations, config.static_set, seed))
         spent += time.perf_counter() - begin
-        write_json(out / "config.json", {**settings, "train_s": round(spent, 2)})
+        replace(run.config, train_s=round(spent, 2)).write(out)
     _write_point_cloud(run)
-    return Run(out, read_json(out / "config.json"))
+    return open_run(out)
 
 
 def _fit(
@@ -187,7 +183,7 @@ def _fit(
     scalars: Scalars | None = None,
 ) -> FrameState:
     """Runs all stages on one frame."""
-    seed = sub_seed(config.seed, run.config["sequence"], run.config["radio"], frame, "fit")
+    seed = sub_seed(config.seed, run.config.sequence, run.config.radio, frame, "fit")
     if config.calibrate != "none":
         _calibrate(run, frame, config, seed)
     observations = run.observations(frame)
@@ -230,18 +226,17 @@ def _calibrate(run: Run, frame: int, config: TrainConfig, seed: int) -> None:
     write_calibration(run.path, frame, calibrate(reported, config, seed, known))
 
 
-def _open_or_create(out: Path, settings: dict[str, Any]) -> Run:
-    path = out / "config.json"
-    if not path.exists():
+def _open_or_create(out: Path, config: RunConfig) -> Run:
+    if not (out / CONFIG_FILE).exists():
         if out.exists() and not out.is_dir():
             raise RfgsError(f"{out} is a file; expected a folder, choose another --out")
         # Whoever starts a training from elsewhere keeps its log there.
         if out.exists() and any(entry.name != "log" for entry in out.iterdir()):
             raise RfgsError(f"{out} is not empty and not a run; choose another --out")
-        write_json(path, settings)
-        return Run(out, settings)
+        config.write(out)
+        return Run(out, config)
     run = open_run(out)
-    differing = [key for key, value in settings.items() if run.config.get(key) != value]
+    differing = config.differing(run.config)
     if differing:
         raise RfgsError(
             f"{out} holds a run with another {', '.join(differing)}; choose another --out or "

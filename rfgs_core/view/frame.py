@@ -118,7 +118,7 @@ def distance_m(points: Float[np.ndarray, "M 3"], truth: Mesh | None) -> Float32[
 def _phase_rad(run: Run, frame: int) -> Float64[np.ndarray, "M"]:
     """Phase of what the moving Gaussians reflect, at the middle of the band."""
     gaussians = run.head.radio_gaussians(run.moving(frame))
-    return reflectors(gaussians, run.sequence.radio_spec(run.config["radio"]).freq_hz).phase_rad
+    return reflectors(gaussians, run.sequence.radio_spec(run.config.radio).freq_hz).phase_rad
 
 
 def still_values(run: Run, count: int) -> Float32[np.ndarray, "2 count"]:

@@ -81,7 +81,7 @@ class Viewer:
                 f"{run.path}: nothing to colour by {mode}; expected one of {', '.join(self.scales)}"
             )
         self._cameras = {row["name"]: Camera.from_dict(row) for row in run.sequence.cameras}
-        room, radio = room_of(run.sequence), radio_shapes(run.sequence, run.config["radio"])
+        room, radio = room_of(run.sequence), radio_shapes(run.sequence, run.config.radio)
         first = self._frame_of(begin)
         offer = Offer(
             title=self._title(),
@@ -181,7 +181,7 @@ class Viewer:
         self.stage.draw_cameras(list(self._cameras.values()))
 
     def _title(self) -> str:
-        sequence, name = self._run.sequence, self._run.config["radio"]
+        sequence, name = self._run.sequence, self._run.config.radio
         radio = sequence.radio_spec(name)
         return (
             f"**{sequence.name}**, {name} {radio.freq_min_hz / 1e9:g}–{radio.freq_max_hz / 1e9:g} "

@@ -95,7 +95,7 @@ def own_run(static_run: Run, walled: Path, tmp_path: Path) -> Run:
     shutil.copytree(walled, tmp_path / "dataset")
     shutil.copytree(static_run.path, tmp_path / "run")
     config = tmp_path / "run" / "config.json"
-    config.write_text(config.read_text().replace(static_run.config["dataset"], "../dataset"))
+    config.write_text(config.read_text().replace(static_run.config.dataset, "../dataset"))
     return open_run(tmp_path / "run")
 
 

@@ -24,6 +24,8 @@ from rfgs_core.gaussians.model import FEATURE_DIM, Gaussians
 from rfgs_core.measure.observations import Kept, Observations, observe
 from rfgs_core.radio import Radio, layout, place_devices
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.run.config import RunConfig
+from rfgs_core.settings import TrainConfig
 
 BOUNDS_M = np.array([[0.0, 0.0, 0.0], [4.0, 3.5, 2.5]])
 
@@ -36,7 +38,9 @@ class SurfaceRun:
     sequence: Sequence
     shift_m: np.ndarray = field(default_factory=lambda: np.zeros(3))
     frames: list[int] = field(default_factory=lambda: [1, 2])
-    config: dict[str, Any] = field(default_factory=lambda: {"radio": "wifi", "train_s": 1.5})
+    config: RunConfig = field(
+        default_factory=lambda: RunConfig("", "", "tiny", "wifi", [1, 2], TrainConfig(), 1.5)
+    )
     channel: Observed = "clean"
 
     def gaussians(self, frame: int) -> Gaussians:
@@ -61,7 +65,7 @@ class SurfaceRun:
         return Bodies.standing(centre[None, :2].astype(np.float64))
 
     def observations(self, frame: int, kept: Kept | None = None) -> Observations:
-        kind = self.config.get("observe", "complex")
+        kind = self.config.settings.observe
         return observe(self.sequence, "wifi", frame, kind=kind, kept=kept)
 
     def predict(self, frame: int) -> np.ndarray:

@@ -103,7 +103,8 @@ def test_resuming_gives_the_same_bytes(calibrated: Run, train, quick_config) -> 
 def test_predictions_are_those_of_devices_with_the_captures_offsets(calibrated: Run) -> None:
     elements = calibrated.sequence.layout("wifi")
     turn = CAPTURE.turn(elements, calibrated.sequence.radio_spec("wifi").freq_hz)
-    plain = replace(calibrated, config={**calibrated.config, "calibrate": "none"})
+    settings = replace(calibrated.config.settings, calibrate="none")
+    plain = replace(calibrated, config=replace(calibrated.config, settings=settings))
     own = elements.tx_device[:, None] == elements.rx_device
     np.testing.assert_allclose(calibrated.predict(1)[own], plain.predict(1)[own], rtol=1e-4)
     between = calibrated.predict(1)[~own] * np.conj(turn[~own])

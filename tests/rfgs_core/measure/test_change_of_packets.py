@@ -209,7 +209,7 @@ def test_the_fit_and_its_controls_see_the_same_estimate(
     config = replace(quick_config, channel="impaired", packets="all")
     run = train(own_dataset, tmp_path / "run", config)
     frame = run.frames[0]
-    assert run.config["packets"] == "all"
+    assert run.config.settings.packets == "all"
     seen, clean = run.observations(frame), observe(walking(), "wifi", frame)
     raw = observe(walking(), "wifi", frame, "impaired")
     # Links that lost their first packet are known from the others.

@@ -77,7 +77,7 @@ def test_a_run_keeps_its_encoder_and_refuses_another(
 
     run = train(config, file)
     assert (run.path / ENCODER_FILE).read_bytes() == encoder_file.read_bytes()
-    assert run.config["encoder"] == "cnn"
+    assert run.config.settings.encoder == "cnn"
     points = np.array([[1.3, 1.4, 1.0]])
     seen = observe(data.sequence(), "wifi", 1)
     kept = run_encoder(run.path, run.config, run.sequence, 1)

@@ -189,9 +189,20 @@ def test_settings_without_a_needed_entry_are_refused(own_run: Path) -> None:
         open_run(own_run)
 
 
+def test_a_run_with_options_that_are_gone_is_refused_by_their_names(own_run: Path) -> None:
+    old = {"power_trust": 0.0, "coarse_share": 0.0}
+    write_json(own_run / "config.json", {**read_json(own_run / "config.json"), **old})
+    expected = r"config\.json: .*found coarse_share, power_trust unknown; .*or train again"
+    with pytest.raises(RfgsFormatError, match=expected):
+        open_run(own_run)
+
+
 @pytest.mark.parametrize(
     ("name", "value"),
     [
+        ("seed", "x"),
+        ("unexplained", None),
+        ("without", "prune"),
         ("frames", []),
         ("frames", ["../../elsewhere"]),
         ("frames", 7),

@@ -111,10 +111,9 @@ def test_the_same_command_again_changes_nothing(
     trained_run: Run, tiny_dataset: Path, train, quick_config, tmp_path: Path
 ) -> None:
     before = result_bytes(trained_run)
-    config = read_json(trained_run.path / "config.json")
     again = train(tiny_dataset, trained_run.path, quick_config)
     assert result_bytes(again) == before
-    assert again.config == config
+    assert again.config == trained_run.config
 
 
 def test_another_folder_gives_the_same_bytes_and_another_seed_others(
@@ -207,7 +206,7 @@ def test_a_run_of_a_newer_version_is_not_continued(
     trained_run: Run, tiny_dataset: Path, train, quick_config, tmp_path
 ) -> None:
     run = Path(shutil.copytree(trained_run.path, tmp_path / "run"))
-    write_json(run / "config.json", {**trained_run.config, "schema": "rfgs-run/2"})
+    write_json(run / "config.json", {**trained_run.config.entries, "schema": "rfgs-run/2"})
     with pytest.raises(RfgsFormatError, match="expected schema rfgs-run/1, found rfgs-run/2"):
         train(tiny_dataset, run, quick_config)
 
@@ -275,7 +274,7 @@ def test_the_other_objectives_run_and_resume(
         assert all(torch.isfinite(value).all() for _, value in gaussians.items())
         assert np.isfinite(run.predict(frame)).all()
         assert np.abs(run.predict(frame)).max() > 0
-    assert open_run(tmp_path / "run").config["objective"] == objective
+    assert open_run(tmp_path / "run").config.settings.objective == objective
 
 
 def test_one_frame_alone_is_a_run(tiny_dataset: Path, train, quick_config, tmp_path) -> None:

@@ -10,12 +10,13 @@ import torch
 
 from rfgs_core.arrays import save_arrays
 from rfgs_core.dataset import Sequence, open_dataset
-from rfgs_core.files import write_json
 from rfgs_core.gaussians import FEATURE_DIM, Gaussians
 from rfgs_core.gaussians.ply import cloud_of, write_ply
 from rfgs_core.model.head import RadioHead
 from rfgs_core.render.shader import Shader
-from rfgs_core.run.folder import SCHEMA, relative_dataset
+from rfgs_core.run.config import RunConfig
+from rfgs_core.run.folder import relative_dataset
+from rfgs_core.settings import TrainConfig
 
 #: Static Gaussians, which have no radio values of their own.
 STATIC = 3
@@ -59,17 +60,14 @@ def write_run(folder: Path, dataset_path: Path, trained_on: Path | None = None) 
     """A run of two frames with a shader; `trained_on` may hold less than the dataset."""
     sequence = open_dataset(dataset_path).sequence()
     dataset = open_dataset(trained_on or dataset_path)
-    write_json(
-        folder / "config.json",
-        {
-            "schema": SCHEMA,
-            "dataset": relative_dataset(folder, dataset.path),
-            "dataset_fingerprint": dataset.fingerprint,
-            "sequence": sequence.name,
-            "radio": "wifi",
-            "frames": sequence.frames,
-        },
-    )
+    RunConfig(
+        dataset=relative_dataset(folder, dataset.path),
+        dataset_fingerprint=dataset.fingerprint,
+        sequence=sequence.name,
+        radio="wifi",
+        frames=sequence.frames,
+        settings=TrainConfig(),
+    ).write(folder)
     corner = np.array([[0.1, 0.1, z] for z in np.linspace(0.5, 1.5, STATIC)])
     write_ply(folder / "gaussians/static.ply", cloud_of(_gaussians(corner, np.full(STATIC, 0.9))))
     for frame in sequence.frames:

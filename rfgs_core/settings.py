@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Literal
 
 from rfgs_core.dataset.observed import Observed
 from rfgs_core.device import Device
+from rfgs_core.errors import RfgsError
 
 Objective = Literal["paper", "csi", "both"]
 Recipe = Literal["rfgs", "paper"]
@@ -31,41 +32,77 @@ Part = Literal["rf_weights", "densify", "feature_gradients", "prune"]
 Density = Literal["none", "paper", "3dgs", "residual", "motion"]
 
 
-@dataclass(frozen=True)
-class TrainConfig:
-    """Settings of the fit of one frame; saved as JSON beside every result."""
+@dataclass(frozen=True, kw_only=True)
+class Choices:
+    """What a user chooses of a training run; each is an option of `rfgs train`."""
 
     objective: Objective = "csi"
-    """paper: eq. 4–7; csi: the propagation model; both: their sum."""
+    """csi: the propagation model; paper: eq. 4-7 of the paper; both: their sum."""
     channel: Observed = "clean"
-    """clean: the traced channel; impaired: what imperfect radios make of it."""
+    """clean: the traced channel; impaired: what `rfgs-factory impair` made of it. The empty room
+    stays clean, since its capture can be averaged."""
     observe: Observe = "complex"
-    """What the radio reports of that channel; no stage sees more."""
+    """What the radio reports, and all that any stage sees: complex, the channel itself; power,
+    |CSI|^2 per link and tone; delay_power, the power of each link's delay profile."""
+    background: Background = "empty_room"
+    """What the moving part is told from: empty_room, its capture; learned, the median over all
+    frames of the sequence, where nobody recorded the empty room."""
+    static_set: int = 0
+    """Gaussians of what stands still, shared by all frames and fitted to the background less the
+    direct paths; 0: none. With --background learned, what moves is then taken out of every frame
+    before the median is taken again. Needs --observe complex."""
+    density: Density | None = None
+    """How Gaussians come and go: none; paper, section 3.5 of the paper (needs its losses); 3dgs,
+    clone, split, prune and reset; residual, new ones where the back-projected residual peaks;
+    motion, between frames, more for a body that moves fast and fewer for one that stands still.
+    Left out: paper with the paper's losses, else none."""
+    recipe: Recipe = "rfgs"
+    """rfgs: our start, rates and steps; paper: the paper's numbers (sections 3.2-3.6)."""
+    calibrate: Calibrate = "none"
+    """Estimate each device's phase and timing offset and take them out: of oscillators (phase), of
+    clocks (timing) or both. From the empty room first, then together with the Gaussians."""
+    seed: int = 0
+    """Root seed; 0 is a seed like any other."""
+    device: Device = "cpu"
+    """Where reflectivities are solved and Gaussians refined: cpu, or cuda, the current GPU."""
+    without: tuple[Part, ...] = ()
+    """Leave out parts of the paper's recipe, as its table 2 does: rf_weights (in eq. 5), densify,
+    feature_gradients (their condition for new Gaussians), prune; see `rfgs ablate`."""
+    temporal: float = 0.0
+    """Weight with which Gaussians are held to their place on the body from frame to frame."""
+    posture: Posture = "told"
+    """told: the radio decides in every frame who stands and who sits, and where the knees point;
+    standing: everybody stands, as is assumed without phases anyway."""
+
+    def __post_init__(self) -> None:
+        """Refuses values that no option may have.
+
+        Raises:
+            RfgsError: One is out of range, or two do not go together.
+        """
+        if self.without and self.objective == "csi":
+            raise RfgsError(
+                "--without leaves out parts of the paper's losses; expected --objective paper or "
+                "both"
+            )
+        if not self.temporal >= 0.0:
+            raise RfgsError(f"--temporal {self.temporal}: expected at least 0")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainConfig(Choices):
+    """Settings of the fit of one frame; saved as JSON beside every result."""
+
     packets: Packets = "first"
     """Which packets of a frame are read; see `packets_to_read`."""
-    background: Background = "empty_room"
-    """What the moving part is told from."""
-    static_set: int = 0
-    """Gaussians of what stands still, fitted to the background; 0: none."""
-    recipe: Recipe = "rfgs"
-    """rfgs: our start, rates and steps; paper: the paper's numbers (sections 3.2–3.6)."""
     num_gaussians: int = 6000
     """Moving Gaussians at the start of the first frame."""
     bodies: int = 1
     """Moving bodies in the scene; taken from the dataset's instances."""
-    posture: Posture = "told"
-    """How bodies are taken to hold themselves; without phases they stand."""
     solver_steps: int = 8
     """Conjugate-gradient steps for the reflectivities."""
     iterations: int = 80
     """Adam steps per frame (the paper: 10,000)."""
-    without: tuple[Part, ...] = ()
-    """Parts of the paper's recipe that are left out."""
-    temporal: float = 0.0
-    """Weight of the pull of each Gaussian to its place on the body in the frame before."""
-    density: Density | None = None
-    """How Gaussians come and go while they are refined; None: as the objective does, the
-    paper's rule with the paper's losses and none without."""
     batch_entries: int = 8192
     """Channel entries (links times tones) per Adam step of the channel loss."""
     batch_points: int = 1024
@@ -78,24 +115,29 @@ class TrainConfig:
     """What gives φ (eq. 2)."""
     encoder_sha256: str = ""
     """Digest of the learned encoder's file; empty for the others."""
-    device: Device = "cpu"
-    """Where reflectivities are solved and Gaussians refined."""
     unexplained: float = 0.5
     """Share of each device pair's power that the model is not asked to explain."""
-    calibrate: Calibrate = "none"
-    """Offsets of devices that are estimated and taken out before the fit."""
-    seed: int = 0
-    """Root seed."""
+
+    def __post_init__(self) -> None:
+        """Refuses values that no setting may have.
+
+        Raises:
+            RfgsError: One is out of range, or two do not go together.
+        """
+        super().__post_init__()
+        if self.iterations < 0:
+            raise RfgsError(f"--iterations {self.iterations}: expected at least 0")
+        if self.num_gaussians < 1:
+            raise RfgsError(f"--gaussians {self.num_gaussians}: expected at least 1")
 
     @staticmethod
-    def of_recipe(recipe: Recipe, objective: Objective, seed: int) -> TrainConfig:
-        """Settings of a recipe."""
-        if recipe == "paper":
-            return TrainConfig(
-                objective=objective,
-                recipe=recipe,
-                seed=seed,
-                iterations=10_000,
-                refine_levels=0,
-            )
-        return TrainConfig(objective=objective, recipe=recipe, seed=seed)
+    def chosen(
+        choices: Choices, *, iterations: int | None = None, num_gaussians: int | None = None
+    ) -> TrainConfig:
+        """Settings of the chosen recipe; what is None is the recipe's own."""
+        paper = choices.recipe == "paper"
+        own = {"iterations": 10_000, "refine_levels": 0} if paper else {}
+        asked = {"iterations": iterations, "num_gaussians": num_gaussians}
+        values = {field.name: getattr(choices, field.name) for field in fields(Choices)}
+        asked = {name: value for name, value in asked.items() if value is not None}
+        return TrainConfig(**{**values, **own, **asked})

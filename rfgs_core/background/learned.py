@@ -23,12 +23,8 @@ from tqdm import tqdm
 from rfgs_core.dataset.observed import Observed
 from rfgs_core.errors import RfgsError
 from rfgs_core.fit.frame import explained_change, solved_frame
-from rfgs_core.measure.observations import (
-    Reported,
-    observe,
-    reported,
-    visible_channel,
-)
+from rfgs_core.measure.kinds import KINDS, Reported
+from rfgs_core.measure.observations import observe, visible_channel
 from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import Observe, Packets, TrainConfig
 from rfgs_core.threads import one_torch_thread
@@ -86,7 +82,7 @@ def learned_background(
     for frame in sequence.frames:
         _, links, tones, csi = visible_channel(sequence, radio, frame, channel, packets)
         mean = csi[0] if len(csi) == 1 else _mean(np.where(tones, csi, 0))
-        values = reported(np.where(tones, mean, 0), tones, kind)
+        values = KINDS[kind].report(np.where(tones, mean, 0), tones)
         rows.append(np.where(links[..., None], values, np.nan)[measured])
         ever |= links
         shape = values.shape

@@ -69,18 +69,8 @@ def bench_training(
     """
     bench = bench or TrainingBench()
     need_device(bench.device)
-    sequence = open_dataset(dataset).sequence()
-    if radio not in sequence.radios:
-        raise RfgsError(f"{dataset} has no radio {radio!r}; it has {', '.join(sequence.radios)}")
-    frame = chosen_frames(None if frame is None else str(frame), sequence.frames)[0]
-    whole = observe(sequence, radio, frame)
-    rng = np.random.default_rng(sub_seed(0, "bench training"))
-    aside = whole.links & (rng.random(whole.links.shape) < 0.1)
-    seen = replace(
-        whole,
-        links=whole.links & ~aside,
-        delta=np.where(aside[..., None], 0, whole.delta).astype(np.complex64),
-    )
+    whole = _observed(dataset, radio, frame)
+    seen, aside = _with_links_aside(whole)
     config = TrainConfig(num_gaussians=bench.gaussians, device=bench.device)
     seed = sub_seed(0, "bench training", "fit")
     begin = time.perf_counter()
@@ -97,7 +87,7 @@ def bench_training(
             # From the start each time: what is timed is one training of so many steps.
             bar.reset()
             begin = time.perf_counter()
-            state = refine(*(seen, start, replace(config, iterations=steps), seed), on_step=on_step)
+            state = refine(seen, start, replace(config, iterations=steps), seed, on_step=on_step)
             finish_device()
             train_s = start_s + time.perf_counter() - begin
             losses.append(_validation(whole, aside, state, config))
@@ -117,6 +107,23 @@ def bench_training(
         "loss_end": losses[-1],
         "still": still,
     }
+
+
+def _observed(dataset: Path, radio: str, frame: int | None) -> Observations:
+    """A frame, the first if none is named."""
+    sequence = open_dataset(dataset).sequence()
+    if radio not in sequence.radios:
+        raise RfgsError(f"{dataset} has no radio {radio!r}; it has {', '.join(sequence.radios)}")
+    chosen = chosen_frames(None if frame is None else str(frame), sequence.frames)[0]
+    return observe(sequence, radio, chosen)
+
+
+def _with_links_aside(whole: Observations) -> tuple[Observations, np.ndarray]:
+    """Observations without a tenth of their links, and which those are, (tx, rx)."""
+    rng = np.random.default_rng(sub_seed(0, "bench training"))
+    aside = whole.links & (rng.random(whole.links.shape) < 0.1)
+    delta = np.where(aside[..., None], 0, whole.delta).astype(np.complex64)
+    return replace(whole, links=whole.links & ~aside, delta=delta), aside
 
 
 def _validation(

@@ -13,22 +13,12 @@ from rfgs_core.dataset.observed import Observed, observed_packets
 from rfgs_core.dataset.splits import HeldOut
 from rfgs_core.encode.matched_filter import device_pairs
 from rfgs_core.errors import RfgsError
-from rfgs_core.measure.packets import change_of_packets
-from rfgs_core.measure.phase_free import (
-    delay_amplitude,
-    direct_amplitude,
-    direct_wave,
-    hologram,
-)
+from rfgs_core.measure.kinds import KINDS, Reported, Visible
 from rfgs_core.radio import Layout
 from rfgs_core.settings import Observe, Packets, TrainConfig
 
 if TYPE_CHECKING:
     from rfgs_core.dataset import Sequence
-
-
-#: What a radio reports of a channel; the last axis is subcarrier or delay.
-Reported = Complex64[np.ndarray, "tx rx entry"] | Float32[np.ndarray, "tx rx entry"]
 
 #: Links and tones that are left when more is hidden than what is held out.
 Kept = tuple[Bool[np.ndarray, "tx rx"], Bool[np.ndarray, "subcarrier"]]
@@ -137,20 +127,6 @@ def packets_to_read(
     return "first"
 
 
-def reported(
-    csi: Complex64[np.ndarray, "*link subcarrier"],
-    tones: Bool[np.ndarray, "subcarrier"],
-    kind: Observe,
-) -> Reported:
-    """What a radio reports of a channel: itself, |csi| per tone, or |h(τ)| per link.
-
-    Hidden tones do not enter the delay profile; NaN of a lost packet stays NaN.
-    """
-    if kind == "complex":
-        return csi
-    return np.abs(csi) if kind == "power" else delay_amplitude(csi, tones)
-
-
 def visible_channel(
     sequence: Sequence, radio: str, frame: int, channel: Observed, packets: Packets = "first"
 ) -> tuple[Layout, Bool[np.ndarray, "tx rx"], Bool[np.ndarray, "subcarrier"], np.ndarray]:
@@ -201,8 +177,7 @@ def observe(
         frame: Which frame.
         channel: The traced channel, or what imperfect radios make of it.
         kind: What the radio reports of it; nothing else reaches the result.
-        empty: What it reports of the empty room, as `reported` gives it; None takes the
-            empty-room capture.
+        empty: What it reports of the empty room; None takes the empty-room capture.
         packets: Whether the frame's other packets help to tell the change from noise; only of
             the channel itself.
         kept: Hides all other links and tones as well, before anything is made of the channel.
@@ -219,31 +194,15 @@ def observe(
         _need_finite(
             static, links, tones, f"csi_static of frame {frame} ({sequence.name}, {radio})"
         )
-        empty = reported(static, tones, kind)
-    seen = links[:, :, None] & tones
+        empty = KINDS[kind].report(static, tones)
     freq_hz = np.array(sequence.coordinates(radio)["freq_hz"].values, dtype=np.float64)
-    now, delay_change = reported(csi[0], tones, kind), None
-    change, interval_s = None, 0.0
-    if kind == "complex" and len(csi) > 1:
-        change = change_of_packets(csi - empty, links, tones, elements)
-        delta, static = change[0], empty
+    seen = Visible(links, tones, elements, freq_hz)
+    change, interval_s = KINDS[kind].change(csi, empty, seen), 0.0
+    if change.packets is not None:
         interval_s = float(np.diff(sequence.sample_times_s(radio, frame)[:2])[0])
-    elif kind == "complex":
-        delta, static = now - empty, empty
-    elif kind == "power":
-        wave = direct_wave(elements, freq_hz)
-        # Hidden links must not set the scale of the others.
-        now, empty = np.where(seen, now, 0), np.where(seen, empty, 0)
-        delta, static = hologram(now, empty, tones, wave), empty * wave
-    else:
-        spacing_hz = float(freq_hz[1] - freq_hz[0])
-        delay_change = np.where(links[..., None], np.abs(now - empty), 0).astype(np.float32)
-        direct = direct_amplitude(empty, elements, spacing_hz)
-        static = direct[..., None] * direct_wave(elements, freq_hz)
-        delta = np.zeros_like(static)
     return Observations(
-        delta=np.where(seen, delta, 0).astype(np.complex64),
-        static=np.where(seen, static, 0).astype(np.complex64),
+        delta=np.where(seen.entries, change.delta, 0).astype(np.complex64),
+        static=np.where(seen.entries, change.static, 0).astype(np.complex64),
         links=links,
         tones=tones,
         layout=elements,
@@ -251,7 +210,7 @@ def observe(
         bounds_m=np.asarray(sequence.bounds_m, dtype=np.float64),
         time_s=sequence.time_s(frame),
         kind=kind,
-        delay_change=delay_change,
-        packets=change,
+        delay_change=change.delay_change,
+        packets=change.packets,
         packet_interval_s=interval_s,
     )

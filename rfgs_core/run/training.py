@@ -109,17 +109,7 @@ def train_sequence(
         RfgsError: `out` holds a run with other settings, or they do not go together or ask of the
             radio and the sequence what these do not have.
     """
-    need_still_antennas(sequence, radio)
-    need_shared_links(sequence, radio, config)
-    need_phases(config)
-    need_sample_points(config)
-    need_device(config.device)
-    if config.background == "learned":
-        need_enough_frames(sequence)
-    if config.channel == "impaired":
-        sequence.impairments(radio)
-    if config.encoder == "paths":
-        dataset.need("paths")
+    _check(dataset, sequence, radio, config)
     if encoder_file is not None:
         refuse_other_radios(encoder_file, sequence, radio, config.packets)
     bodies = sum(1 for row in sequence.instances if row["class"] == "person")
@@ -138,29 +128,8 @@ def train_sequence(
     if encoder_file is not None and not (out / ENCODER_FILE).exists():
         keep_encoder(encoder_file, out)
     if config.background == "learned" and not (out / BACKGROUND_FILE).exists():
-        empty = learned_background(sequence, radio, config.channel, config.observe, config.packets)
-        if config.static_set:
-            empty = without_movers(sequence, radio, empty, config)
-        save_arrays(out / BACKGROUND_FILE, {"empty": empty})
-    spent = run.config.train_s
-    before: FrameState | None = None
-    total = len(frames) * (config.iterations + 2)
-    with (
-        tqdm(total=total, desc=f"train {radio}") as bar,
-        TrainingLog(out / "log" if log else None) as curves,
-    ):
-        for frame in frames:
-            begin = time.perf_counter()
-            state = _finished(run, frame)
-            if state is None:
-                with one_torch_thread():
-                    state = _fit(run, frame, config, before, bar, curves.of_frame(frame))
-                _store(run, frame, state)
-                spent += time.perf_counter() - begin
-                replace(run.config, train_s=round(spent, 2)).write(out)
-            else:
-                bar.update(config.iterations + 2)
-            before = state
+        _learn_background(out, sequence, radio, config)
+    spent = _fit_frames(run, config, log)
     if config.static_set and not has_static_set(out):
         begin = time.perf_counter()
         # Of a calibrated run the background has no offsets only once a frame is fitted.
@@ -172,6 +141,53 @@ def train_sequence(
         replace(run.config, train_s=round(spent, 2)).write(out)
     _write_point_cloud(run)
     return open_run(out)
+
+
+def _check(dataset: Dataset, sequence: Sequence, radio: str, config: TrainConfig) -> None:
+    """Refuses settings that do not go together, or ask for what is not there."""
+    need_still_antennas(sequence, radio)
+    need_shared_links(sequence, radio, config)
+    need_phases(config)
+    need_sample_points(config)
+    need_device(config.device)
+    if config.background == "learned":
+        need_enough_frames(sequence)
+    if config.channel == "impaired":
+        sequence.impairments(radio)
+    if config.encoder == "paths":
+        dataset.need("paths")
+
+
+def _learn_background(out: Path, sequence: Sequence, radio: str, config: TrainConfig) -> None:
+    """Writes what takes the place of the empty room's capture."""
+    empty = learned_background(sequence, radio, config.channel, config.observe, config.packets)
+    if config.static_set:
+        empty = without_movers(sequence, radio, empty, config)
+    save_arrays(out / BACKGROUND_FILE, {"empty": empty})
+
+
+def _fit_frames(run: Run, config: TrainConfig, log: bool) -> float:
+    """Fits and stores the frames that are not finished; returns the time of all so far [s]."""
+    spent = run.config.train_s
+    before: FrameState | None = None
+    total = len(run.frames) * (config.iterations + 2)
+    with (
+        tqdm(total=total, desc=f"train {run.config.radio}") as bar,
+        TrainingLog(run.path / "log" if log else None) as curves,
+    ):
+        for frame in run.frames:
+            begin = time.perf_counter()
+            state = _finished(run, frame)
+            if state is None:
+                with one_torch_thread():
+                    state = _fit(run, frame, config, before, bar, curves.of_frame(frame))
+                _store(run, frame, state)
+                spent += time.perf_counter() - begin
+                replace(run.config, train_s=round(spent, 2)).write(run.path)
+            else:
+                bar.update(config.iterations + 2)
+            before = state
+    return spent
 
 
 def _fit(

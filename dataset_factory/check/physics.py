@@ -20,7 +20,7 @@ from rfgs_core.radio.levels import amplitude_of, decibels, power_of
 #: grazing reflection that nothing resolves, the median over links may not.
 DIRECT_LIMITS = (0.4, 2.5)
 #: Power that may arrive before the direct path, relative to the strongest arrival.
-EARLY_LIMIT = power_of(-25)
+EARLY_LIMIT = power_of(-25.0)
 #: Energy of all links relative to free space; reflections that add in phase stay below it.
 ENERGY_LIMIT = 6.0
 #: Peak power gain of Sionna's antenna patterns.

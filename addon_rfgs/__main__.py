@@ -18,12 +18,12 @@ from .scene.scripts import close_scripted_file
 def main(arguments: list[str]) -> int:
     """Runs one command on a .blend; returns the exit code."""
     program = "python -m addon_rfgs --blend FILE"
+    register()
     if arguments[:1] in (["-h"], ["--help"]):
         return run(["--help"], program)
     if len(arguments) < 2 or arguments[0] != "--blend":
         sys.stderr.write(f"error: expected {program} COMMAND …\n")
         return USER_ERROR
-    register()
     atexit.register(close_scripted_file)
     return run(arguments[2:], program, Path(arguments[1]))
 

@@ -53,12 +53,8 @@ def operator_properties(kind: type | None) -> list[Any]:
     return [spec for spec in specs if spec.identifier != "rna_type" and not spec.is_hidden]
 
 
-def options_of(command: Command, kind: type | None) -> list[Option]:
+def options_of(command: Command, kind: type | None) -> Iterator[Option]:
     """Every option that sets properties: those of the operator, then those of settings."""
-    return list(_options(command, kind))
-
-
-def _options(command: Command, kind: type | None) -> Iterator[Option]:
     rows = {spec.identifier: ("", spec) for spec in operator_properties(kind)}
     for group, names in command.reads.items():
         specs = type(_settings(group)).bl_rna.properties
@@ -90,7 +86,7 @@ def add_command(tasks: Any, command: Command, kind: type | None) -> None:
     parser = tasks.add_parser(
         command.name.split()[-1], help=f"{first[0].lower()}{first[1:]}", description=text
     )
-    options = options_of(command, kind)
+    options = list(options_of(command, kind))
     for option in options:
         place, how = _argument(command, option)
         parser.add_argument(*place, **how)
@@ -178,24 +174,24 @@ def _choices(spec: Any) -> dict[str, str]:
 
 def _run(command: Command, kind: type | None, options: argparse.Namespace, out: TextIO) -> str:
     """Sets what was said, calls the operator and saves; returns what was done."""
-    scene, given = bpy.context.scene, vars(options)
+    given, keys = vars(options), {}
     if command.frame and options.frame is not None:
-        scene.frame_set(options.frame)
+        bpy.context.scene.frame_set(options.frame)
     own = {spec.identifier for spec in operator_properties(kind)}
     values = {name: value for name, value in command.unsaid.items() if name in own}
     for option in options_of(command, kind):
-        said = _said(option, given[option.key])
+        said, keys[option.flag] = _said(option, given[option.key]), option.key
         if option.group:
             _set(option, said, command)
         else:
             values |= said
     for flag, meant in command.means.items():
-        if given.get(_key(command, kind, flag)) in (None, False):
+        if given[keys.get(flag, flag.removeprefix("--"))] in (None, False):
             continue
+        groups = {name: group for group, names in command.reads.items() for name in names}
         for name, value in meant.items():
-            group = next((group for group, names in command.reads.items() if name in names), "")
-            if group:
-                setattr(_settings(group), name, value)
+            if name in groups:
+                setattr(_settings(groups[name]), name, value)
             else:
                 values[name] = value
     if command.prepare:
@@ -211,11 +207,6 @@ def _run(command: Command, kind: type | None, options: argparse.Namespace, out: 
         save_copy(options.saved)
         told += ("\n" if "\n" in told else "; ") + f"wrote {options.saved}"
     return told
-
-
-def _key(command: Command, kind: type | None, flag: str) -> str:
-    found = [option.key for option in options_of(command, kind) if option.flag == flag]
-    return found[0] if found else flag.removeprefix("--").replace("-", "_")
 
 
 def _set(option: Option, said: dict[str, Any], command: Command) -> None:

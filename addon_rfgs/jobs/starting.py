@@ -23,6 +23,11 @@ from .queue import ACTIVE, DONE, RUNNING, STOPPING, Job
 from .record import log_file
 
 _EVERY_S = 0.2
+#: Settings that a dataset's plan takes as they are.
+_SAID = (
+    *("frames", "cameras", "resolution", "samples", "images", "depth", "workers", "paths"),
+    "seed",
+)
 
 
 def generate_plan(scene: bpy.types.Scene) -> GeneratePlan:
@@ -39,15 +44,7 @@ def generate_plan(scene: bpy.types.Scene) -> GeneratePlan:
         blend=bpy.data.filepath,
         blender=blender_program(),
         radios=",".join(wanted_radios(scene)),
-        frames=said.frames,
-        cameras=said.cameras,
-        resolution=said.resolution,
-        samples=said.samples,
-        images=said.images,
-        depth=said.depth,
-        workers=said.workers,
-        paths=said.paths,
-        seed=said.seed,
+        **{name: getattr(said, name) for name in _SAID},
     )
 
 

@@ -12,7 +12,6 @@ import io
 import os
 import tarfile
 import tempfile
-import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -193,13 +192,11 @@ def trace_frame(request: Request, scene: bytes, moving: bytes, task: Task) -> An
     if task.frame is not None:
         frame_file(_place.bundle, task.frame).write_bytes(moving)
     value, table, seconds = _place.tracer.trace(task)
-    start = time.perf_counter()
     paths = b""
     if table is not None:
         file = _place.path / "paths.npz"
         write_paths(file, table)
         paths = file.read_bytes()
-    seconds["pack"] = time.perf_counter() - start
     _place.frames += 1
     memory_bytes = psutil.Process().memory_info().rss
     limit_bytes = worker.memory_manager.memory_limit

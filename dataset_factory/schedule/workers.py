@@ -35,6 +35,7 @@ _MEMORY_SHARE = 0.9
 
 #: One library's worker pool inside each process would make processes fight for cores.
 _SINGLE_THREADED = {f"{name}_NUM_THREADS": 1 for name in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
+#: Dask's settings for workers of this machine.
 _HERE = {
     # A frame is tried twice.
     "distributed.scheduler.allowed-failures": 1,
@@ -110,7 +111,7 @@ class Workers:
             )
         try:
             answer: Any = future.result()
-        except (RfgsError, OSError):
+        except RfgsError:
             raise
         except KilledWorker as error:
             tries = error.allowed_failures + 1
@@ -120,6 +121,9 @@ class Workers:
                 f"the log is in {self.place}"
             ) from error
         except Exception as error:
+            if isinstance(error, OSError) and error.errno:
+                # Such as a full disk; those of connections have no number.
+                raise
             raise RfgsError(
                 f"tracing failed: {task}: {type(error).__name__}: {error}; the log is in "
                 f"{self.place}"
@@ -133,7 +137,7 @@ class Workers:
             remedy = (
                 "raise --worker-memory or lower --workers"
                 if self.ours
-                else ("start the workers with a higher --memory-limit")
+                else "start the workers with a higher --memory-limit"
             )
             return f"a worker took more than {lost.memory_limit / 1e9:.1f} GB; {remedy}"
         return "its worker died"

@@ -15,7 +15,8 @@ from rfgs_core.dataset import Sequence, open_dataset
 from rfgs_core.errors import RfgsError
 from rfgs_core.evaluate.scene import Scene
 from rfgs_core.files import read_json
-from rfgs_core.measure.observations import observe, reported
+from rfgs_core.measure.kinds import KINDS
+from rfgs_core.measure.observations import observe
 from rfgs_core.run import open_run
 from tests import tiny_dataset as tiny
 
@@ -53,7 +54,7 @@ def test_the_median_is_closer_to_the_room_than_any_frame(walk: Path, kind) -> No
     keep = seen.links[..., None] & (seen.tones if kind != "delay_power" else True)
 
     def visible(csi: np.ndarray) -> np.ndarray:
-        return np.where(keep, reported(np.where(seen.tones, csi, 0), seen.tones, kind), 0)
+        return np.where(keep, KINDS[kind].report(np.where(seen.tones, csi, 0), seen.tones), 0)
 
     room = visible(sequence.csi_static("wifi"))
     error = np.sum(np.abs(background - room) ** 2)

@@ -6,7 +6,7 @@ These commands made docs/person.webp (about twenty minutes on two cores):
     rfgs-factory generate living_room_walk --radio wifi --frames 10:56:2 --cameras 2 \
         --resolution 224 --out walk
     rfgs train walk --radio wifi --iterations 20 --out walk_run
-    python docs/animate.py walk_run --out docs/person.webp
+    python docs/animate.py walk_run --camera cam01 --out docs/person.webp
 
 The Gaussians are drawn over the picture of the empty room. Their places come from radio alone;
 their colours were fitted to pictures afterwards, for display.
@@ -18,7 +18,7 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-from PIL import Image, ImageDraw
+from PIL import Image, ImageDraw, ImageFont
 
 from rfgs_core import open_run
 from rfgs_core.errors import RfgsError
@@ -27,6 +27,8 @@ from rfgs_core.render.beside import side_by_side, to_bytes
 from rfgs_core.render.view import camera_of, render_view
 from rfgs_core.run import Run
 
+#: Pixels of the page per pixel of the picture.
+ZOOM = 2
 #: Names of the radios in words.
 WORDS = {"wifi": "Wi-Fi", "mmwave": "60 GHz radar", "uwb": "ultra-wide band"}
 
@@ -36,10 +38,13 @@ def picture(run: Run, camera: str, frame: int) -> Image.Image:
     true = run.sequence.image(camera, frame)[..., :3]
     fitted = to_bytes(render_view(run, camera_of(run.sequence, camera), frame).rgb)
     image = Image.fromarray(side_by_side(np.ascontiguousarray(true), fitted))
+    image = image.resize((ZOOM * image.width, ZOOM * image.height), Image.Resampling.LANCZOS)
     radio = run.config["radio"]
-    draw = ImageDraw.Draw(image)
-    for left, text in ((0, "true person"), (true.shape[1], f"from {WORDS.get(radio, radio)}")):
-        draw.text((left + 10, 6), text, fill="white", stroke_width=1, stroke_fill="black")
+    draw, font = ImageDraw.Draw(image), ImageFont.load_default(10 * ZOOM)
+    right = image.width - ZOOM * fitted.shape[1]
+    for left, text in ((0, "true person"), (right, f"from {WORDS.get(radio, radio)}")):
+        where = (left + 6 * ZOOM, 4 * ZOOM)
+        draw.text(where, text, fill="white", stroke_width=1, stroke_fill="black", font=font)
     return image
 
 

@@ -21,7 +21,7 @@ def test_both_frames_are_drawn(python: Python, small_run: Run, tmp_path: Path) -
     told = python(ANIMATE, small_run.path, "--out", out, must_work=True).stdout
     assert "2 frames" in told
     with Image.open(out) as picture:
-        assert picture.n_frames == 2 and picture.size == (24 + 4 + 24, 24)
+        assert picture.n_frames == 2 and picture.size == (2 * (24 + 4 + 24), 2 * 24)
         seen = []
         for frame in range(2):
             picture.seek(frame)

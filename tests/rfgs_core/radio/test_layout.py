@@ -130,3 +130,16 @@ def test_device_pairs_are_those_with_a_measured_link() -> None:
     assert pairs["included"] == [(0, 0), (0, 1), (1, 0), (1, 1)]
     assert pairs["only"] == [(0, 0), (1, 1)]
     assert pairs["excluded"] == [(0, 1), (1, 0)]
+
+
+def test_pairs_are_numbered_by_their_devices() -> None:
+    devices = np.array([0, 0, 1]), np.array([0, 1, 1, 2])
+    radio = preset("wifi")
+    elements = layout(radio, place_devices(radio, np.array([[0.0, 0.0, 0.0], [4.0, 4.0, 3.0]])))
+    elements = replace(elements, tx_device=devices[0], rx_device=devices[1])
+    use = np.ones((3, 4), bool)
+    use[2, 0] = False
+    use[0, 3] = False
+    pair, names = elements.pairs_of(use)
+    assert names == [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2)]
+    assert pair.tolist() == [[0, 1, 1, -1], [0, 1, 1, 2], [-1, 3, 3, 4]]

@@ -182,6 +182,28 @@ def _need_finite(csi: np.ndarray, links: np.ndarray, tones: np.ndarray, what: st
         raise RfgsError(f"{what} holds NaN or infinity; run `rfgs-factory validate` on the dataset")
 
 
+def _of_powers(
+    now: Float32[np.ndarray, "tx rx subcarrier"],
+    empty: Float32[np.ndarray, "tx rx subcarrier"],
+    tones: Bool[np.ndarray, "subcarrier"],
+    elements: Layout,
+    freq_hz: Float64[np.ndarray, "subcarrier"],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Change and empty room of powers per tone, on the phase of the direct path."""
+    wave = direct_wave(elements, freq_hz)
+    return hologram(now, empty, tones, wave), empty * wave
+
+
+def _of_delay_powers(
+    empty: Float32[np.ndarray, "tx rx delay"],
+    elements: Layout,
+    freq_hz: Float64[np.ndarray, "subcarrier"],
+) -> np.ndarray:
+    """Empty room of powers per delay: the amplitude of the direct path on its phase."""
+    direct = direct_amplitude(empty, elements, float(freq_hz[1] - freq_hz[0]))
+    return direct[..., None] * direct_wave(elements, freq_hz)
+
+
 def observe(
     sequence: Sequence,
     radio: str,
@@ -230,15 +252,12 @@ def observe(
     elif kind == "complex":
         delta, static = now - empty, empty
     elif kind == "power":
-        wave = direct_wave(elements, freq_hz)
         # Hidden links must not set the scale of the others.
         now, empty = np.where(seen, now, 0), np.where(seen, empty, 0)
-        delta, static = hologram(now, empty, tones, wave), empty * wave
+        delta, static = _of_powers(now, empty, tones, elements, freq_hz)
     else:
-        spacing_hz = float(freq_hz[1] - freq_hz[0])
         delay_change = np.where(links[..., None], np.abs(now - empty), 0).astype(np.float32)
-        direct = direct_amplitude(empty, elements, spacing_hz)
-        static = direct[..., None] * direct_wave(elements, freq_hz)
+        static = _of_delay_powers(empty, elements, freq_hz)
         delta = np.zeros_like(static)
     return Observations(
         delta=np.where(seen, delta, 0).astype(np.complex64),

@@ -30,7 +30,7 @@ from rfgs_core.fit.refine import need_sample_points
 from rfgs_core.fit.stages import fit_frame
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.gaussians.ply import GaussianCloud, cloud_of, read_ply, write_ply
-from rfgs_core.measure.observations import need_still_antennas
+from rfgs_core.measure.observations import Reported, need_still_antennas
 from rfgs_core.measure.offsets import Offsets
 from rfgs_core.model.head import HEAD_SHAPES, RadioHead
 from rfgs_core.radio.levels import decibels
@@ -109,19 +109,7 @@ def train_sequence(
         RfgsError: `out` holds a run with other settings, or they do not go together or ask of the
             radio and the sequence what these do not have.
     """
-    need_still_antennas(sequence, radio)
-    need_shared_links(sequence, radio, config)
-    need_phases(config)
-    need_sample_points(config)
-    need_device(config.device)
-    if config.background == "learned":
-        need_enough_frames(sequence)
-    if config.channel == "impaired":
-        sequence.impairments(radio)
-    if config.encoder == "paths":
-        dataset.need("paths")
-    if encoder_file is not None:
-        refuse_other_radios(encoder_file, sequence, radio, config.packets)
+    _need_what_fits(dataset, sequence, radio, config, encoder_file)
     bodies = sum(1 for row in sequence.instances if row["class"] == "person")
     config = replace(config, bodies=max(bodies, 1))
     run = _open_or_create(
@@ -138,10 +126,7 @@ def train_sequence(
     if encoder_file is not None and not (out / ENCODER_FILE).exists():
         keep_encoder(encoder_file, out)
     if config.background == "learned" and not (out / BACKGROUND_FILE).exists():
-        empty = learned_background(sequence, radio, config.channel, config.observe, config.packets)
-        if config.static_set:
-            empty = without_movers(sequence, radio, empty, config)
-        save_arrays(out / BACKGROUND_FILE, {"empty": empty})
+        save_arrays(out / BACKGROUND_FILE, {"empty": _learned(sequence, radio, config)})
     spent = run.config.train_s
     before: FrameState | None = None
     total = len(frames) * (config.iterations + 2)
@@ -161,17 +146,56 @@ def train_sequence(
             else:
                 bar.update(config.iterations + 2)
             before = state
-    if config.static_set and not has_static_set(out):
-        begin = time.perf_counter()
-        # Of a calibrated run the background has no offsets only once a frame is fitted.
-        seed = sub_seed(config.seed, sequence.name, radio, "static set")
-        observations = run.observations(frames[0])
-        with one_torch_thread():
-            write_static_set(out, fit_static_set(observations, config.static_set, seed))
-        spent += time.perf_counter() - begin
-        replace(run.config, train_s=round(spent, 2)).write(out)
+    _add_static_set(run, config, spent)
     _write_point_cloud(run)
     return open_run(out)
+
+
+def _need_what_fits(
+    dataset: Dataset,
+    sequence: Sequence,
+    radio: str,
+    config: TrainConfig,
+    encoder_file: Path | None,
+) -> None:
+    """Refuses settings that do not go together, or ask for what is not there.
+
+    Raises:
+        RfgsError: They are such.
+    """
+    need_still_antennas(sequence, radio)
+    need_shared_links(sequence, radio, config)
+    need_phases(config)
+    need_sample_points(config)
+    need_device(config.device)
+    if config.background == "learned":
+        need_enough_frames(sequence)
+    if config.channel == "impaired":
+        sequence.impairments(radio)
+    if config.encoder == "paths":
+        dataset.need("paths")
+    if encoder_file is not None:
+        refuse_other_radios(encoder_file, sequence, radio, config.packets)
+
+
+def _learned(sequence: Sequence, radio: str, config: TrainConfig) -> Reported:
+    """The background that the frames tell; with a static set without what moves in them."""
+    empty = learned_background(sequence, radio, config.channel, config.observe, config.packets)
+    return without_movers(sequence, radio, empty, config) if config.static_set else empty
+
+
+def _add_static_set(run: Run, config: TrainConfig, spent: float) -> None:
+    """Fits the static set that is asked for, unless it is there; `spent` is the time so far [s]."""
+    if config.static_set == 0 or has_static_set(run.path):
+        return
+    begin = time.perf_counter()
+    # Of a calibrated run the background has no offsets only once a frame is fitted.
+    seed = sub_seed(config.seed, run.config.sequence, run.config.radio, "static set")
+    observations = run.observations(run.frames[0])
+    with one_torch_thread():
+        write_static_set(run.path, fit_static_set(observations, config.static_set, seed))
+    spent += time.perf_counter() - begin
+    replace(run.config, train_s=round(spent, 2)).write(run.path)
 
 
 def _fit(

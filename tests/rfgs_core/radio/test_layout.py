@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rfgs_core.radio import PRESETS, DevicePose, Radio, layout, place_devices, preset
+from rfgs_core.radio import PRESETS, DevicePose, Layout, Radio, layout, place_devices, preset
 from rfgs_core.radio.layout import element_offsets, rotation
 
 BOUNDS_M = np.array([[-1.0, 0.5, 0.25], [5.0, 4.5, 2.95]])
@@ -133,10 +133,20 @@ def test_device_pairs_are_those_with_a_measured_link() -> None:
 
 
 def test_pairs_are_numbered_by_their_devices() -> None:
-    devices = np.array([0, 0, 1]), np.array([0, 1, 1, 2])
-    radio = preset("wifi")
-    elements = layout(radio, place_devices(radio, np.array([[0.0, 0.0, 0.0], [4.0, 4.0, 3.0]])))
-    elements = replace(elements, tx_device=devices[0], rx_device=devices[1])
+    elements = Layout(
+        tx_xyz=np.zeros((3, 3)),
+        rx_xyz=np.zeros((4, 3)),
+        tx_device=np.array([0, 0, 1]),
+        rx_device=np.array([0, 1, 1, 2]),
+        rx_column=np.zeros(4, int),
+        measured=np.ones((3, 4), bool),
+        tx_port=np.zeros(3, int),
+        rx_port=np.zeros(4, int),
+        tx_site=np.zeros(3, int),
+        rx_site=np.zeros(4, int),
+        tx_quat_wxyz=np.zeros((3, 4)),
+        rx_quat_wxyz=np.zeros((4, 4)),
+    )
     use = np.ones((3, 4), bool)
     use[2, 0] = False
     use[0, 3] = False

@@ -12,7 +12,7 @@ link, which is exact to the interpolation error of a linear reading between prof
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Bool, Complex, Float, Float32, Float64, Int
+from jaxtyping import Complex, Float, Float32, Float64, Int
 
 from rfgs_core.encode.back_projection import OVERSAMPLING, POINTS, images, oversampled_profiles
 from rfgs_core.encode.protocol import FEATURES, FrameChannel, unit_rms
@@ -83,32 +83,6 @@ def aperture_filter(
     """
     own = np.where(np.eye(len(csi), dtype=bool), 0, -1)
     return images(*_band_profiles(csi, freq_hz, 1), tx_xyz, rx_xyz, own, points)[0, 0]
-
-
-def device_pairs(
-    tx_device: Int[np.ndarray, "tx"],
-    rx_device: Int[np.ndarray, "rx"],
-    use: Bool[np.ndarray, "tx rx"],
-) -> tuple[Int[np.ndarray, "tx rx"], list[tuple[int, int]]]:
-    """Numbers the ordered (transmitting, receiving) device pairs that have a used link.
-
-    Returns:
-        Pair index per link, -1 where unused, and the list of pairs.
-    """
-    pair = np.full(use.shape, -1, dtype=np.int64)
-    names = sorted(
-        {
-            (int(a), int(b))
-            for a, b in zip(
-                np.broadcast_to(tx_device[:, None], use.shape)[use],
-                np.broadcast_to(rx_device[None, :], use.shape)[use],
-                strict=True,
-            )
-        }
-    )
-    for index, (a, b) in enumerate(names):
-        pair[(tx_device[:, None] == a) & (rx_device[None, :] == b) & use] = index
-    return pair, names
 
 
 def matched_filter_map(

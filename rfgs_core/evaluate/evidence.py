@@ -12,7 +12,7 @@ from jaxtyping import Bool, Complex, Float
 
 from rfgs_core.bodies.body_prior import Bodies
 from rfgs_core.dataset.splits import HeldOut
-from rfgs_core.encode.matched_filter import device_pairs, matched_filter_map
+from rfgs_core.encode.matched_filter import matched_filter_map
 from rfgs_core.evaluate.backprojection import PowerMap, ThinnedMaps, thinned_maps
 from rfgs_core.evaluate.grid import Grid
 from rfgs_core.radio import Layout
@@ -81,7 +81,7 @@ class Evidence:
     def maps(self) -> ThinnedMaps:
         """Power maps of the visible entries, computed once."""
         layout = self.layout
-        pair, pairs = device_pairs(layout.tx_device, layout.rx_device, self.link_visible)
+        pair, pairs = layout.pairs_of(self.link_visible)
         geometry = (layout.tx_xyz, layout.rx_xyz, pair, self.freq_hz)
         matched_filter = partial(matched_filter_map, self.delta_or_zero, *geometry)
         return thinned_maps(self.power_map or matched_filter, pairs, self.freq_hz, self.grid)

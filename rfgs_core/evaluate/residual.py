@@ -21,7 +21,6 @@ import numpy as np
 from jaxtyping import Bool, Complex, Complex64, Float64
 from scipy.optimize import nnls
 
-from rfgs_core.encode.matched_filter import device_pairs
 from rfgs_core.evaluate.baselines.interpolation import completed, fill
 from rfgs_core.evaluate.baselines.spectrum import spectral
 from rfgs_core.evaluate.evidence import Evidence
@@ -63,7 +62,7 @@ def with_residual(
     tried, answers = _answers(less.predicted, fewer), _answers(predicted, evidence)
     out = np.array(predicted, dtype=np.complex64)
     layout = evidence.layout
-    index, names = device_pairs(layout.tx_device, layout.rx_device, layout.measured)
+    index, names = layout.pairs_of(layout.measured)
     for number in range(len(names)):
         pair = index == number
         seen = pair & evidence.link_visible

@@ -118,7 +118,7 @@ def start_frame(
             pace_m_s = paces_m_s(tracks, novelty(observations, earlier))
             wanted = wanted_counts(config.num_gaussians, pace_m_s)
             points, track_id = at_pace(
-                *(before.moving, bodies, cells, wanted, points, track_id, rng)
+                before.moving, bodies, cells, wanted, points=points, track_id=track_id, rng=rng
             )
         goes_on, next_track = np.isin(track_id, before.track_id), before.unused_track
     head = None if before is None else before.head
@@ -183,8 +183,12 @@ def solve_reflectivity(
     """
     there = on_device(state, config.device)
     gamma = fitted_reflectivities(
-        *(observations, there.head, there.gaussians, there.power),
-        *(config.unexplained, config.solver_steps),
+        observations,
+        there.head,
+        there.gaussians,
+        there.power,
+        unexplained=config.unexplained,
+        iterations=config.solver_steps,
     )
     gamma = _drawn_phases(state, config.seed) if gamma is None else gamma.cpu()
     features = state.head.with_gamma(state.gaussians.features, gamma)

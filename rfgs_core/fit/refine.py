@@ -214,8 +214,14 @@ def density_control(
         return StandardDensity(StandardRule.for_steps(config.iterations), 1.1 * radius_m, seed)
     if kind == "residual":
         return ResidualDensity(
-            *(ResidualRule(), observations, task.channel, task.comparison, task.noise),
-            *(state.head, state.tracks.bodies, config.iterations),
+            rule=ResidualRule(),
+            observations=observations,
+            channel=task.channel,
+            comparison=task.comparison,
+            noise=task.noise,
+            head=state.head,
+            bodies=state.tracks.bodies,
+            iterations=config.iterations,
         )
     return NoDensity()
 

@@ -28,8 +28,13 @@ def delay_power_map(
     profiles = (change[tx, rx] ** 2).astype(np.complex64)[:, None]
     layout = observations.layout
     read = images(
-        *(profiles, np.zeros(1), spacing_hz * change.shape[-1] / SPEED_OF_LIGHT),
-        *(layout.tx_xyz, layout.rx_xyz, pair, points),
+        profiles,
+        centre_k=np.zeros(1),
+        samples_per_m=spacing_hz * change.shape[-1] / SPEED_OF_LIGHT,
+        tx_xyz=layout.tx_xyz,
+        rx_xyz=layout.rx_xyz,
+        pair=pair,
+        points=points,
     )
     return np.maximum(read[:, 0].real, 0.0).astype(np.float32)
 

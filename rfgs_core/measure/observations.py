@@ -11,7 +11,6 @@ from jaxtyping import Bool, Complex, Complex64, Float32, Float64, Int64
 
 from rfgs_core.dataset.observed import Observed, observed_packets
 from rfgs_core.dataset.splits import HeldOut
-from rfgs_core.encode.matched_filter import device_pairs
 from rfgs_core.errors import RfgsError
 from rfgs_core.measure.kinds import KINDS, Reported, Visible
 from rfgs_core.radio import Layout
@@ -74,7 +73,7 @@ class Observations:
     @property
     def pairs(self) -> tuple[Int64[np.ndarray, "tx rx"], list[tuple[int, int]]]:
         """Device pair of each visible link (−1 elsewhere) and the list of pairs."""
-        return device_pairs(self.layout.tx_device, self.layout.rx_device, self.links)
+        return self.layout.pairs_of(self.links)
 
     def with_delta(self, delta: Complex64[np.ndarray, "tx rx subcarrier"]) -> Observations:
         """The same observations with another channel change, for example a residual."""

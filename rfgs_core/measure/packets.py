@@ -25,7 +25,6 @@ from jaxtyping import Bool, Complex, Complex64, Float
 from scipy.ndimage import uniform_filter1d
 from scipy.special import gammainccinv
 
-from rfgs_core.encode.matched_filter import device_pairs
 from rfgs_core.radio import Layout
 
 #: Doppler frequencies per resolved one at which spectra are held.
@@ -149,7 +148,7 @@ def change_of_packets(
         Zero where nothing may be read.
     """
     estimate = np.zeros(change.shape, dtype=np.complex64)
-    pair, names = device_pairs(layout.tx_device, layout.rx_device, links)
+    pair, names = layout.pairs_of(links)
     for index in range(len(names)):
         tx, rx = (np.unique(axis) for axis in np.nonzero(pair == index))
         rx, rows = _columns(layout.rx_column, rx)

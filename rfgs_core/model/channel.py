@@ -14,7 +14,7 @@ from rfgs_core.gaussians import Gaussians
 from rfgs_core.measure.direct_path import direct_paths
 from rfgs_core.measure.observations import Observations
 from rfgs_core.model.head import RadioHead
-from rfgs_core.propagation import EnvironmentPaths, Links, Tones, environment, scatter, shadow
+from rfgs_core.propagation import EnvironmentPaths, Links, Tones, environment, propagate, shadow
 
 
 @dataclass(frozen=True)
@@ -74,11 +74,7 @@ class Channel:
         """What the Gaussians reflect; `gamma` replaces the reflectivity of their features."""
         g = head.radio_gaussians(gaussians)
         strength = g.gamma if gamma is None else gamma[:, None]
-        return scatter(
-            *(g.means, g.quats, g.scales_rf, strength, self.links, self.tones),
-            normals=g.normals,
-            sharpness=g.sharpness,
-        )
+        return propagate(replace(g, gamma=strength), self.links, self.tones)
 
     def shadowed(self, head: RadioHead, gaussians: Gaussians) -> Complex[Tensor, "link subcarrier"]:
         """What the Gaussians take away from the direct paths: (T − 1) a e^{−j2πfτ}."""

@@ -23,7 +23,7 @@ import torch
 from jaxtyping import Float, Float64
 
 from rfgs_core.predict.prediction import tones_of
-from rfgs_core.propagation import Links, RadioGaussians, scatter
+from rfgs_core.propagation import Links, RadioGaussians, propagate
 from rfgs_core.radio import Layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.levels import amplitude_decibels, decibels
@@ -72,13 +72,9 @@ def levels_of(
     rows = [_some_links(layout, a, b) for a, b in pairs]
     tx, rx = np.concatenate(rows, axis=1)
     links = Links(torch.from_numpy(layout.tx_xyz[tx]), torch.from_numpy(layout.rx_xyz[rx]))
-    g = gaussians
     with torch.no_grad():
-        csi = scatter(
-            *(g.means, g.quats, g.scales_rf, g.gamma, links, tones_of(freq_hz)),
-            *(g.normals, g.sharpness, g.visibility),
-        )
-    centre = g.means.detach().numpy().mean(axis=0)
+        csi = propagate(gaussians, links, tones_of(freq_hz))
+    centre = gaussians.means.detach().numpy().mean(axis=0)
     spread = np.linalg.norm(layout.tx_xyz[tx] - centre, axis=1)
     spread *= np.linalg.norm(layout.rx_xyz[rx] - centre, axis=1)
     # The radar equation backwards, per entry.

@@ -15,7 +15,7 @@ import numpy as np
 import torch
 from jaxtyping import Complex, Complex64, Complex128, Float, Float64
 
-from rfgs_core.propagation import EnvironmentPaths, Links, RadioGaussians, Tones, scatter, shadow
+from rfgs_core.propagation import EnvironmentPaths, Links, RadioGaussians, Tones, propagate, shadow
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.levels import decibels
 
@@ -85,10 +85,7 @@ def predict_channel(
     g, echoes = gaussians, []
     with torch.no_grad():
         for part in (g, *([] if room is None else [room])):
-            echo = scatter(
-                *(part.means, part.quats, part.scales_rf, part.gamma, links, tones_of(freq_hz)),
-                *(part.normals, part.sharpness, part.visibility),
-            )
+            echo = propagate(part, links, tones_of(freq_hz))
             echoes.append(echo.numpy().reshape(*shape, -1).astype(np.complex64))
         passed = shadow(g.means, g.quats, g.scales, g.alpha, _straight(links, freq_hz))
     free = friis(np.linalg.norm(flat - tx, axis=1), freq_hz)

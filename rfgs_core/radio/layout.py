@@ -64,9 +64,24 @@ class Layout:
     @property
     def device_pairs(self) -> list[tuple[int, int]]:
         """Measured (transmitting, receiving) pairs of devices, ascending."""
-        tx, rx = np.nonzero(self.measured)
-        pairs = np.unique(np.stack([self.tx_device[tx], self.rx_device[rx]], axis=1), axis=0)
-        return [(int(a), int(b)) for a, b in pairs]
+        return self.pairs_of(self.measured)[1]
+
+    def pairs_of(
+        self, use: Bool[np.ndarray, "tx rx"]
+    ) -> tuple[Int64[np.ndarray, "tx rx"], list[tuple[int, int]]]:
+        """Numbers the ordered (transmitting, receiving) device pairs that have a used link.
+
+        Returns:
+            Pair index per link, -1 where unused, and the list of pairs.
+        """
+        tx, rx = np.nonzero(use)
+        names = sorted(
+            set(zip(self.tx_device[tx].tolist(), self.rx_device[rx].tolist(), strict=True))
+        )
+        pair = np.full(use.shape, -1, dtype=np.int64)
+        for index, (a, b) in enumerate(names):
+            pair[self.links_between(a, b) & use] = index
+        return pair, names
 
     def links_between(self, a: int, b: int) -> Bool[np.ndarray, "tx rx"]:
         """Links from elements of device `a` to those of device `b`, measured or not."""

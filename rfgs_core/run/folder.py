@@ -195,9 +195,12 @@ class Run:
         power = torch.from_numpy(self._power(frame).astype(np.float32))
         with one_torch_thread():
             gamma = fitted_reflectivities(
-                *(observations, head, gaussians, power),
-                self.config.settings.unexplained,
-                self.config.settings.solver_steps,
+                observations,
+                head,
+                gaussians,
+                power,
+                unexplained=self.config.settings.unexplained,
+                iterations=self.config.settings.solver_steps,
             )
         assert gamma is not None
         features = head.with_gamma(gaussians.features, gamma)
@@ -232,8 +235,13 @@ class Run:
         csi = np.zeros_like(observations.delta)
         csi[channel.tx, channel.rx] = change
         csi = levelled(
-            *(csi, observations.links, observations.layout, observations.centre_hz),
-            *(head, gaussians, self._power(frame)),
+            csi,
+            visible=observations.links,
+            layout=observations.layout,
+            freq_hz=observations.centre_hz,
+            head=head,
+            gaussians=gaussians,
+            power=self._power(frame),
         )
         return self._as_captured(frame, observations, csi)
 

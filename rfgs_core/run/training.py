@@ -305,8 +305,10 @@ def _finished(run: Run, frame: int) -> FrameState | None:
         power=torch.from_numpy(arrays["power"]),
         head=RadioHead.of_arrays(arrays, "head."),
         tracks=Tracks(
-            *(arrays["axes_xy"], arrays["velocity_xy"], float(arrays["time_s"])),
-            arrays["knees_rad"],
+            axes_xy=arrays["axes_xy"],
+            velocity_xy=arrays["velocity_xy"],
+            time_s=float(arrays["time_s"]),
+            knees_rad=arrays["knees_rad"],
         ),
         track_id=arrays["track_id"],
         next_track=int(arrays["next_track"]),

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Complex, Float
 
-from rfgs_core.encode.matched_filter import device_pairs, matched_filter
+from rfgs_core.encode.matched_filter import matched_filter
 from rfgs_core.evaluate.evidence import ControlResult, Evidence
 from rfgs_core.evaluate.grid import splat_gaussians
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
@@ -25,9 +25,7 @@ class PointModel:
         self.evidence = evidence
         layout = evidence.layout
         self.layout = layout
-        self.pair, self.pairs = device_pairs(
-            layout.tx_device, layout.rx_device, evidence.link_visible
-        )
+        self.pair, self.pairs = layout.pairs_of(evidence.link_visible)
         self.tones = np.flatnonzero(evidence.tone_visible)
         self.wavenumber = 2.0 * np.pi * evidence.freq_hz / SPEED_OF_LIGHT
         self.links = [np.nonzero(self.pair == index) for index in range(len(self.pairs))]

@@ -124,15 +124,14 @@ class ResidualDensity:
                 change, np.arange(len(self.channel.links))
             )
             gamma = posterior_mean(
-                *(
-                    self.channel,
-                    self.head,
-                    new,
-                    residual,
-                    self.noise,
-                    energy.mean().expand(len(new)),
-                ),
-                *(self.rule.solver_steps, self.comparison),
+                self.channel,
+                self.head,
+                new,
+                target=residual,
+                noise=self.noise,
+                power=energy.mean().expand(len(new)),
+                iterations=self.rule.solver_steps,
+                comparison=self.comparison,
             )
         return replace(new, features=self.head.with_gamma(new.features, gamma))
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rfgs_core.encode import matched_filter_features, matched_filter_map
-from rfgs_core.encode.matched_filter import device_pairs, matched_filter
+from rfgs_core.encode.matched_filter import matched_filter
 from rfgs_core.radio import layout, place_devices, preset
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
@@ -91,7 +91,7 @@ def test_a_scatterer_is_one_at_its_place(name: str) -> None:
     elements = layout(radio, place_devices(radio, BOUNDS_M))
     point = np.array([1.9, 2.2, 1.1])
     csi = waves(elements.tx_xyz, elements.rx_xyz, radio.freq_hz, point).astype(np.complex64)
-    pair, names = device_pairs(elements.tx_device, elements.rx_device, elements.measured)
+    pair, names = elements.pairs_of(elements.measured)
     assert len(names) == (16 if name == "wifi" else 4)
     places = point + np.array([[0.0, 0.0, 0.0], [0.0, 0.9, 0.0]])
     got = matched_filter(csi, elements.tx_xyz, elements.rx_xyz, pair, radio.freq_hz, places)[:, 0]
@@ -202,13 +202,3 @@ def test_left_out_links_are_never_read(small: tuple) -> None:
         other = matched_filter(poisoned, tx_xyz, rx_xyz, pair, freq_hz, points, bands)
         np.testing.assert_array_equal(other, clean)
         assert np.isfinite(clean).all()
-
-
-def test_pairs_are_numbered_by_their_devices() -> None:
-    tx_device, rx_device = np.array([0, 0, 1]), np.array([0, 1, 1, 2])
-    use = np.ones((3, 4), bool)
-    use[2, 0] = False
-    use[0, 3] = False
-    pair, names = device_pairs(tx_device, rx_device, use)
-    assert names == [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2)]
-    assert pair.tolist() == [[0, 1, 1, -1], [0, 1, 1, 2], [-1, 3, 3, 4]]

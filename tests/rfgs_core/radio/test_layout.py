@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rfgs_core.radio import PRESETS, DevicePose, Radio, layout, place_devices, preset
+from rfgs_core.radio import PRESETS, DevicePose, Layout, Radio, layout, place_devices, preset
 from rfgs_core.radio.layout import element_offsets, rotation
 
 BOUNDS_M = np.array([[-1.0, 0.5, 0.25], [5.0, 4.5, 2.95]])
@@ -130,3 +130,26 @@ def test_device_pairs_are_those_with_a_measured_link() -> None:
     assert pairs["included"] == [(0, 0), (0, 1), (1, 0), (1, 1)]
     assert pairs["only"] == [(0, 0), (1, 1)]
     assert pairs["excluded"] == [(0, 1), (1, 0)]
+
+
+def test_pairs_are_numbered_by_their_devices() -> None:
+    elements = Layout(
+        tx_xyz=np.zeros((3, 3)),
+        rx_xyz=np.zeros((4, 3)),
+        tx_device=np.array([0, 0, 1]),
+        rx_device=np.array([0, 1, 1, 2]),
+        rx_column=np.zeros(4, int),
+        measured=np.ones((3, 4), bool),
+        tx_port=np.zeros(3, int),
+        rx_port=np.zeros(4, int),
+        tx_site=np.zeros(3, int),
+        rx_site=np.zeros(4, int),
+        tx_quat_wxyz=np.zeros((3, 4)),
+        rx_quat_wxyz=np.zeros((4, 4)),
+    )
+    use = np.ones((3, 4), bool)
+    use[2, 0] = False
+    use[0, 3] = False
+    pair, names = elements.pairs_of(use)
+    assert names == [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2)]
+    assert pair.tolist() == [[0, 1, 1, -1], [0, 1, 1, 2], [-1, 3, 3, 4]]

@@ -185,28 +185,45 @@ def _run(command: Command, kind: type | None, options: argparse.Namespace, out: 
             _set(option, said, command)
         else:
             values |= said
-    for flag, meant in command.means.items():
-        if given[keys.get(flag, flag.removeprefix("--"))] in (None, False):
-            continue
-        groups = {name: group for group, names in command.reads.items() for name in names}
-        for name, value in meant.items():
-            if name in groups:
-                setattr(_settings(groups[name]), name, value)
-            else:
-                values[name] = value
+    for flag in command.means:
+        if given[keys.get(flag, flag.removeprefix("--"))] not in (None, False):
+            values |= _meant(command, flag)
     if command.prepare:
         command.prepare(values)
-    others = [name for flag, name in command.instead.items() if given[flag.removeprefix("--")]]
-    if others:
-        told = call(others[0], out)
-    elif command.work:
-        told = command.work(options)
-    else:
-        told = call(kind.bl_idname.removeprefix("rfgs."), out, **values)
+    told = _call(command, kind, options, values, out)
     if command.saves:
         save_copy(options.saved)
         told += ("\n" if "\n" in told else "; ") + f"wrote {options.saved}"
     return told
+
+
+def _meant(command: Command, flag: str) -> dict[str, Any]:
+    """Sets the settings that a flag means besides; returns properties of the operator."""
+    groups = {name: group for group, names in command.reads.items() for name in names}
+    values = {}
+    for name, value in command.means[flag].items():
+        if name in groups:
+            setattr(_settings(groups[name]), name, value)
+        else:
+            values[name] = value
+    return values
+
+
+def _call(
+    command: Command,
+    kind: type | None,
+    options: argparse.Namespace,
+    values: dict[str, Any],
+    out: TextIO,
+) -> str:
+    """Does the work; returns what was done."""
+    given = vars(options)
+    others = [name for flag, name in command.instead.items() if given[flag.removeprefix("--")]]
+    if others:
+        return call(others[0], out)
+    if command.work:
+        return command.work(options)
+    return call(kind.bl_idname.removeprefix("rfgs."), out, **values)
 
 
 def _set(option: Option, said: dict[str, Any], command: Command) -> None:
@@ -254,16 +271,21 @@ def _split(option: Option, text: str) -> list[int]:
     return [int(part) for part in parts]
 
 
+def _number(option: Option, spec: Any, value: Any) -> Any:
+    for number in value if isinstance(value, list) else [value]:
+        if not spec.hard_min <= number <= spec.hard_max:
+            limits = f"{spec.hard_min:g} to {spec.hard_max:g}"
+            raise AddonError(f"{option.flag} {number:g}: expected {limits}")
+    if _unit(spec) == "ROTATION":
+        return [math.radians(number) for number in value]
+    if _unit(spec) == "LENGTH":
+        return [number / unit_scale(bpy.context.scene) for number in value]
+    return value
+
+
 def _value(option: Option, spec: Any, value: Any) -> Any:
     if spec.type in ("INT", "FLOAT"):
-        for number in value if isinstance(value, list) else [value]:
-            if not spec.hard_min <= number <= spec.hard_max:
-                limits = f"{spec.hard_min:g} to {spec.hard_max:g}"
-                raise AddonError(f"{option.flag} {number:g}: expected {limits}")
-        if _unit(spec) == "ROTATION":
-            return [math.radians(number) for number in value]
-        if _unit(spec) == "LENGTH":
-            return [number / unit_scale(bpy.context.scene) for number in value]
+        return _number(option, spec, value)
     if spec.type == "ENUM":
         return _choices(spec)[value]
     if spec.type == "COLLECTION":

@@ -23,7 +23,7 @@ from PIL import Image, ImageDraw, ImageFont
 from rfgs_core import open_run
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import replacing
-from rfgs_core.render.beside import side_by_side, to_bytes
+from rfgs_core.render.side_by_side import side_by_side, to_bytes
 from rfgs_core.render.view import camera_of, render_view
 from rfgs_core.run import Run
 

@@ -20,7 +20,7 @@ from rfgs_core.propagation import (
     EnvironmentPaths,
     Links,
     RadioGaussians,
-    Tones,
+    Subcarriers,
     environment,
     propagate,
     scatter,
@@ -29,7 +29,7 @@ from rfgs_core.propagation import (
 from rfgs_core.propagation.reference import MAX_ELEMENTS
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
-#: Block size [gaussian, link, tone] at which the plain twin is fastest on common processors.
+#: Block size [gaussian, link, subcarrier] at which the plain twin is fastest on common processors.
 _TUNED_ELEMENTS = 1 << 17
 
 _Result = TypeVar("_Result")
@@ -46,7 +46,7 @@ class PropagationBench:
     """Gaussians, standing in a box of 0.6 x 0.6 x 1.7 m."""
     num_links: int = 64
     """Links, from one transmitter to a receiving array across the room."""
-    num_tones: int = 64
+    num_subcarriers: int = 64
     """Subcarriers."""
     paths_per_link: int = 2
     """Environment paths of each link that the cloud shadows."""
@@ -68,7 +68,7 @@ class _Scene:
 
     gaussians: RadioGaussians
     links: Links
-    tones: Tones
+    subcarriers: Subcarriers
     paths: EnvironmentPaths
     grad: Complex[Tensor, "link subcarrier"]
 
@@ -77,7 +77,7 @@ def bench_propagation(config: PropagationBench | None = None) -> dict[str, float
     """Times the compiled propagation model beside its plain torch twin, on one device.
 
     Both compute the full model in float32: scattering and shadowed environment paths. The twin
-    works through the Gaussians in blocks, as otherwise its arrays of [gaussian, link, tone]
+    works through the Gaussians in blocks, as otherwise its arrays of [gaussian, link, subcarrier]
     would not fit into memory; it sees each block's gradient at once, which costs it nothing.
     The `tuned` numbers are the same twin with blocks small enough for the processor's cache.
 
@@ -150,15 +150,15 @@ def _scene(config: PropagationBench) -> _Scene:
         torch.tensor([[0.2, 0.2, 1.2]], dtype=torch.float64).expand(links, 3),
         torch.tensor([4.8, 3.8, 1.2], dtype=torch.float64) + 0.5 * wavelength_m * grid,
     )
-    tones = Tones(
-        config.center_hz - 0.5 * config.spacing_hz * config.num_tones,
+    subcarriers = Subcarriers(
+        config.center_hz - 0.5 * config.spacing_hz * config.num_subcarriers,
         config.spacing_hz,
-        config.num_tones,
+        config.num_subcarriers,
     )
-    csi_shape = (links, config.num_tones)
+    csi_shape = (links, config.num_subcarriers)
     grad = torch.complex(normal(*csi_shape), normal(*csi_shape)).to(torch.complex64)
     paths = _paths(link_rows, config.paths_per_link, wavelength_m, uniform)
-    return on_device(_Scene(gaussians, link_rows, tones, paths, grad), config.device)
+    return on_device(_Scene(gaussians, link_rows, subcarriers, paths, grad), config.device)
 
 
 def _paths(
@@ -202,7 +202,7 @@ def _grads(gaussians: RadioGaussians) -> dict[str, Tensor]:
 def _fast_forward(scene: _Scene) -> Complex[Tensor, "link subcarrier"]:
     """CSI of the compiled model without a graph."""
     with torch.no_grad():
-        return propagate(scene.gaussians, scene.links, scene.tones, scene.paths)
+        return propagate(scene.gaussians, scene.links, scene.subcarriers, scene.paths)
 
 
 def _pull(csi: Complex[Tensor, "link subcarrier"], scene: _Scene) -> None:
@@ -213,26 +213,26 @@ def _pull(csi: Complex[Tensor, "link subcarrier"], scene: _Scene) -> None:
 def _fast_gradients(scene: _Scene) -> tuple[Tensor, dict[str, Tensor]]:
     """CSI and gradients of the compiled model."""
     g = _leaves(scene.gaussians)
-    csi = propagate(g, scene.links, scene.tones, scene.paths)
+    csi = propagate(g, scene.links, scene.subcarriers, scene.paths)
     _pull(csi, scene)
     return csi.detach(), _grads(g)
 
 
 def _plain(scene: _Scene, elements: int, gradients: bool) -> tuple[Tensor, dict[str, Tensor]]:
-    """CSI and gradients of the plain twin, in blocks of `elements` of [gaussian, link, tone]."""
+    """CSI and gradients of the plain twin, in blocks of `elements` of (M, link, subcarrier)."""
     g = _leaves(scene.gaussians)
-    links, tones, paths = scene.links, scene.tones, scene.paths
-    rows = max(1, elements // (len(links) * tones.num_selected))
+    links, subcarriers, paths = scene.links, scene.subcarriers, scene.paths
+    rows = max(1, elements // (len(links) * subcarriers.num_selected))
     with torch.set_grad_enabled(gradients):
         through = shadow(g.means, g.quats, g.scales, g.alpha, paths, backend="torch")
-        csi = environment(through, paths, tones, len(links))
+        csi = environment(through, paths, subcarriers, len(links))
         total = csi.detach()
         if gradients:
             _pull(csi, scene)
         for first in range(0, g.means.shape[0], rows):
             part = slice(first, first + rows)
             block = (g.means[part], g.quats[part], g.scales_rf[part], g.gamma[part])
-            csi = scatter(*block, links, tones, backend="torch")
+            csi = scatter(*block, links, subcarriers, backend="torch")
             if gradients:
                 _pull(csi, scene)
             total = total + csi.detach()

@@ -13,7 +13,8 @@ from rfgs_core.errors import RfgsError
 Objective = Literal["paper", "csi", "both"]
 Recipe = Literal["rfgs", "paper"]
 EncoderKind = Literal["matched_filter", "cnn", "paths"]
-#: complex: the channel itself; power: |csi|² per link and tone; delay_power: the power of each
+#: complex: the channel itself; power: |csi|² per link and subcarrier; delay_power: the power of
+# each
 #: link's delay profile.
 Observe = Literal["complex", "power", "delay_power"]
 #: all: every packet of a frame helps to tell its change from noise; first: the one at its own time.
@@ -33,7 +34,7 @@ Density = Literal["none", "paper", "3dgs", "residual", "motion"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Choices:
+class TrainOptions:
     """What a user chooses of a training run; each is an option of `rfgs train`."""
 
     objective: Objective = "csi"
@@ -43,7 +44,7 @@ class Choices:
     stays clean, since its capture can be averaged."""
     observe: Observe = "complex"
     """What the radio reports, and all that any stage sees: complex, the channel itself; power,
-    |CSI|^2 per link and tone; delay_power, the power of each link's delay profile."""
+    |CSI|^2 per link and subcarrier; delay_power, the power of each link's delay profile."""
     background: Background = "empty_room"
     """What the moving part is told from: empty_room, its capture; learned, the median over all
     frames of the sequence, where nobody recorded the empty room."""
@@ -90,7 +91,7 @@ class Choices:
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrainConfig(Choices):
+class TrainConfig(TrainOptions):
     """Settings of the fit of one frame; saved as JSON beside every result."""
 
     packets: Packets = "first"
@@ -104,7 +105,7 @@ class TrainConfig(Choices):
     iterations: int = 80
     """Adam steps per frame (the paper: 10,000)."""
     batch_entries: int = 8192
-    """Channel entries (links times tones) per Adam step of the channel loss."""
+    """Channel entries (links times subcarriers) per Adam step of the channel loss."""
     batch_points: int = 1024
     """Sample points per Adam step of the paper's loss (section 3.6)."""
     grid_side: int = 64
@@ -132,12 +133,12 @@ class TrainConfig(Choices):
 
     @staticmethod
     def chosen(
-        choices: Choices, *, iterations: int | None = None, num_gaussians: int | None = None
+        options: TrainOptions, *, iterations: int | None = None, num_gaussians: int | None = None
     ) -> TrainConfig:
         """Settings of the chosen recipe; what is None is the recipe's own."""
-        paper = choices.recipe == "paper"
+        paper = options.recipe == "paper"
         own = {"iterations": 10_000, "refine_levels": 0} if paper else {}
         asked = {"iterations": iterations, "num_gaussians": num_gaussians}
-        values = {field.name: getattr(choices, field.name) for field in fields(Choices)}
+        values = {field.name: getattr(options, field.name) for field in fields(TrainOptions)}
         asked = {name: value for name, value in asked.items() if value is not None}
         return TrainConfig(**{**values, **own, **asked})

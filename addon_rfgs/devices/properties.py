@@ -97,7 +97,10 @@ class RadioFields:
     freq_min_ghz: _edge_ghz("freq_min_hz", "From [GHz]")
     freq_max_ghz: _edge_ghz("freq_max_hz", "To [GHz]")
     num_subcarriers: _count(
-        "num_subcarriers", "Subcarriers", "Tones at the centres of equal slices of the band", min=2
+        "num_subcarriers",
+        "Subcarriers",
+        "Subcarriers at the centres of equal slices of the band",
+        min=2,
     )
     tx_rows: _elements("tx_rows", "TX rows", "z")
     tx_cols: _elements("tx_cols", "TX columns", "y")

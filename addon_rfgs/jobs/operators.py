@@ -114,7 +114,7 @@ class RFGS_OT_train_gaussians(InEnvironment, bpy.types.Operator):
 
 
 class RFGS_OT_evaluate_run(InEnvironment, bpy.types.Operator):
-    """Measure the training beside its controls, in the background; writes metrics.json."""
+    """Measure the training beside its baselines, in the background; writes metrics.json."""
 
     bl_label = "Evaluate"
     command = Command("evaluate", reads={"jobs": ("run_folder",)}, words={"run_folder": "--run"})

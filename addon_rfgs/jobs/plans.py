@@ -102,7 +102,7 @@ class TrainPlan:
 
 @dataclass(frozen=True)
 class EvaluatePlan:
-    """Metrics of a run beside its controls, by `rfgs eval`."""
+    """Metrics of a run beside its baselines, by `rfgs eval`."""
 
     kind: ClassVar[str] = "evaluate"
     label: ClassVar[str] = "Evaluate"

@@ -108,7 +108,7 @@ def channel_error_db(
     Args:
         table: The paths.
         layout: Antenna elements.
-        freq_hz: Tones [Hz].
+        freq_hz: Subcarriers [Hz].
         csi: Channel, shape (tx, rx, subcarrier).
     """
     ratios = []

@@ -156,14 +156,14 @@ def blocked(start: np.ndarray, end: np.ndarray, triangles: np.ndarray) -> bool:
 def _early_power(sequence: Sequence, radio: str, links: np.ndarray, nearest_m: float) -> float:
     """Strongest arrival earlier than light allows, relative to the strongest of all."""
     spec = sequence.radio_spec(radio)
-    tones = spec.num_subcarriers
-    profile = delay_profile(links, hann_to_zero(tones))
+    subcarriers = spec.num_subcarriers
+    profile = delay_profile(links, hann_to_zero(subcarriers))
     power = (np.abs(profile) ** 2).mean(axis=(0, 1))
     cell_m = SPEED_OF_LIGHT / spec.bandwidth_hz
-    length_m = np.arange(tones) * cell_m
+    length_m = np.arange(subcarriers) * cell_m
     # The last third of the profile is negative delay: no path of a checked scene is that long.
     length_m = np.where(
-        length_m > 2 / 3 * spec.unambiguous_path_m, length_m - tones * cell_m, length_m
+        length_m > 2 / 3 * spec.unambiguous_path_m, length_m - subcarriers * cell_m, length_m
     )
     early = power[length_m < nearest_m - HANN_LOBE * cell_m]
     return float(early.max() / power.max()) if len(early) else 0.0

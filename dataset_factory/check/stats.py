@@ -61,8 +61,8 @@ def _sequence(dataset: Dataset, sequence: Sequence) -> dict[str, Any]:
 def radio_stats(sequence: Sequence, radio: str) -> dict[str, Any]:
     """Links, levels, share that moves, and delay spread of one radio.
 
-    Levels are |H|² averaged over tones [dB]; the dynamic-to-static ratio is
-    Σ|csi − csi_static|² / Σ|csi_static|² over links and tones, its median over frames [dB].
+    Levels are |H|² averaged over subcarriers [dB]; the dynamic-to-static ratio is
+    Σ|csi − csi_static|² / Σ|csi_static|² over links and subcarriers, its median over frames [dB].
     """
     layout, spec = sequence.layout(radio), sequence.radio_spec(radio)
     # One sample of each frame, or, where antennas move, all of its places.
@@ -84,7 +84,7 @@ def radio_stats(sequence: Sequence, radio: str) -> dict[str, Any]:
         "rx_elements": len(layout.rx_device),
         "links": int(layout.measured.sum()),
         "device_pairs": len(layout.device_pairs),
-        "tones": spec.num_subcarriers,
+        "subcarriers": spec.num_subcarriers,
         "band_ghz": [spec.freq_min_hz / 1e9, spec.freq_max_hz / 1e9],
         "samples_per_frame": spec.samples_per_frame,
         "trace_depth": sequence.trace_depth(radio),
@@ -109,21 +109,21 @@ def delay_spread_s(links: np.ndarray, spacing_hz: float) -> np.ndarray:
 
     Args:
         links: Channels (link, subcarrier).
-        spacing_hz: Distance of tones [Hz].
+        spacing_hz: Distance of subcarriers [Hz].
 
     Returns:
         (link,); a single path gives the width of the band's own window, below 1/bandwidth.
     """
-    tones = links.shape[-1]
-    profile = np.abs(delay_profile(links, hann_to_zero(tones))) ** 2
+    subcarriers = links.shape[-1]
+    profile = np.abs(delay_profile(links, hann_to_zero(subcarriers))) ** 2
     peak = profile.argmax(axis=-1)
     # A profile is periodic; a quarter of it before the strongest arrival counts as before.
-    order = (np.arange(tones) + peak[:, None] - tones // 4) % tones
+    order = (np.arange(subcarriers) + peak[:, None] - subcarriers // 4) % subcarriers
     profile = np.take_along_axis(profile, order, axis=-1)
     floor = profile.max(axis=-1, keepdims=True) * power_of(-SPREAD_RANGE_DB)
     weight = np.where(profile >= floor, profile, 0.0)
     weight = weight / np.maximum(weight.sum(axis=-1, keepdims=True), 1e-300)
-    delay_s = np.arange(tones) / (tones * spacing_hz)
+    delay_s = np.arange(subcarriers) / (subcarriers * spacing_hz)
     mean_s = weight @ delay_s
     return np.sqrt(np.maximum(weight @ delay_s**2 - mean_s**2, 0.0))
 

@@ -161,7 +161,7 @@ def _refuse_large_scene(job: Job) -> None:
     """Refuses a scene too large for a radio before all of its frames are exported.
 
     Raises:
-        RfgsError: A radio's tones are too far apart for the scene.
+        RfgsError: A radio's subcarriers are too far apart for the scene.
     """
     radios = [job.plan.radio(name) for name in job.plan.radios]
     if all(radio.unambiguous_path_m > _ANY_SCENE_M for radio in radios):

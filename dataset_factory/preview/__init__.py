@@ -98,7 +98,7 @@ def _facts(sequence: Sequence) -> list[tuple[str, str]]:
             (
                 f"{name}: {radio.freq_min_hz / 1e9:g} to {radio.freq_max_hz / 1e9:g} GHz",
                 f"{layout.measured.shape[0]} TX × {layout.measured.shape[1]} RX × "
-                f"{radio.num_subcarriers} tones, traced at depth {sequence.trace_depth(name)}",
+                f"{radio.num_subcarriers} subcarriers, depth {sequence.trace_depth(name)}",
             )
         )
     return facts
@@ -206,8 +206,8 @@ def _aperture(
             folder / f"{radio}_images.png",
             f"Focused images of {radio}, one frame",
             f"Frame {frame}. What people change through a matched filter over all places and "
-            "tones, the strongest along the axis that is not drawn; the cross marks the pelvis. "
-            "The antenna looks down, so heads and shoulders answer most.",
+            "subcarriers, the strongest along the axis that is not drawn; the cross marks the "
+            "pelvis. The antenna looks down, so heads and shoulders answer most.",
             folded=True,
         ),
     ]

@@ -37,7 +37,7 @@ class Aperture:
     rx_xyz: np.ndarray
     """Receiving antenna at each place [m], shape (sample, 3)."""
     freq_hz: np.ndarray
-    """Tones [Hz]."""
+    """Subcarriers [Hz]."""
 
     @staticmethod
     def of(sequence: Sequence, radio: str) -> Aperture:
@@ -50,8 +50,8 @@ class Aperture:
     def image(self, pulses: np.ndarray, axes_m: list[np.ndarray]) -> np.ndarray:
         """Power (x, y, z) that the matched filter finds, from channels (sample, subcarrier).
 
-        Tones are weighted with a Hann window, or the straight way from antenna to antenna would
-        show everywhere.
+        Subcarriers are weighted with a Hann window, or the straight way from antenna to antenna
+        would show everywhere.
         """
         grid = np.stack(np.meshgrid(*axes_m, indexing="ij"), axis=-1)
         window = np.hanning(len(self.freq_hz))

@@ -103,7 +103,7 @@ def responses(sequence: Sequence, radio: str, links: np.ndarray) -> tuple[np.nda
     """
     spec = sequence.radio_spec(radio)
     window = hann_to_zero(spec.num_subcarriers)
-    # The first tone's own phase is kept, so responses stay comparable between elements.
+    # The first subcarrier's own phase is kept, so responses stay comparable between elements.
     response = delay_profile(links, window, OVERSAMPLING, peak=True) / window.sum()
     length_m = path_lengths_m(spec, OVERSAMPLING)
     carrier = 2 * np.pi * spec.freq_hz[0] / SPEED_OF_LIGHT

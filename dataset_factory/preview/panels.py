@@ -115,7 +115,7 @@ def _image(axis: Any, seen: Watch, y: np.ndarray, value: np.ndarray, **style: An
 def amplitude_panel(axis: Any, sequence: Sequence, radio: str, seen: Watch) -> Any:
     """|H| / |H_static| of the liveliest link: what a power-only receiver would notice."""
     ratio_db = decibels(np.abs(seen.csi) ** 2) - decibels(np.abs(seen.static) ** 2)
-    # Tones in a deep fade of the empty scene say little, so medians choose link and range.
+    # Subcarriers in a deep fade of the empty scene say little, so medians choose link and range.
     lively = np.median(np.abs(ratio_db), axis=(0, 3))
     tx, rx = np.unravel_index(lively.argmax(), lively.shape)
     value = ratio_db[:, tx, rx].T
@@ -181,9 +181,9 @@ def doppler_shown(sequence: Sequence, radio: str) -> bool:
 def doppler_panel(axis: Any, sequence: Sequence, radio: str, seen: Watch) -> Any:
     """Micro-Doppler of what people change, with the pelvis' own speed."""
     change = (seen.csi - seen.static)[:, :1, :: max(1, seen.csi.shape[2] // DOPPLER_ELEMENTS)]
-    tones = slice(None, None, max(1, change.shape[-1] // 8))
-    freq_hz = sequence.radio_spec(radio).freq_hz[tones]
-    found = micro_doppler(change[..., tones], seen.time_s, freq_hz)
+    subcarriers = slice(None, None, max(1, change.shape[-1] // 8))
+    freq_hz = sequence.radio_spec(radio).freq_hz[subcarriers]
+    found = micro_doppler(change[..., subcarriers], seen.time_s, freq_hz)
     level = decibels(found.power)
     shown = axis.pcolormesh(
         found.time_s,

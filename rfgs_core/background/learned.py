@@ -80,9 +80,9 @@ def learned_background(
     measured = sequence.coordinates(radio)["measured"].values
     ever, rows, shape = np.zeros_like(measured), [], ()
     for frame in sequence.frames:
-        _, links, tones, csi = visible_channel(sequence, radio, frame, channel, packets)
-        mean = csi[0] if len(csi) == 1 else _mean(np.where(tones, csi, 0))
-        values = KINDS[kind].report(np.where(tones, mean, 0), tones)
+        _, links, subcarriers, csi = visible_channel(sequence, radio, frame, channel, packets)
+        mean = csi[0] if len(csi) == 1 else _mean(np.where(subcarriers, csi, 0))
+        values = KINDS[kind].report(np.where(subcarriers, mean, 0), subcarriers)
         rows.append(np.where(links[..., None], values, np.nan)[measured])
         ever |= links
         shape = values.shape
@@ -98,9 +98,9 @@ def learned_background(
 def without_movers(
     sequence: Sequence,
     radio: str,
-    background: Complex64[np.ndarray, "tx rx tone"],
+    background: Complex64[np.ndarray, "tx rx subcarrier"],
     config: TrainConfig,
-) -> Complex64[np.ndarray, "tx rx tone"]:
+) -> Complex64[np.ndarray, "tx rx subcarrier"]:
     """The background of the frames without what Gaussians of the moving bodies explain of them.
 
     Args:
@@ -132,12 +132,14 @@ def without_movers(
                 with one_torch_thread():
                     before = solved_frame(seen, config, seed, before)
                     left = left - explained_change(seen, before)
-            rows.append(np.where(seen.links[..., None] & seen.tones, left, complex(np.nan, np.nan)))
+            rows.append(
+                np.where(seen.links[..., None] & seen.subcarriers, left, complex(np.nan, np.nan))
+            )
         background = _median(np.stack(rows))
     return background
 
 
-def _median(rows: np.ndarray) -> Complex64[np.ndarray, "tx rx tone"]:
+def _median(rows: np.ndarray) -> Complex64[np.ndarray, "tx rx subcarrier"]:
     """Median over frames of real and imaginary part, zero where no frame is visible."""
     known = ~np.isnan(rows).all(axis=0)
     background = np.zeros(rows.shape[1:], dtype=np.complex64)

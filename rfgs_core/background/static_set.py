@@ -35,7 +35,7 @@ from rfgs_core.seeds import sub_seed
 #: Drawn in so many rounds, each from what the earlier ones leave.
 ROUNDS = 4
 #: Exponent of the matched filter's power: its peaks stand out of its side lobes.
-SHARPNESS = 2.0
+PEAK_EXPONENT = 2.0
 #: Nothing stands nearer to an antenna [m]: 1/d would let it explain that antenna alone.
 NEAREST_M = 0.1
 #: Share of each device pair's power that need not be explained.
@@ -74,7 +74,7 @@ class StaticSet:
         return StaticSet(self.gaussians.select(torch.from_numpy(far)), self.head)
 
     def background(self, observations: Observations) -> Complex64[np.ndarray, "tx rx subcarrier"]:
-        """Direct paths and what the set scatters, on every measured link and tone."""
+        """Direct paths and what the set scatters, on every measured link and subcarrier."""
         csi = direct_background(observations)
         everything = np.ones(len(observations.freq_hz), dtype=bool)
         channel = Channel.of(observations, observations.layout.measured, everything)
@@ -94,12 +94,12 @@ def fit_static_set(observations: Observations, count: int, seed: int) -> StaticS
     Returns:
         The set; without any Gaussian where direct paths explain the background.
     """
-    seen = observations.links[..., None] & observations.tones
+    seen = observations.links[..., None] & observations.subcarriers
     left = np.where(seen, observations.static - direct_background(observations), 0)
     rest = observations.with_delta(left)
     least = LEAST_SHARE * float(np.sum(np.abs(observations.static) ** 2))
-    channel = Channel.of(observations, observations.links, observations.tones)
-    target = torch.from_numpy(rest.delta[observations.links][:, observations.tones])
+    channel = Channel.of(observations, observations.links, observations.subcarriers)
+    target = torch.from_numpy(rest.delta[observations.links][:, observations.subcarriers])
     head = _head(observations, seed)
     if float(np.sum(np.abs(left) ** 2)) <= least or count == 0:
         return StaticSet(Gaussians.none(), head)
@@ -153,7 +153,7 @@ def _places(
     centres = maps.origin_m + maps.spacing_m * cells
     # Half a cell's diagonal more, so that no place within a cell is too near.
     far = _far(centres, antennas, NEAREST_M + maps.spacing_m)
-    weight = (power / power.max()).ravel() ** SHARPNESS * far
+    weight = (power / power.max()).ravel() ** PEAK_EXPONENT * far
     chosen = rng.choice(len(centres), size=count, p=weight / weight.sum())
     half_m = 0.5 * maps.spacing_m
     return np.clip(centres[chosen] + rng.uniform(-half_m, half_m, (count, 3)), *bounds_m)

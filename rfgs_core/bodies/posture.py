@@ -30,11 +30,12 @@ from rfgs_core.settings import TrainConfig
 
 #: Gaussians that stand for a body.
 GAUSSIANS = 1500
-#: Entries (links times tones) that are read of all device pairs together, and at most of one at a
+#: Entries (links times subcarriers) that are read of all device pairs together, and at most of one
+# at a
 #: time. Of few pairs others are read, with other Gaussians, in several rounds: what one round says
 #: of a single pair may be 100 nat off.
 ENTRIES, MOST_ENTRIES, MOST_ROUNDS = 4096, 256, 4
-#: Links that are read of a pair; the other entries are tones.
+#: Links that are read of a pair; the other entries are subcarriers.
 LINKS = 32
 #: Shares of noise that are tried, against the mean power of the echoes.
 NOISE_SHARES = 10.0 ** np.arange(-3.0, 1.01, 0.25)
@@ -52,16 +53,16 @@ TO_SIT = 15.0
 
 @dataclass(frozen=True)
 class PairSample:
-    """Some visible links and tones of one device pair."""
+    """Some visible links and subcarriers of one device pair."""
 
     tx_xyz: Float64[np.ndarray, "link 3"]
     """Transmitting elements [m]."""
     rx_xyz: Float64[np.ndarray, "link 3"]
     """Receiving elements [m]."""
-    freq_hz: Float64[np.ndarray, "tone"]
-    """Tones [Hz]."""
+    freq_hz: Float64[np.ndarray, "subcarrier"]
+    """Subcarriers [Hz]."""
     change: Complex64[np.ndarray, "entry"]
-    """Channel change of these links and tones, tones fastest."""
+    """Channel change of these links and subcarriers, subcarriers fastest."""
 
     def log_likelihood(
         self, points: Float64[np.ndarray, "M 3"], normals: Float64[np.ndarray, "M 3"]
@@ -86,7 +87,7 @@ class PairSample:
     def _responses(
         self, points: Float64[np.ndarray, "M 3"], normals: Float64[np.ndarray, "M 3"]
     ) -> Complex64[np.ndarray, "entry M"]:
-        """The propagation model's answer of each link and tone to each Gaussian of γ = 1.
+        """The propagation model's answer of each link and subcarrier to each Gaussian of γ = 1.
 
         Without its factor λ/(4π)^{3/2}, which hardly differs within a band: levels are fitted.
         """
@@ -115,19 +116,19 @@ def pair_samples(observations: Observations, seed: int) -> list[PairSample]:
     """Entries of each device pair, drawn by chance, in units of their root mean square."""
     rng = np.random.default_rng(seed)
     pair, names = observations.pairs
-    visible = np.flatnonzero(observations.tones)
+    visible = np.flatnonzero(observations.subcarriers)
     entries = min(ENTRIES // max(len(names), 1), MOST_ENTRIES)
     result = []
     for index in range(len(names)):
         tx, rx = np.nonzero(pair == index)
         count = min(len(tx), LINKS)
         link = np.sort(rng.choice(len(tx), count, replace=False))
-        tone = rng.choice(visible, min(len(visible), max(entries // count, 4)), replace=False)
-        tx, rx, tone = tx[link], rx[link], np.sort(tone)
-        change = observations.delta[tx[:, None], rx[:, None], tone].ravel()
+        subcarrier = rng.choice(visible, min(len(visible), max(entries // count, 4)), replace=False)
+        tx, rx, subcarrier = tx[link], rx[link], np.sort(subcarrier)
+        change = observations.delta[tx[:, None], rx[:, None], subcarrier].ravel()
         scale = np.sqrt(np.mean(np.abs(change) ** 2)) or 1.0
         ends = observations.layout.tx_xyz[tx], observations.layout.rx_xyz[rx]
-        freq_hz = observations.freq_hz[tone]
+        freq_hz = observations.freq_hz[subcarrier]
         result.append(PairSample(*ends, freq_hz, (change / scale).astype(np.complex64)))
     return result
 

@@ -133,7 +133,7 @@ def _echoes(
     gaussians = gaussians_at(points, outward_normals(points, bodies))
     power = fit_power(observations, gaussians)
     head = new_head(observations, config, power)
-    channel = Channel.of(observations, observations.links, observations.tones)
+    channel = Channel.of(observations, observations.links, observations.subcarriers)
     target = comparison_of(observations).measured()
     noise = noise_per_link(observations, target, config.unexplained)
     gamma = posterior_mean(channel, head, gaussians, target, noise, power, SOLVER_STEPS)

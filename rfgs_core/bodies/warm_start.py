@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float64, Int64
 
 from rfgs_core.bodies.body_prior import Bodies, nearest_axis
-from rfgs_core.bodies.pace import kept
+from rfgs_core.bodies.motion_density import kept
 from rfgs_core.bodies.start import StartCells, StartDensity
 
 

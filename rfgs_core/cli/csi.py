@@ -14,9 +14,9 @@ import tyro
 class CsiArgs:
     """Draws what was measured and what a run predicts of one link, over its frames.
 
-    Shows csi − csi_static between two devices over tones and over path length, the mean power of
-    their antenna pairs; entries held out of training are in it. In Blender, Show
-    CSI of the Channels panel draws the same.
+    Shows csi − csi_static between two devices over subcarriers and over path length, the mean power
+    of their antenna pairs; entries held out of training are in it. In Blender, Show CSI of the
+    Channels panel draws the same.
 
     Example: rfgs csi run --tx-device 0 --rx-device 2 --out link.png
     """

@@ -22,7 +22,7 @@ class DemoArgs:
     """Runs the whole loop on the living room and writes DEMO/report.html.
 
     Stages: generate a dataset from the Blender scene, validate it, train on Wi-Fi and on
-    mmWave, evaluate beside the controls, bring the Gaussians back into Blender. Finished
+    mmWave, evaluate beside the baselines, bring the Gaussians back into Blender. Finished
     stages are kept: a second run with the same settings only writes the report.
     """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`rfgs eval`: metrics of a run beside its controls."""
+"""`rfgs eval`: metrics of a run beside its baselines."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import tyro
 
 @dataclass(frozen=True)
 class EvalArgs:
-    """Evaluates a run with all controls and writes RUN/metrics.json."""
+    """Evaluates a run with all baselines and writes RUN/metrics.json."""
 
     run: tyro.conf.Positional[Path]
     """Folder of a trained run."""

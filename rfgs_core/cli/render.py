@@ -54,7 +54,7 @@ def render_run(trained: TrainedRun, args: RenderArgs) -> None:
     from tqdm import tqdm
 
     from rfgs_core.dataset.pictures import write_png
-    from rfgs_core.render.beside import side_by_side, to_bytes
+    from rfgs_core.render.side_by_side import side_by_side, to_bytes
     from rfgs_core.render.view import camera_of, fitted_shader, render_person, render_view
 
     if fitted_shader(trained) is None:
@@ -84,7 +84,7 @@ def _chosen(trained: TrainedRun, args: RenderArgs) -> list[tuple[str, int]]:
 def _true_picture(
     trained: TrainedRun, name: str, frame: int, person_only: bool
 ) -> np.ndarray | None:
-    from rfgs_core.render.beside import to_bytes
+    from rfgs_core.render.side_by_side import to_bytes
     from rfgs_core.render.view import camera_of, true_person
 
     if not trained.sequence.files.image(name, frame).is_file():

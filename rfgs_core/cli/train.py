@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from rfgs_core.settings import Choices, Packets, TrainConfig
+from rfgs_core.settings import Packets, TrainConfig, TrainOptions
 
 if TYPE_CHECKING:
     from rfgs_core.dataset import Dataset, Sequence
@@ -50,7 +50,7 @@ class TrainArgs:
     shader: Annotated[bool, tyro.conf.arg(name="shader")] = True
     """Colour the frozen Gaussians from training pictures afterwards, for display only. Without any
     such picture they stay grey."""
-    choices: Annotated[Choices, tyro.conf.arg(name="")] = field(default_factory=Choices)
+    options: Annotated[TrainOptions, tyro.conf.arg(name="")] = field(default_factory=TrainOptions)
 
 
 def run(args: TrainArgs) -> int:
@@ -67,7 +67,7 @@ def run(args: TrainArgs) -> int:
     from rfgs_core.seeds import sub_seed
 
     config = TrainConfig.chosen(
-        args.choices, iterations=args.iterations, num_gaussians=args.gaussians
+        args.options, iterations=args.iterations, num_gaussians=args.gaussians
     )
     config, encoder_file = with_encoder(config, args.encoder)
     dataset = open_dataset(args.dataset)
@@ -83,7 +83,7 @@ def run(args: TrainArgs) -> int:
     trained = train_sequence(
         dataset, sequence, args.radio, frames, config, args.out, encoder_file, log=args.log
     )
-    if args.choices.calibrate != "none":
+    if args.options.calibrate != "none":
         sys.stdout.write(f"offsets: {calibration_text(args.out, frames)}\n")
     if shader and not (args.out / "shader.npz").exists():
         seed = sub_seed(config.seed, "shader")

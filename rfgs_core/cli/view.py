@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from rfgs_core.view.choice import ColorMode
+from rfgs_core.view.selection import ColorMode
 
 if TYPE_CHECKING:
     from viser import ViserServer

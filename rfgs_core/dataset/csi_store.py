@@ -52,7 +52,7 @@ def create_csi(
 
     Args:
         path: Folder of the store.
-        radio: Gives the tones.
+        radio: Gives the subcarriers.
         layout: Gives the antenna elements.
         frames: Frame numbers.
         time_s: Time of each frame [s].

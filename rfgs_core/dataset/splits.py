@@ -50,8 +50,8 @@ def radio_split(radio: Radio, layout: Layout, seed: int) -> dict[str, list[Any]]
     """
     held_columns = radio.rx_cols // 4
     elements = np.flatnonzero(layout.rx_column >= radio.rx_cols - held_columns)
-    tones = radio.num_subcarriers
-    first, last = 5 * tones // 8, 6 * tones // 8
+    subcarriers = radio.num_subcarriers
+    first, last = 5 * subcarriers // 8, 6 * subcarriers // 8
     tx, rx = np.nonzero(layout.measured)
     devices = np.stack([layout.tx_device[tx], layout.rx_device[rx]], axis=1)
     pairs = np.unique(np.sort(devices, axis=1), axis=0)
@@ -61,7 +61,7 @@ def radio_split(radio: Radio, layout: Layout, seed: int) -> dict[str, list[Any]]
     held = pool[sub_seed(seed, radio.name, "held-out pair") % len(pool)][None]
     return {
         "rx_elements": elements.tolist(),
-        "subcarriers": list(range(first, max(last, first + 1))) if tones >= 8 else [],
+        "subcarriers": list(range(first, max(last, first + 1))) if subcarriers >= 8 else [],
         "device_pairs": held.tolist() if len(pairs) > 1 else [],
     }
 
@@ -72,10 +72,10 @@ class HeldOut:
 
     links: Bool[np.ndarray, "tx rx"]
     """Measured links that training may use."""
-    tones: Bool[np.ndarray, "subcarrier"]
-    """Tones that training may use."""
+    subcarriers: Bool[np.ndarray, "subcarrier"]
+    """Subcarriers that training may use."""
     pair_links: Bool[np.ndarray, "tx rx"]
-    """Links of held-out device pairs, in both directions; all their tones are held out."""
+    """Links of held-out device pairs, in both directions; all their subcarriers are held out."""
     element_links: Bool[np.ndarray, "tx rx"]
     """Links of held-out elements outside the held-out device pairs."""
 
@@ -86,10 +86,10 @@ class HeldOut:
         Args:
             split: `rx_elements`, `subcarriers` and unordered `device_pairs`.
             layout: Antenna elements and the links that exist.
-            num_subcarriers: Tones of the radio.
+            num_subcarriers: Subcarriers of the radio.
         """
-        tones = np.ones(num_subcarriers, dtype=bool)
-        tones[list(split["subcarriers"])] = False
+        subcarriers = np.ones(num_subcarriers, dtype=bool)
+        subcarriers[list(split["subcarriers"])] = False
         column = np.zeros(layout.measured.shape, dtype=bool)
         column[:, list(split["rx_elements"])] = True
         pair = np.zeros(layout.measured.shape, dtype=bool)
@@ -97,22 +97,22 @@ class HeldOut:
             pair |= layout.links_between(a, b) | layout.links_between(b, a)
         return HeldOut(
             links=layout.measured & ~pair & ~column,
-            tones=tones,
+            subcarriers=subcarriers,
             pair_links=layout.measured & pair,
             element_links=layout.measured & ~pair & column,
         )
 
     @property
     def element(self) -> Bool[np.ndarray, "tx rx subcarrier"]:
-        """Held-out array columns, at training tones."""
-        return self.element_links[:, :, None] & self.tones
+        """Held-out array columns, at training subcarriers."""
+        return self.element_links[:, :, None] & self.subcarriers
 
     @property
     def subcarrier(self) -> Bool[np.ndarray, "tx rx subcarrier"]:
-        """Held-out tones, at training elements."""
-        return self.links[:, :, None] & ~self.tones
+        """Held-out subcarriers, at training elements."""
+        return self.links[:, :, None] & ~self.subcarriers
 
     @property
     def visible(self) -> Bool[np.ndarray, "tx rx subcarrier"]:
         """Measured entries that training may see."""
-        return self.links[:, :, None] & self.tones
+        return self.links[:, :, None] & self.subcarriers

@@ -86,28 +86,28 @@ def _back_project(profiles, centre_k, samples_per_m, tx_xyz, rx_xyz, links, poin
 
 
 def oversampled_profiles(
-    csi: Complex[np.ndarray, "link *channel tone"],
+    csi: Complex[np.ndarray, "link *channel subcarrier"],
     freq_hz: Float[np.ndarray, "subcarrier"],
-    tones: Int[np.ndarray, "tone"] | None = None,
+    subcarriers: Int[np.ndarray, "subcarrier"] | None = None,
 ) -> tuple[np.ndarray, float, float]:
-    """Delay profiles of some tones, `OVERSAMPLING` samples per resolution cell of the whole band.
+    """Delay profiles of some subcarriers, `OVERSAMPLING` samples per cell 1/B of the whole band.
 
     Args:
-        csi: Channel at the tones.
-        freq_hz: All tones of the radio [Hz], equally spaced.
-        tones: Which of them `csi` holds; None for all.
+        csi: Channel at the subcarriers.
+        freq_hz: All subcarriers of the radio [Hz], equally spaced.
+        subcarriers: Which of them `csi` holds; None for all.
 
     Returns:
-        Profiles (…, sample), divided by the number of tones and relative to the middle one,
+        Profiles (…, sample), divided by the number of subcarriers and relative to the middle one,
         whose wave number [rad/m] follows, and profile samples per metre of path.
     """
-    tones = np.arange(len(freq_hz)) if tones is None else tones
+    subcarriers = np.arange(len(freq_hz)) if subcarriers is None else subcarriers
     size = OVERSAMPLING * len(freq_hz)
-    offset = int(tones[len(tones) // 2])
+    offset = int(subcarriers[len(subcarriers) // 2])
     spectrum = np.zeros((*csi.shape[:-1], size), dtype=np.complex64)
-    spectrum[..., (tones - offset) % size] = csi
+    spectrum[..., (subcarriers - offset) % size] = csi
     # ifft carries exp(+j2π n m / size): the profile at delay m / (size · Δf).
-    profiles = np.fft.ifft(spectrum, axis=-1) * size / len(tones)
+    profiles = np.fft.ifft(spectrum, axis=-1) * size / len(subcarriers)
     centre_k = 2.0 * np.pi * float(freq_hz[offset]) / SPEED_OF_LIGHT
     spacing_hz = float(freq_hz[1] - freq_hz[0])
     return profiles, centre_k, spacing_hz * size / SPEED_OF_LIGHT

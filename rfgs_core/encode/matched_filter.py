@@ -27,9 +27,9 @@ def _band_profiles(
     samples_per_m = 0.0
     profiles = np.zeros((len(csi), num_bands, OVERSAMPLING * len(freq_hz)), dtype=np.complex64)
     centre_k = np.zeros(num_bands)
-    for band, tones in enumerate(np.array_split(np.arange(len(freq_hz)), num_bands)):
+    for band, subcarriers in enumerate(np.array_split(np.arange(len(freq_hz)), num_bands)):
         profiles[:, band], centre_k[band], samples_per_m = oversampled_profiles(
-            csi[:, tones], freq_hz, tones
+            csi[:, subcarriers], freq_hz, subcarriers
         )
     return profiles, centre_k, samples_per_m
 
@@ -46,16 +46,16 @@ def matched_filter(
     """Complex matched-filter output per device pair and sub-band.
 
     Args:
-        csi: Channel; uniform tone grid.
+        csi: Channel; uniform subcarrier grid.
         tx_xyz: Transmitting elements [m].
         rx_xyz: Receiving elements [m].
         pair: Which sum a link belongs to, 0..P-1; negative links are left out.
-        freq_hz: Tone frequencies [Hz], equally spaced.
+        freq_hz: Subcarrier frequencies [Hz], equally spaced.
         points: Where to evaluate [m].
-        num_bands: Sub-bands of equal width, each filtered on its own; at most one per tone.
+        num_bands: Sub-bands of equal width, each filtered on its own; at most one per subcarrier.
 
     Returns:
-        Mean over the links and tones of a pair, shape (pair, band, N).
+        Mean over the links and subcarriers of a pair, shape (pair, band, N).
     """
     tx_index, rx_index = np.nonzero(pair >= 0)
     profiles = _band_profiles(csi[tx_index, rx_index], freq_hz, num_bands)
@@ -72,14 +72,14 @@ def aperture_filter(
     """Complex matched-filter output of a synthetic aperture: time-domain back-projection.
 
     Args:
-        csi: Channel of one antenna pair at each of its places; uniform tone grid.
+        csi: Channel of one antenna pair at each of its places; uniform subcarrier grid.
         tx_xyz: Its transmitting antenna at each place [m].
         rx_xyz: Its receiving antenna at each place [m].
-        freq_hz: Tone frequencies [Hz], equally spaced.
+        freq_hz: Subcarrier frequencies [Hz], equally spaced.
         points: Where to evaluate [m].
 
     Returns:
-        Mean over places and tones, shape (N,).
+        Mean over places and subcarriers, shape (N,).
     """
     own = np.where(np.eye(len(csi), dtype=bool), 0, -1)
     return images(*_band_profiles(csi, freq_hz, 1), tx_xyz, rx_xyz, own, points)[0, 0]
@@ -126,7 +126,7 @@ def _sub_band_amplitudes(
     """Root of the mean power over pairs in each sub-band."""
     bands = min(num_features, len(freq_hz))
     power = np.abs(matched_filter(csi, tx_xyz, rx_xyz, pair, freq_hz, points, bands)) ** 2
-    # A radio with fewer tones than features has its sub-bands repeated, still in order.
+    # A radio with fewer subcarriers than features has its sub-bands repeated, still in order.
     return np.sqrt(power.mean(axis=0)).T[:, np.arange(num_features) * bands // num_features]
 
 

@@ -40,16 +40,16 @@ def micro_doppler(
 ) -> Spectrogram:
     """Short-time spectra of a channel, velocity by time.
 
-    A scatterer whose path of length d changes turns tone f by e^{−j2πfd/c}: at v = −ḋ/2 its
-    Doppler shift is 2vf/c. Each tone is analysed at its own wavelength, Hann windows overlap by
-    three quarters, and powers are averaged over links and tones.
+    A scatterer whose path of length d changes turns subcarrier f by e^{−j2πfd/c}: at v = −ḋ/2 its
+    Doppler shift is 2vf/c. Each subcarrier is analysed at its own wavelength, Hann windows overlap
+    by three quarters, and powers are averaged over links and subcarriers.
 
     Args:
         change: `csi − csi_static` (or csi less its mean over time), any axes of links between
-            time and tones; choose one device pair, as other pairs see other velocities.
+            time and subcarriers; choose one device pair, as other pairs see other velocities.
         time_s: Time of each sample [s]. Evenly spaced, or in evenly spaced runs such as bursts
             of chirps; no window crosses a gap.
-        freq_hz: Tone frequencies [Hz].
+        freq_hz: Subcarrier frequencies [Hz].
         window_s: Length of a window [s], cut to the length of a run. Velocities are told apart
             by c/(2f · window_s).
         velocity_limit_m_s: Largest speed shown [m/s]; None takes the largest that is not
@@ -78,10 +78,10 @@ def micro_doppler(
     times = np.arange(size) * interval_s
     samples = change.reshape(len(time_s), -1, len(freq_hz))
     power = np.zeros((len(velocity), len(starts)))
-    for tone, wavelength in enumerate(wavelength_m):
+    for subcarrier, wavelength in enumerate(wavelength_m):
         turn = np.exp(-4j * np.pi / wavelength * np.outer(velocity, times)) * window
         for column, first in enumerate(starts):
-            spectrum = turn @ samples[first : first + size, :, tone]
+            spectrum = turn @ samples[first : first + size, :, subcarrier]
             power[:, column] += (np.abs(spectrum) ** 2).mean(axis=1)
     centres = np.asarray(time_s)[starts] + 0.5 * (size - 1) * interval_s
     return Spectrogram(power / len(freq_hz), velocity, centres)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Float64
 
-#: Tones whose power is below this share of the strongest are taken as silent.
+#: Subcarriers whose power is below this share of the strongest are taken as silent.
 _SILENT = 1e-24
 
 
@@ -16,7 +16,7 @@ def normalise_subcarriers(
     """Divides each subcarrier by its RMS amplitude over the links.
 
     Returns:
-        The normalised channel, zero on other links and silent tones, and the scale that gives
+        The normalised channel, zero on other links and silent subcarriers, and the scale that gives
         the channel back: `csi[links] == normalised[links] * scale`.
     """
     scale = np.sqrt(np.mean(np.abs(csi[links].astype(np.complex128)) ** 2, axis=0))
@@ -28,13 +28,13 @@ def normalise_subcarriers(
 def hamming(
     freq_hz: Float[np.ndarray, "subcarrier"], centre_hz: float, width_hz: float
 ) -> Float64[np.ndarray, "subcarrier"]:
-    """Hamming window read at the tones' own frequencies, zero outside of its width.
+    """Hamming window read at the subcarriers' own frequencies, zero outside of its width.
 
-    Tones next to a gap keep the value of their place in the band, which a window over tone
-    numbers would not give them. On a full grid it is `numpy.hamming`.
+    Subcarriers next to a gap keep the value of their place in the band, which a window over
+    subcarrier numbers would not give them. On a full grid it is `numpy.hamming`.
 
     Args:
-        freq_hz: Tones [Hz], in any order and with any gaps.
+        freq_hz: Subcarriers [Hz], in any order and with any gaps.
         centre_hz: Where the window is one [Hz].
         width_hz: Distance of its two ends, where it is 0.08 [Hz].
     """
@@ -48,7 +48,7 @@ def bulk_slope(
 ) -> Float64[np.ndarray, "*link"]:
     """Slope of the phase over frequency [rad/Hz]: −2π times the power-weighted mean delay.
 
-    Only neighbouring tones at the grid's own spacing are compared: across a gap the phase may
+    Only neighbouring subcarriers at the grid's own spacing are compared: across a gap the phase may
     have turned any number of times.
     """
     steps = np.diff(freq_hz)
@@ -61,14 +61,15 @@ def bulk_slope(
 def unwrap_phase(
     csi: Complex[np.ndarray, "*link subcarrier"], freq_hz: Float64[np.ndarray, "subcarrier"]
 ) -> tuple[Float64[np.ndarray, "*link subcarrier"], Float64[np.ndarray, "*link"]]:
-    """Continuous phase over the true tone grid, gaps between sub-bands included.
+    """Continuous phase over the true subcarrier grid, gaps between sub-bands included.
 
     The slope of the mean delay is taken out first, and what is left is unwrapped. It turns by
-    less than half a cycle from tone to tone, gap or not, as long as delays spread by less than
-    1/(2 · gap) around their mean; unwrapping tone by tone fails at a gap of 1/(2 · delay).
+    less than half a cycle from subcarrier to subcarrier, gap or not, as long as delays spread by
+    less than 1/(2 · gap) around their mean; unwrapping subcarrier by subcarrier fails at a gap of
+    1/(2 · delay).
 
     Args:
-        csi: Channel at ascending tones without the hidden ones.
+        csi: Channel at ascending subcarriers without the hidden ones.
         freq_hz: Their frequencies [Hz], at least two.
 
     Returns:

@@ -43,8 +43,8 @@ class FrameChannel(Protocol):
         ...
 
     @property
-    def tones(self) -> Bool[np.ndarray, "subcarrier"]:
-        """Tones that may be read."""
+    def subcarriers(self) -> Bool[np.ndarray, "subcarrier"]:
+        """Subcarriers that may be read."""
         ...
 
     @property
@@ -54,7 +54,7 @@ class FrameChannel(Protocol):
 
     @property
     def freq_hz(self) -> Float64[np.ndarray, "subcarrier"]:
-        """Tone frequencies [Hz], equally spaced."""
+        """Subcarrier frequencies [Hz], equally spaced."""
         ...
 
     @property

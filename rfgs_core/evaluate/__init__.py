@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Evaluation: what a sceptic would ask, with every number beside its controls."""
+"""Evaluation: what a sceptic would ask, with every number beside its baselines."""
 
 from __future__ import annotations
 

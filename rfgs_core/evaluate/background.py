@@ -41,7 +41,7 @@ Channel = Complex[np.ndarray, "tx rx subcarrier"]
 
 @dataclass(frozen=True)
 class Backgrounds:
-    """The empty room as a run's static set predicts it, on every link and tone."""
+    """The empty room as a run's static set predicts it, on every link and subcarrier."""
 
     static: StaticSet
     """The set."""
@@ -63,7 +63,7 @@ class Backgrounds:
         if run.config.settings.calibrate != "none":
             # As devices with the offsets of the capture hear it, like `Run.predict`.
             turn = read_calibration(run.path, run.frames[0]).capture.turn(layout, freq_hz)
-        visible = np.where(seen.links[..., None] & seen.tones, seen.static * turn, np.nan)
+        visible = np.where(seen.links[..., None] & seen.subcarriers, seen.static * turn, np.nan)
         evidence = Evidence.hide(
             visible,
             visible,

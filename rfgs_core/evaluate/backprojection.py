@@ -67,7 +67,7 @@ def thinned_maps(
     Args:
         power_map: Gives the power of each of `pairs` at points.
         pairs: Transmitting and receiving device of each row.
-        freq_hz: Tone frequencies [Hz].
+        freq_hz: Subcarrier frequencies [Hz].
         grid: Where to evaluate.
     """
     bandwidth_hz = float(freq_hz[-1] - freq_hz[0])

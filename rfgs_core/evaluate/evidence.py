@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a control may look at: one frame without the held-out entries."""
+"""What a baseline may look at: one frame without the held-out entries."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ class Evidence:
     layout: Layout
     """Antenna elements of the radio."""
     freq_hz: Float[np.ndarray, "subcarrier"]
-    """Tone frequencies [Hz], equally spaced."""
+    """Subcarrier frequencies [Hz], equally spaced."""
     link_visible: Bool[np.ndarray, "tx rx"]
-    """Links with at least one visible tone."""
-    tone_visible: Bool[np.ndarray, "subcarrier"]
-    """Tones that are not held out."""
+    """Links with at least one visible subcarrier."""
+    subcarrier_visible: Bool[np.ndarray, "subcarrier"]
+    """Subcarriers that are not held out."""
     grid: Grid
     """Grid to score."""
     voxels: int
@@ -65,7 +65,7 @@ class Evidence:
             layout=layout,
             freq_hz=freq_hz,
             link_visible=visible.any(axis=2),
-            tone_visible=visible.any(axis=(0, 1)),
+            subcarrier_visible=visible.any(axis=(0, 1)),
             grid=grid,
             voxels=voxels,
             power_map=power_map,
@@ -93,18 +93,18 @@ class Evidence:
 
 
 @dataclass(frozen=True)
-class ControlResult:
-    """What a control says about a frame; what it cannot say is None, with the reason."""
+class BaselineResult:
+    """What a baseline says about a frame; what it cannot say is None, with the reason."""
 
     score: Float[np.ndarray, "x y z"] | None = None
     """Score per voxel."""
     delta: Complex[np.ndarray, "tx rx subcarrier"] | None = None
-    """Prediction of csi − csi_static on every link and tone."""
+    """Prediction of csi − csi_static on every link and subcarrier."""
     static: Complex[np.ndarray, "tx rx subcarrier"] | None = None
-    """Prediction of csi_static on every link and tone."""
+    """Prediction of csi_static on every link and subcarrier."""
     reason: str = ""
     """Why something is None, for the report."""
 
 
-#: A control turns the evidence of one frame into a result.
-Control = Callable[[Evidence], ControlResult]
+#: A baseline turns the evidence of one frame into a result.
+Baseline = Callable[[Evidence], BaselineResult]

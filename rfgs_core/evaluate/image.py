@@ -2,7 +2,7 @@
 """Rendered beside true pictures. A display metric: colour is not in the radio.
 
 Background pixels dominate a plain PSNR, so the empty room and a mean-colour silhouette are
-controls in every table, and `psnr_person` looks at the person alone.
+baselines in every table, and `psnr_person` looks at the person alone.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`metrics.json` of a run: every metric, every control, conditions and verdicts."""
+"""`metrics.json` of a run: every metric, every baseline, conditions and verdicts."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from jaxtyping import Float
 from tqdm import tqdm
 
 from rfgs_core.evaluate.background import Backgrounds, background_metrics
-from rfgs_core.evaluate.baselines import CONTROLS, ControlResult, phase_free
+from rfgs_core.evaluate.baselines import BASELINES, BaselineResult, phase_free
 from rfgs_core.evaluate.geometry import GEOMETRY_KEYS, geometry_metrics
 from rfgs_core.evaluate.image import IMAGE_KEYS
 from rfgs_core.evaluate.oracle import oracle_scores
@@ -30,13 +30,13 @@ from rfgs_core.measure.observations import Kept
 from rfgs_core.render.view import pictures_of
 
 SCHEMA = "rfgs-metrics/1"
-#: Name of the evaluated method among the controls while they are computed alike.
+#: Name of the evaluated method among the baselines while they are computed alike.
 METHOD = "method"
 MEDIANS = ("element_snr_median_db", "subcarrier_snr_median_db")
 
 
 def evaluate_run(run: EvaluatedRun, *, oracle: bool = True) -> dict[str, Any]:
-    """Evaluates a run with all its controls and writes `metrics.json` into it.
+    """Evaluates a run with all its baselines and writes `metrics.json` into it.
 
     Args:
         run: A trained run.
@@ -49,7 +49,7 @@ def evaluate_run(run: EvaluatedRun, *, oracle: bool = True) -> dict[str, Any]:
     scene = Scene.of(run)
     table, room = _Table(), Backgrounds.of(scene)
     pictures = pictures_of(run, "test") if has_pictures(run) else []
-    steps = len(run.frames) * (1 + len(CONTROLS)) + len(pictures)
+    steps = len(run.frames) * (1 + len(BASELINES)) + len(pictures)
     with tqdm(total=steps, desc="evaluate", unit="step") as bar:
         for frame in run.frames:
             _evaluate_frame(scene, frame, table, room, bar.update)
@@ -59,7 +59,7 @@ def evaluate_run(run: EvaluatedRun, *, oracle: bool = True) -> dict[str, Any]:
     _add_oracle(scene, table, oracle)
     groups = table.groups(image)
     metrics: dict[str, Any] = groups.pop(METHOD)
-    metrics["controls"] = groups
+    metrics["baselines"] = groups
     metrics["reasons"] = table.reasons(image, image_reasons, bool(pictures))
     metrics["frames"] = table.frames()
     metrics["people"] = people_metrics(table.people) if table.people else None
@@ -88,7 +88,7 @@ def _circumstances(scene: Scene) -> dict[str, Any]:
 
 
 class _Table:
-    """Per-frame rows of the method and of each control, its people, and why values are missing."""
+    """Per-frame rows of the method and of each baseline, its people, and why values are missing."""
 
     def __init__(self) -> None:
         self.rows: dict[str, dict[int, dict[str, Any]]] = {}
@@ -102,7 +102,7 @@ class _Table:
     def groups(self, image: dict[str, Values]) -> dict[str, dict[str, Values]]:
         """All groups of all names, pooled over frames; what is missing is None."""
         result: dict[str, dict[str, Values]] = {}
-        for name in (METHOD, GAUSSIANS_ALONE, *CONTROLS, "silhouette", "oracle_init"):
+        for name in (METHOD, GAUSSIANS_ALONE, *BASELINES, "silhouette", "oracle_init"):
             rows = list(self.rows.get(name, {}).values())
             geometry = mean_of(
                 [row["geometry"] for row in rows if "geometry" in row], GEOMETRY_KEYS
@@ -114,10 +114,10 @@ class _Table:
         return result
 
     def frames(self) -> list[dict[str, Any]]:
-        """Values of each frame: the method's own and those of every control."""
+        """Values of each frame: the method's own and those of every baseline."""
         result = []
         for frame in self.rows[METHOD]:
-            row: dict[str, Any] = {"frame": frame, "controls": {}}
+            row: dict[str, Any] = {"frame": frame, "baselines": {}}
             for name, rows in self.rows.items():
                 part = {
                     group: value if group == "geometry" else rf_values(value)
@@ -126,7 +126,7 @@ class _Table:
                 if name == METHOD:
                     row |= part
                 else:
-                    row["controls"][name] = part
+                    row["baselines"][name] = part
             result.append(row)
         return result
 
@@ -134,19 +134,19 @@ class _Table:
         self, image: dict[str, Values], image_reasons: dict[str, str], pictures: bool
     ) -> dict[str, str]:
         """Why values are None: dotted path of a group or value → one sentence."""
-        result = {f"controls.{name}": why for name, why in self.why.items()}
+        result = {f"baselines.{name}": why for name, why in self.why.items()}
         for name, why in image_reasons.items():
             if name == "lpips":
                 result["image.lpips"] = why
             else:
-                result["image" if name == METHOD else f"controls.{name}.image"] = why
+                result["image" if name == METHOD else f"baselines.{name}.image"] = why
         if not pictures:
             result["image"] = "the dataset holds no pictures that the shader did not see"
         else:
-            result["controls.*.image"] = "only empty_room and silhouette are pictures"
-        result["controls.silhouette"] = "a control of pictures; it says nothing about space"
-        result["controls.zero.rf.device_gain_mae_db"] = "a power of zero has no level in dB"
-        result["controls.empty_room.rf.device_gain_mae_db"] = "a power of zero has no level in dB"
+            result["baselines.*.image"] = "only empty_room and silhouette are pictures"
+        result["baselines.silhouette"] = "a baseline of pictures; it says nothing about space"
+        result["baselines.zero.rf.device_gain_mae_db"] = "a power of zero has no level in dB"
+        result["baselines.empty_room.rf.device_gain_mae_db"] = "a power of zero has no level in dB"
         return result
 
 
@@ -161,7 +161,7 @@ def _evaluate_frame(
     room: Backgrounds | None,
     on_step: Callable[[], Any],
 ) -> None:
-    """Method and controls on one frame."""
+    """Method and baselines on one frame."""
     reference, csi = scene.reference(frame), scene.csi(frame)
     score, predicted = scene.score(frame), scene.run.predict(frame)
     evidence = scene.evidence(frame, score)
@@ -176,14 +176,14 @@ def _evaluate_frame(
         whole = with_residual(predicted, seen, partial(_from_less, scene.run, frame))
     # A static set brings the method's own empty room.
     best, alone = (None, None) if room is None else (room.best, room.whole)
-    _add(scene, table, METHOD, frame, ControlResult(score, whole, best), reference, csi)
-    model = ControlResult(
+    _add(scene, table, METHOD, frame, BaselineResult(score, whole, best), reference, csi)
+    model = BaselineResult(
         delta=predicted, static=alone, reason="the method's own Gaussians without the residual"
     )
     _add(scene, table, GAUSSIANS_ALONE, frame, model, reference, csi)
     on_step()
-    for name, control in CONTROLS.items():
-        result = phase_free.answer(name, control, evidence, scene.observe)
+    for name, baseline in BASELINES.items():
+        result = phase_free.answer(name, baseline, evidence, scene.observe)
         _add(scene, table, name, frame, result, reference, csi)
         on_step()
 
@@ -199,7 +199,7 @@ def _add(
     table: _Table,
     name: str,
     frame: int,
-    result: ControlResult,
+    result: BaselineResult,
     reference: Float[np.ndarray, "n 3"],
     csi: np.ndarray,
 ) -> None:
@@ -228,5 +228,5 @@ def _add_oracle(scene: Scene, table: _Table, wanted: bool) -> None:
         return
     scores = oracle_scores(scene)
     for frame, score in scores.items():
-        result = ControlResult(score=score, reason="only its geometry is compared")
+        result = BaselineResult(score=score, reason="only its geometry is compared")
         _add(scene, table, "oracle_init", frame, result, scene.reference(frame), scene.csi(frame))

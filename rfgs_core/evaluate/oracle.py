@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The ceiling control: the same fit, started on the true surface instead of the estimate."""
+"""The ceiling baseline: the same fit, started on the true surface instead of the estimate."""
 
 from __future__ import annotations
 

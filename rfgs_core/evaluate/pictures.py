@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Image group of a run and of its picture controls."""
+"""Image group of a run and of its picture baselines."""
 
 from __future__ import annotations
 

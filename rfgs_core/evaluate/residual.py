@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The method's prediction of hidden entries: Gaussians, what they leave, and how far to trust both.
 
-Gaussians say what is far from all that was measured; neighbouring antennas and tones say what
-physics has missed (regression kriging), with the covariance of the control `spectrum`. Which of
+Gaussians say what is far from all that was measured; neighbouring antennas and subcarriers say what
+physics has missed (regression kriging), with the covariance of the baseline `spectrum`. Which of
 the two to believe differs between radios and device pairs: three answers are mixed, the
 Gaussians', the Gaussians' with their residual carried on, and the channel carried on as it is.
 Weights come from visible entries that are left out beforehand (stacking, Wolpert, Neural Networks
@@ -54,11 +54,11 @@ def with_residual(
     Args:
         predicted: What the Gaussians say.
         evidence: What may be looked at.
-        from_less: What there would be of some links and tones only.
+        from_less: What there would be of some links and subcarriers only.
     """
-    links, tones = kept = _left(evidence)
+    links, subcarriers = kept = _left(evidence)
     less = from_less(kept)
-    fewer = replace(evidence, delta=less.change, link_visible=links, tone_visible=tones)
+    fewer = replace(evidence, delta=less.change, link_visible=links, subcarrier_visible=subcarriers)
     tried, answers = _answers(less.predicted, fewer), _answers(predicted, evidence)
     out = np.array(predicted, dtype=np.complex64)
     layout = evidence.layout
@@ -68,8 +68,8 @@ def with_residual(
         seen = pair & evidence.link_visible
         if not seen.any():
             continue
-        columns = (seen & ~links)[..., None] & tones
-        gaps = (seen & links)[..., None] & evidence.tone_visible & ~tones
+        columns = (seen & ~links)[..., None] & subcarriers
+        gaps = (seen & links)[..., None] & evidence.subcarrier_visible & ~subcarriers
         for where, left_out in ((seen, gaps), (pair & ~seen, columns)):
             weights = _weights(tried[:, left_out], evidence.delta[left_out])
             out[where] = np.einsum("a,a...->...", weights, answers[:, where])
@@ -80,24 +80,24 @@ def with_residual(
 
 
 def _left(evidence: Evidence) -> Kept:
-    """Links and tones without as many as are held out: the last columns, and tones amid others."""
+    """Links and subcarriers less as many as are held out: last columns, inner subcarriers."""
     column = evidence.layout.rx_column
     seen = np.unique(column[evidence.link_visible.any(axis=0)])
     hidden = len(np.unique(column)) - len(seen)
     links = evidence.link_visible.copy()
     if hidden < len(seen):
         links[:, np.isin(column, seen[len(seen) - hidden :])] = False
-    tones = evidence.tone_visible.copy()
-    first, last = _longest_run(tones)
-    count = min(int((~tones).sum()), (last - first) // 2)
+    subcarriers = evidence.subcarrier_visible.copy()
+    first, last = _longest_run(subcarriers)
+    count = min(int((~subcarriers).sum()), (last - first) // 2)
     middle = (first + last - count) // 2
-    tones[middle : middle + count] = False
-    return links, tones
+    subcarriers[middle : middle + count] = False
+    return links, subcarriers
 
 
-def _longest_run(tones: Bool[np.ndarray, "subcarrier"]) -> tuple[int, int]:
-    """First and last + 1 of the most visible tones in a row."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], tones.astype(int), [0]])))
+def _longest_run(subcarriers: Bool[np.ndarray, "subcarrier"]) -> tuple[int, int]:
+    """First and last + 1 of the most visible subcarriers in a row."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], subcarriers.astype(int), [0]])))
     runs = edges.reshape(-1, 2)
     longest = runs[int(np.argmax(runs[:, 1] - runs[:, 0]))]
     return int(longest[0]), int(longest[1])

@@ -73,7 +73,7 @@ class EvaluatedRun(Protocol):
         ...
 
     def observations(self, frame: int, kept: Kept | None = None) -> Observations:
-        """What training sees of a frame, or would see of some links and tones."""
+        """What training sees of a frame, or would see of some links and subcarriers."""
         ...
 
     def predict(self, frame: int) -> Complex[np.ndarray, "tx rx subcarrier"]:
@@ -151,13 +151,13 @@ class Scene:
         return self.run.sequence.csi(self.radio.name, frame)
 
     def evidence(self, frame: int, score: Float[np.ndarray, "x y z"]) -> Evidence:
-        """What controls may see of a frame, and where the method's own `score` is centred."""
+        """What baselines may see of a frame, and where the method's own `score` is centred."""
         static, power_map = self.csi_static, None
         if (self.observe, self.background, self.packets) == ("complex", "empty_room", "first"):
             csi = observed_csi(self.run.sequence, self.radio.name, frame, self.run.channel)
         else:
             seen = self.run.observations(frame)
-            hidden, static = ~(seen.links[..., None] & seen.tones), seen.static
+            hidden, static = ~(seen.links[..., None] & seen.subcarriers), seen.static
             # In double precision, so that taking the room off again gives the change as it is.
             csi = np.where(hidden, np.nan, seen.delta.astype(np.complex128) + static)
             if seen.kind == "delay_power":

@@ -9,12 +9,12 @@ from rfgs_core.evaluate.residual import GAUSSIANS_ALONE
 
 #: Beginnings of sentences; reports colour them.
 WON, LOST, OPEN = "Won: ", "Lost: ", "Not decided: "
-#: Share of the control's error 1 − F that the method must remove on radios between devices.
+#: Share of the baseline's error 1 − F that the method must remove on radios between devices.
 ERROR_SHARE = 1.0 / 3.0
 
 
 def verdicts(metrics: dict[str, Any]) -> list[str]:
-    """One sentence per required comparison, and one per further control that does better."""
+    """One sentence per required comparison, and one per further baseline that does better."""
     result = [_against(metrics, "matched_filter", "f10")]
     result += _error_share(metrics)
     result += [_against(metrics, "template", key) for key in ("f05", "f10")]
@@ -28,13 +28,13 @@ def _value(metrics: dict[str, Any], group: str, key: str) -> float | None:
     return (metrics.get(group) or {}).get(key)
 
 
-def _control(metrics: dict[str, Any], name: str, group: str, key: str) -> float | None:
-    return _value(metrics["controls"].get(name) or {}, group, key)
+def _baseline(metrics: dict[str, Any], name: str, group: str, key: str) -> float | None:
+    return _value(metrics["baselines"].get(name) or {}, group, key)
 
 
 def _against(metrics: dict[str, Any], name: str, key: str) -> str:
-    """Geometry against one control."""
-    own, other = _value(metrics, "geometry", key), _control(metrics, name, "geometry", key)
+    """Geometry against one baseline."""
+    own, other = _value(metrics, "geometry", key), _baseline(metrics, name, "geometry", key)
     label = key.upper().replace("F0", "F")
     if own is None or other is None:
         return f"{OPEN}{label} against {name}: one of the two could not be computed."
@@ -52,7 +52,7 @@ def _why(metrics: dict[str, Any], key: str, other: float) -> str:
         parts.append(
             f"In {100 * (1 - tracked):.0f} % of the frames the fit sits over half a metre away"
         )
-    ceiling = _control(metrics, "oracle_init", "geometry", key)
+    ceiling = _baseline(metrics, "oracle_init", "geometry", key)
     if ceiling is None:
         parts.append(
             "The ceiling oracle_init is not known, so model and optimisation cannot be told apart"
@@ -75,9 +75,9 @@ def _why(metrics: dict[str, Any], key: str, other: float) -> str:
 
 def _error_share(metrics: dict[str, Any]) -> list[str]:
     """Share of the matched filter's error removed, where devices hear each other."""
-    between = _control(metrics, "matched_filter_different_sum", "geometry", "f10") is not None
+    between = _baseline(metrics, "matched_filter_different_sum", "geometry", "f10") is not None
     own = _value(metrics, "geometry", "f10")
-    other = _control(metrics, "matched_filter", "geometry", "f10")
+    other = _baseline(metrics, "matched_filter", "geometry", "f10")
     if not between or own is None or other is None or other >= 1.0:
         return []
     share = (own - other) / (1.0 - other)
@@ -85,16 +85,16 @@ def _error_share(metrics: dict[str, Any]) -> list[str]:
     if share < 0.0:
         text = f"the error 1 − F10 is {-100 * share:.0f} % larger than the matched filter's"
     if share >= ERROR_SHARE:
-        return [f"{WON}{text}; the mark is a third removed."]
-    return [f"{LOST}{text}; the mark is a third removed. {_why(metrics, 'f10', other)}"]
+        return [f"{WON}{text}; the target is a third removed."]
+    return [f"{LOST}{text}; the target is a third removed. {_why(metrics, 'f10', other)}"]
 
 
 def _other_geometry(metrics: dict[str, Any]) -> list[str]:
-    """Further controls with a better F10; the ceiling is no competitor."""
+    """Further baselines with a better F10; the ceiling is no competitor."""
     own = _value(metrics, "geometry", "f10")
     better = []
-    for name in metrics["controls"]:
-        other = _control(metrics, name, "geometry", "f10")
+    for name in metrics["baselines"]:
+        other = _baseline(metrics, name, "geometry", "f10")
         known = name in ("matched_filter", "template", "oracle_init")
         if not known and own is not None and other is not None and other >= own:
             better.append(f"{name} ({other:.3f})")
@@ -104,10 +104,10 @@ def _other_geometry(metrics: dict[str, Any]) -> list[str]:
 
 
 def _rf(metrics: dict[str, Any], key: str) -> str:
-    """Held-out channel entries against the best control."""
+    """Held-out channel entries against the best baseline."""
     own = _value(metrics, "rf", key)
-    rivals = [name for name in metrics["controls"] if name != GAUSSIANS_ALONE]
-    values = {name: _control(metrics, name, "rf", key) for name in rivals}
+    rivals = [name for name in metrics["baselines"] if name != GAUSSIANS_ALONE]
+    values = {name: _baseline(metrics, name, "rf", key) for name in rivals}
     known = {name: value for name, value in values.items() if value is not None}
     what = "held-out elements" if key.startswith("element") else "held-out subcarriers"
     if own is None or not known:
@@ -115,21 +115,21 @@ def _rf(metrics: dict[str, Any], key: str) -> str:
     best = max(known, key=lambda name: known[name])
     numbers = f"{own:.1f} dB on {what} against {known[best]:.1f} dB of {best}"
     if own > known[best]:
-        return f"{WON}{numbers}, the best control."
+        return f"{WON}{numbers}, the best baseline."
     below = [name for name, value in known.items() if value >= own]
     smooth = ""
     if best in ("spectrum", "gaussian_process", "linear"):
         smooth = (
-            " Clean channels are smooth along arrays and tones, which suits interpolation; it "
-            "says nothing about where the person is."
+            " Clean channels are smooth along arrays and subcarriers, which suits interpolation; "
+            "it says nothing about where the person is."
         )
-    return f"{LOST}{numbers}; {len(below)} of {len(known)} controls do at least as well.{smooth}"
+    return f"{LOST}{numbers}; {len(below)} of {len(known)} baselines do at least as well.{smooth}"
 
 
 def _picture(metrics: dict[str, Any]) -> str:
     """The person in pictures against the silhouette, which is given the outline."""
     own = _value(metrics, "image", "psnr_person")
-    other = _control(metrics, "silhouette", "image", "psnr_person")
+    other = _baseline(metrics, "silhouette", "image", "psnr_person")
     if own is None or other is None:
         return ""
     numbers = f"psnr_person {own:.1f} dB against {other:.1f} dB of silhouette"

@@ -99,7 +99,7 @@ def bench_training(
         "device": bench.device,
         "gaussians": bench.gaussians,
         "links": int(seen.links.sum()),
-        "tones": int(seen.tones.sum()),
+        "subcarriers": int(seen.subcarriers.sum()),
         "train_s": train_s,
         "start_s": start_s,
         "steps": steps,
@@ -131,7 +131,7 @@ def _validation(
 ) -> float:
     """Channel loss of the links that were set aside."""
     held = replace(whole, links=aside)
-    channel = Channel.of(held, held.links, held.tones)
+    channel = Channel.of(held, held.links, held.subcarriers)
     target = comparison_of(held).measured()
     noise = noise_per_link(held, target, config.unexplained)
     with torch.no_grad():

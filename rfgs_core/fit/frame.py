@@ -12,7 +12,7 @@ from torch import Tensor
 
 from rfgs_core.bodies.body_prior import outward_normals
 from rfgs_core.bodies.localise import PairMaps, locate_bodies, pair_maps
-from rfgs_core.bodies.pace import novelty, paces_m_s, wanted_counts
+from rfgs_core.bodies.motion_density import novelty, speeds_m_s, wanted_counts
 from rfgs_core.bodies.posture import tell_postures
 from rfgs_core.bodies.separation import tell_apart
 from rfgs_core.bodies.start import StartCells
@@ -115,8 +115,8 @@ def start_frame(
     if before is not None:
         points, track_id = carry_over(before.moving, bodies, cells, density, points, rng)
         if config.density == "motion" and earlier is not None:
-            pace_m_s = paces_m_s(tracks, novelty(observations, earlier))
-            wanted = wanted_counts(config.num_gaussians, pace_m_s)
+            speed_m_s = speeds_m_s(tracks, novelty(observations, earlier))
+            wanted = wanted_counts(config.num_gaussians, speed_m_s)
             points, track_id = at_pace(
                 before.moving, bodies, cells, wanted, points=points, track_id=track_id, rng=rng
             )
@@ -207,7 +207,7 @@ def explained_change(
     observations: Observations, state: FrameState
 ) -> Complex64[np.ndarray, "tx rx subcarrier"]:
     """What the Gaussians explain of the visible entries."""
-    channel = Channel.of(observations, observations.links, observations.tones)
+    channel = Channel.of(observations, observations.links, observations.subcarriers)
     with torch.no_grad():
         predicted = channel.change(state.head, state.gaussians)
     return observations.with_entries(predicted.numpy()).delta

@@ -54,7 +54,7 @@ class Task:
     """What one frame's descent compares with."""
 
     channel: Channel
-    """Visible links and tones."""
+    """Visible links and subcarriers."""
     comparison: Comparison
     """The terms in which the change is reported."""
     target: Tensor
@@ -82,7 +82,7 @@ class Task:
         comparison = comparison_of(observations)
         target = comparison.measured()
         return Task(
-            Channel.of(observations, observations.links, observations.tones),
+            Channel.of(observations, observations.links, observations.subcarriers),
             comparison,
             target,
             noise_per_link(observations, target, config.unexplained),
@@ -95,7 +95,7 @@ def _batch(task: Task, config: TrainConfig, seed: int, step: int) -> tuple[np.nd
     """Links and sample points of a step; a function of the step, so that resuming is exact."""
     rng = np.random.default_rng(sub_seed(seed, "batch", step))
     count = len(task.channel.links)
-    wanted = max(1, config.batch_entries // task.channel.tones.num_selected)
+    wanted = max(1, config.batch_entries // task.channel.subcarriers.num_selected)
     links = np.sort(rng.choice(count, min(wanted, count), replace=False))
     size = 0 if task.points is None else len(task.points.xyz)
     points = rng.choice(size, min(config.batch_points, size), replace=False) if size else []

@@ -75,8 +75,8 @@ def _features(
         return encoder(observations, points)
     if encoder is not MATCHED_FILTER:
         raise RfgsError(
-            "a learned encoder reads the channel over tones, and `--observe delay_power` hides "
-            "it; leave --encoder out, or choose --observe complex or power"
+            "a learned encoder reads the channel over subcarriers, and `--observe delay_power` "
+            "hides it; leave --encoder out, or choose --observe complex or power"
         )
     return delay_features(observations, points)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Trains an encoder on radio alone: hidden antennas and tones are predicted from the others.
+"""Trains an encoder on radio alone: hidden antennas and subcarriers are predicted from the others.
 
 Part of a frame is hidden, the rest is encoded at sample points, and scatterers there radiate what
 was hidden: for device pair j
@@ -43,8 +43,8 @@ _SIDE, _LEVELS = 20, 2
 _POINTS = 256
 #: Device pairs of a step.
 _PAIRS = 3
-#: Hidden share of tones and of receiving antennas, each contiguous.
-_HIDDEN_TONES, _HIDDEN_ANTENNAS = 1 / 8, 1 / 4
+#: Hidden share of subcarriers and of receiving antennas, each contiguous.
+_HIDDEN_SUBCARRIERS, _HIDDEN_ANTENNAS = 1 / 8, 1 / 4
 #: Weight of the correlation of features beside the error.
 _DECORRELATION = 0.2
 #: Draws of masks and points that an error is averaged over.
@@ -109,9 +109,9 @@ class Example:
 
 
 def _mask(blocks: Blocks, rng: np.random.Generator) -> Bool[Tensor, "pair tx rx subcarrier"]:
-    """A run of tones on all links, and a run of receiving antennas on all tones."""
+    """A run of subcarriers on all links, and a run of receiving antennas on all subcarriers."""
     mask = torch.zeros(blocks.csi.shape, dtype=torch.bool)
-    for axis, share in ((3, _HIDDEN_TONES), (2, _HIDDEN_ANTENNAS)):
+    for axis, share in ((3, _HIDDEN_SUBCARRIERS), (2, _HIDDEN_ANTENNAS)):
         size = mask.shape[axis]
         width = min(max(1, round(share * size)), size - 1)
         for pair in range(len(mask)):

@@ -21,8 +21,8 @@ def direct_gain(
 ) -> Complex128[np.ndarray, "pair"]:
     """Complex factor on Friis' direct path per device pair, by least squares."""
     tx, rx = np.nonzero(pair >= 0)
-    wave = direct_channel(observations)[tx, rx][:, observations.tones].astype(np.complex128)
-    seen = observations.static[tx, rx][:, observations.tones]
+    wave = direct_channel(observations)[tx, rx][:, observations.subcarriers].astype(np.complex128)
+    seen = observations.static[tx, rx][:, observations.subcarriers]
     index = pair[tx, rx]
     match = np.sum(np.conj(wave) * seen, axis=1)
     power = np.sum(np.abs(wave) ** 2, axis=1)

@@ -27,17 +27,17 @@ class Visible(NamedTuple):
 
     links: Bool[np.ndarray, "tx rx"]
     """Visible links."""
-    tones: Bool[np.ndarray, "subcarrier"]
-    """Visible tones."""
+    subcarriers: Bool[np.ndarray, "subcarrier"]
+    """Visible subcarriers."""
     layout: Layout
     """Antenna elements."""
     freq_hz: Float64[np.ndarray, "subcarrier"]
-    """Tone frequencies [Hz]."""
+    """Subcarrier frequencies [Hz]."""
 
     @property
     def entries(self) -> np.ndarray:
         """Visible entries of the channel, bool, shape (tx, rx, subcarrier)."""
-        return self.links[:, :, None] & self.tones
+        return self.links[:, :, None] & self.subcarriers
 
 
 class Change(NamedTuple):
@@ -53,11 +53,13 @@ class Kind(Protocol):
     """One kind of report."""
 
     def report(
-        self, csi: Complex64[np.ndarray, "*link subcarrier"], tones: Bool[np.ndarray, "subcarrier"]
+        self,
+        csi: Complex64[np.ndarray, "*link subcarrier"],
+        subcarriers: Bool[np.ndarray, "subcarrier"],
     ) -> Reported:
         """What the radio reports of a channel.
 
-        Hidden tones do not enter the delay profile; NaN of a lost packet stays NaN.
+        Hidden subcarriers do not enter the delay profile; NaN of a lost packet stays NaN.
         """
         ...
 
@@ -75,34 +77,34 @@ class Kind(Protocol):
 
 
 class _Complex:
-    def report(self, csi: np.ndarray, tones: np.ndarray) -> Reported:
+    def report(self, csi: np.ndarray, subcarriers: np.ndarray) -> Reported:
         return csi
 
     def change(self, csi: np.ndarray, empty: Reported, seen: Visible) -> Change:
         if len(csi) == 1:
             return Change(csi[0] - empty, empty)
-        packets = change_of_packets(csi - empty, seen.links, seen.tones, seen.layout)
+        packets = change_of_packets(csi - empty, seen.links, seen.subcarriers, seen.layout)
         return Change(packets[0], empty, packets=packets)
 
 
 class _Power:
-    def report(self, csi: np.ndarray, tones: np.ndarray) -> Reported:
+    def report(self, csi: np.ndarray, subcarriers: np.ndarray) -> Reported:
         return np.abs(csi)
 
     def change(self, csi: np.ndarray, empty: Reported, seen: Visible) -> Change:
         wave = direct_wave(seen.layout, seen.freq_hz)
         # Hidden links must not set the scale of the others.
-        now = np.where(seen.entries, self.report(csi[0], seen.tones), 0)
+        now = np.where(seen.entries, self.report(csi[0], seen.subcarriers), 0)
         empty = np.where(seen.entries, empty, 0)
-        return Change(hologram(now, empty, seen.tones, wave), empty * wave)
+        return Change(hologram(now, empty, seen.subcarriers, wave), empty * wave)
 
 
 class _DelayPower:
-    def report(self, csi: np.ndarray, tones: np.ndarray) -> Reported:
-        return delay_amplitude(csi, tones)
+    def report(self, csi: np.ndarray, subcarriers: np.ndarray) -> Reported:
+        return delay_amplitude(csi, subcarriers)
 
     def change(self, csi: np.ndarray, empty: Reported, seen: Visible) -> Change:
-        change = np.abs(self.report(csi[0], seen.tones) - empty)
+        change = np.abs(self.report(csi[0], seen.subcarriers) - empty)
         change = np.where(seen.links[..., None], change, 0).astype(np.float32)
         spacing_hz = float(seen.freq_hz[1] - seen.freq_hz[0])
         direct = direct_amplitude(empty, seen.layout, spacing_hz)

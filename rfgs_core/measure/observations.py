@@ -19,28 +19,28 @@ from rfgs_core.settings import Observe, Packets, TrainConfig
 if TYPE_CHECKING:
     from rfgs_core.dataset import Sequence
 
-#: Links and tones that are left when more is hidden than what is held out.
+#: Links and subcarriers that are left when more is hidden than what is held out.
 Kept = tuple[Bool[np.ndarray, "tx rx"], Bool[np.ndarray, "subcarrier"]]
 
 
 @dataclass(frozen=True)
 class Observations:
-    """Channel change of one frame on the links and tones that training may use."""
+    """Channel change of one frame on the links and subcarriers that training may use."""
 
     delta: Complex64[np.ndarray, "tx rx subcarrier"]
-    """csi − csi_static where visible, zero elsewhere; of powers per tone the hologram of
+    """csi − csi_static where visible, zero elsewhere; of powers per subcarrier the hologram of
     `phase_free`, of powers per delay nothing."""
     static: Complex64[np.ndarray, "tx rx subcarrier"]
     """csi_static where visible, zero elsewhere; without phases its amplitude (of powers per
     delay: that of the direct path) on the phase of the direct path."""
     links: Bool[np.ndarray, "tx rx"]
     """Links that training may use."""
-    tones: Bool[np.ndarray, "subcarrier"]
-    """Tones that training may use."""
+    subcarriers: Bool[np.ndarray, "subcarrier"]
+    """Subcarriers that training may use."""
     layout: Layout
     """Antenna elements, and the links that the radio has at all, held out or not."""
     freq_hz: Float64[np.ndarray, "subcarrier"]
-    """Tone frequencies [Hz], equally spaced."""
+    """Subcarrier frequencies [Hz], equally spaced."""
     bounds_m: Float64[np.ndarray, "2 3"]
     """Scene bounds [m]."""
     time_s: float = 0.0
@@ -79,11 +79,11 @@ class Observations:
         """The same observations with another channel change, for example a residual."""
         return replace(self, delta=delta.astype(np.complex64), packets=None, packet_interval_s=0.0)
 
-    def with_entries(self, entries: Complex[np.ndarray, "link tone"]) -> Observations:
+    def with_entries(self, entries: Complex[np.ndarray, "link subcarrier"]) -> Observations:
         """The same observations with other visible entries of the change, zero where hidden."""
         delta = np.zeros_like(self.delta)
         tx, rx = np.nonzero(self.links)
-        delta[tx[:, None], rx[:, None], np.flatnonzero(self.tones)] = entries
+        delta[tx[:, None], rx[:, None], np.flatnonzero(self.subcarriers)] = entries
         return self.with_delta(delta)
 
 
@@ -129,7 +129,7 @@ def packets_to_read(
 def visible_channel(
     sequence: Sequence, radio: str, frame: int, channel: Observed, packets: Packets = "first"
 ) -> tuple[Layout, Bool[np.ndarray, "tx rx"], Bool[np.ndarray, "subcarrier"], np.ndarray]:
-    """Elements, visible links and tones, and the channels of a frame with everything in them.
+    """Elements, visible links and subcarriers, and the channels of a frame with everything in them.
 
     Returns:
         The channels are (packet, tx, rx, subcarrier), NaN where a packet was lost; links that
@@ -143,18 +143,18 @@ def visible_channel(
     # The links that exist are those the channels were stored with.
     elements = replace(sequence.layout(radio), measured=data["measured"].values.copy())
     split = HeldOut.of(sequence.splits["rf"][radio], elements, data.sizes["subcarrier"])
-    links, tones = split.links, split.tones
+    links, subcarriers = split.links, split.subcarriers
     count = 1 if packets == "first" else None
     csi = observed_packets(sequence, radio, frame, channel, count)
     received = np.broadcast_to(links, csi.shape[:3])
     if channel == "impaired":
         received = received & ~np.isnan(csi).all(axis=3)
-    _need_finite(csi, received, tones, f"csi of frame {frame} ({sequence.name}, {radio})")
-    return elements, received.any(axis=0), tones, csi
+    _need_finite(csi, received, subcarriers, f"csi of frame {frame} ({sequence.name}, {radio})")
+    return elements, received.any(axis=0), subcarriers, csi
 
 
-def _need_finite(csi: np.ndarray, links: np.ndarray, tones: np.ndarray, what: str) -> None:
-    if not np.isfinite(csi[links[..., None] & tones]).all():
+def _need_finite(csi: np.ndarray, links: np.ndarray, subcarriers: np.ndarray, what: str) -> None:
+    if not np.isfinite(csi[links[..., None] & subcarriers]).all():
         raise RfgsError(f"{what} holds NaN or infinity; run `rfgs-factory validate` on the dataset")
 
 
@@ -179,23 +179,23 @@ def observe(
         empty: What it reports of the empty room; None takes the empty-room capture.
         packets: Whether the frame's other packets help to tell the change from noise; only of
             the channel itself.
-        kept: Hides all other links and tones as well, before anything is made of the channel.
+        kept: Hides all other links and subcarriers as well, before anything is made of the channel.
 
     Raises:
         RfgsError: The channel holds values that are not finite, or its antennas move within a
             frame.
     """
-    elements, links, tones, csi = visible_channel(sequence, radio, frame, channel, packets)
+    elements, links, subcarriers, csi = visible_channel(sequence, radio, frame, channel, packets)
     if kept is not None:
-        links, tones = links & kept[0], tones & kept[1]
+        links, subcarriers = links & kept[0], subcarriers & kept[1]
     if empty is None:
         static = sequence.csi_static(radio)
         _need_finite(
-            static, links, tones, f"csi_static of frame {frame} ({sequence.name}, {radio})"
+            static, links, subcarriers, f"csi_static of frame {frame} ({sequence.name}, {radio})"
         )
-        empty = KINDS[kind].report(static, tones)
+        empty = KINDS[kind].report(static, subcarriers)
     freq_hz = np.array(sequence.coordinates(radio)["freq_hz"].values, dtype=np.float64)
-    seen = Visible(links, tones, elements, freq_hz)
+    seen = Visible(links, subcarriers, elements, freq_hz)
     change, interval_s = KINDS[kind].change(csi, empty, seen), 0.0
     if change.packets is not None:
         interval_s = float(np.diff(sequence.sample_times_s(radio, frame)[:2])[0])
@@ -203,7 +203,7 @@ def observe(
         delta=np.where(seen.entries, change.delta, 0).astype(np.complex64),
         static=np.where(seen.entries, change.static, 0).astype(np.complex64),
         links=links,
-        tones=tones,
+        subcarriers=subcarriers,
         layout=elements,
         freq_hz=freq_hz,
         bounds_m=np.asarray(sequence.bounds_m, dtype=np.float64),

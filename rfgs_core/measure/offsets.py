@@ -2,8 +2,8 @@
 """Phase and timing offsets of devices, from channels beside what they should be.
 
 A device whose oscillator is φ ahead and whose clock is τ late turns every link from it to
-another device b by exp(j(φ_a − φ_b) − j2π(f − f_c)(τ_a − τ_b)), f_c the centre of the tones; links
-within a device stay as they are. Given channels y and a model m of them, the likelihood under
+another device b by exp(j(φ_a − φ_b) − j2π(f − f_c)(τ_a − τ_b)), f_c the centre of the subcarriers;
+links within a device stay as they are. Given channels y and a model m of them, the likelihood under
 white noise depends on the cross spectra c_ab(f) = Σ_links y m* of the device pairs alone:
 
     J(φ, τ) = Σ_ab w_ab Re Σ_f c_ab(f) exp(−j(φ_a − φ_b) + j2π(f − f_c)(τ_a − τ_b)).
@@ -78,15 +78,15 @@ class CrossSpectra:
     """Cross spectra of the pairs of different devices, each in units of its own power."""
 
     value: Complex128[np.ndarray, "pair subcarrier"]
-    """c_ab over the visible tones."""
+    """c_ab over the visible subcarriers."""
     first: Int64[np.ndarray, "pair"]
     """Transmitting device of each pair."""
     second: Int64[np.ndarray, "pair"]
     """Receiving device of each pair."""
     baseband: Float64[np.ndarray, "subcarrier"]
-    """2π(f − f_c) of the visible tones [rad/s]."""
+    """2π(f − f_c) of the visible subcarriers [rad/s]."""
     index: Int64[np.ndarray, "subcarrier"]
-    """Place of the visible tones among all."""
+    """Place of the visible subcarriers among all."""
 
     @staticmethod
     def of(
@@ -100,13 +100,13 @@ class CrossSpectra:
             RfgsError: The visible links do not connect all devices to each other.
         """
         pair, names = observations.pairs
-        tones = observations.tones
+        subcarriers = observations.subcarriers
         rows, kept = [], []
         for index, (a, b) in enumerate(names):
             if a == b:
                 continue
-            y = measured[pair == index][:, tones].astype(np.complex128)
-            m = model[pair == index][:, tones].astype(np.complex128)
+            y = measured[pair == index][:, subcarriers].astype(np.complex128)
+            m = model[pair == index][:, subcarriers].astype(np.complex128)
             scale = np.sqrt(np.sum(np.abs(y) ** 2) * np.sum(np.abs(m) ** 2))
             if scale > 0:
                 rows.append(np.sum(y * np.conj(m), axis=0) / scale)
@@ -118,8 +118,8 @@ class CrossSpectra:
             value=np.array(rows),
             first=first,
             second=second,
-            baseband=2 * np.pi * (freq_hz - freq_hz.mean())[tones],
-            index=np.flatnonzero(tones),
+            baseband=2 * np.pi * (freq_hz - freq_hz.mean())[subcarriers],
+            index=np.flatnonzero(subcarriers),
         )
 
     def weighted(self, offsets: Offsets, pooled: bool) -> CrossSpectra:
@@ -137,7 +137,7 @@ class CrossSpectra:
 
     @staticmethod
     def join(parts: Sequence[CrossSpectra]) -> CrossSpectra:
-        """All pairs of parts with the same tones, for offsets that have to suit them all."""
+        """All pairs of parts with the same subcarriers, for offsets that have to suit them all."""
         names = ("value", "first", "second")
         rows = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
         return replace(parts[0], **rows)

@@ -40,7 +40,8 @@ _CELLS = 1024
 
 
 def noise_power(
-    change: Complex[np.ndarray, "packet link subcarrier"], tones: Bool[np.ndarray, "subcarrier"]
+    change: Complex[np.ndarray, "packet link subcarrier"],
+    subcarriers: Bool[np.ndarray, "subcarrier"],
 ) -> float:
     """Power of what has no delay and no Doppler of its own: white noise of one entry.
 
@@ -49,9 +50,9 @@ def noise_power(
 
     Args:
         change: Channel change; packets evenly spaced.
-        tones: Visible tones; the longest run of them is read.
+        subcarriers: Visible subcarriers; the longest run of them is read.
     """
-    index = np.flatnonzero(tones)
+    index = np.flatnonzero(subcarriers)
     run = max(np.split(index, np.flatnonzero(np.diff(index) > 1) + 1), key=len)
     band, time = (np.hanning(size + 2)[1:-1] for size in (len(run), len(change)))
     window = band * time[:, None, None] / np.sqrt((band**2).sum() * (time**2).sum())
@@ -112,17 +113,17 @@ def _columns(rx_column: np.ndarray, rx: np.ndarray) -> tuple[np.ndarray, int]:
 
 def _pair_estimate(
     change: Complex[np.ndarray, "packet tx column row subcarrier"],
-    tones: Bool[np.ndarray, "subcarrier"],
+    subcarriers: Bool[np.ndarray, "subcarrier"],
     received: Bool[np.ndarray, "packet"],
 ) -> Complex[np.ndarray, "packet tx column row subcarrier"]:
     """The estimate of one device pair."""
-    noise = noise_power(change[received].reshape(received.sum(), -1, len(tones)), tones)
-    power = float(np.mean(np.abs(change[received][..., tones]) ** 2))
+    noise = noise_power(change[received].reshape(received.sum(), -1, len(subcarriers)), subcarriers)
+    power = float(np.mean(np.abs(change[received][..., subcarriers]) ** 2))
     if received.all() and noise <= SILENT * power:
         return change
     cells = np.fft.ifft(change, axis=4, norm="ortho")
     cells = np.fft.fftn(cells, axes=(1, 2, 3), norm="ortho")
-    noise *= float(tones.mean())
+    noise *= float(subcarriers.mean())
     spectrum = doppler_spectrum(cells, noise, int(received.sum()))
     flat = cells.reshape(len(cells), -1), spectrum.reshape(len(spectrum), -1)
     estimate = wiener_estimate(*flat, noise, received).reshape(cells.shape)
@@ -133,7 +134,7 @@ def _pair_estimate(
 def change_of_packets(
     change: Complex64[np.ndarray, "packet tx rx subcarrier"],
     links: Bool[np.ndarray, "tx rx"],
-    tones: Bool[np.ndarray, "subcarrier"],
+    subcarriers: Bool[np.ndarray, "subcarrier"],
     layout: Layout,
 ) -> Complex64[np.ndarray, "packet tx rx subcarrier"]:
     """The change of all visible links at each packet, estimated from all of them.
@@ -141,7 +142,7 @@ def change_of_packets(
     Args:
         change: csi − csi_static of each packet, evenly spaced; NaN where one was lost.
         links: Links that may be read.
-        tones: Tones that may be read.
+        subcarriers: Subcarriers that may be read.
         layout: Antenna elements.
 
     Returns:
@@ -152,11 +153,11 @@ def change_of_packets(
     for index in range(len(names)):
         tx, rx = (np.unique(axis) for axis in np.nonzero(pair == index))
         rx, rows = _columns(layout.rx_column, rx)
-        visible = links[tx[:, None], rx][..., None] & tones
+        visible = links[tx[:, None], rx][..., None] & subcarriers
         block = np.where(visible, change[:, tx[:, None], rx], 0)
         received = np.isfinite(block).all(axis=(1, 2, 3))
         block[~received] = 0
-        shape = (*block.shape[:2], -1, rows, len(tones))
-        found = _pair_estimate(block.reshape(shape), tones, received)
+        shape = (*block.shape[:2], -1, rows, len(subcarriers))
+        found = _pair_estimate(block.reshape(shape), subcarriers, received)
         estimate[:, tx[:, None], rx] = found.reshape(block.shape)
-    return np.where(links[..., None] & tones, estimate, 0).astype(np.complex64)
+    return np.where(links[..., None] & subcarriers, estimate, 0).astype(np.complex64)

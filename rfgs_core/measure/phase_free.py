@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What radios tell that report no phase: power per tone, or power per delay.
+"""What radios tell that report no phase: power per subcarrier, or power per delay.
 
-**Power per tone.** With the empty room H₀ and its change Δ,
+**Power per subcarrier.** With the empty room H₀ and its change Δ,
 
     |H₀ + Δ|² − |H₀|² = 2 Re(H₀* Δ) + |Δ|²,
 
@@ -44,10 +44,10 @@ def direct_wave(
 
 def reference_level(
     empty_amplitude: Float[np.ndarray, "*link subcarrier"],
-    tones: Bool[np.ndarray, "subcarrier"],
+    subcarriers: Bool[np.ndarray, "subcarrier"],
 ) -> Float32[np.ndarray, "*link"]:
-    """RMS amplitude of each link's empty room over the visible tones, never quite zero."""
-    level = np.sqrt(np.mean(empty_amplitude[..., tones].astype(np.float64) ** 2, axis=-1))
+    """RMS amplitude of each link's empty room over the visible subcarriers, never quite zero."""
+    level = np.sqrt(np.mean(empty_amplitude[..., subcarriers].astype(np.float64) ** 2, axis=-1))
     floor = LEAST_REFERENCE * level.max() if level.size else 0.0
     return np.maximum(level, max(floor, 1e-30)).astype(np.float32)
 
@@ -55,7 +55,7 @@ def reference_level(
 def hologram(
     amplitude: Float[np.ndarray, "tx rx subcarrier"],
     empty_amplitude: Float[np.ndarray, "tx rx subcarrier"],
-    tones: Bool[np.ndarray, "subcarrier"],
+    subcarriers: Bool[np.ndarray, "subcarrier"],
     wave: Complex64[np.ndarray, "tx rx subcarrier"],
 ) -> Complex64[np.ndarray, "tx rx subcarrier"]:
     """Change of power over the level of the reference, on the direct path's phase.
@@ -63,23 +63,23 @@ def hologram(
     Args:
         amplitude: |csi| of the frame.
         empty_amplitude: |csi| of the empty room.
-        tones: Visible tones.
+        subcarriers: Visible subcarriers.
         wave: `direct_wave`.
     """
-    level = reference_level(empty_amplitude, tones)[..., None]
+    level = reference_level(empty_amplitude, subcarriers)[..., None]
     change = (amplitude.astype(np.float64) ** 2 - empty_amplitude.astype(np.float64) ** 2) / level
     return (wave * change).astype(np.complex64)
 
 
 def delay_amplitude(
-    csi: Complex64[np.ndarray, "*link subcarrier"], tones: Bool[np.ndarray, "subcarrier"]
+    csi: Complex64[np.ndarray, "*link subcarrier"], subcarriers: Bool[np.ndarray, "subcarrier"]
 ) -> Float32[np.ndarray, "*link delay"]:
     """|h(τ)| of the windowed visible band; a path of amplitude a peaks at a.
 
     The samples cover one period 1/Δf of delay, `DELAY_SAMPLES` per resolution cell.
     """
-    visible = np.where(tones, csi, 0)
-    profile = delay_profile(visible, band_window(tones), DELAY_SAMPLES, peak=True)
+    visible = np.where(subcarriers, csi, 0)
+    profile = delay_profile(visible, band_window(subcarriers), DELAY_SAMPLES, peak=True)
     return np.abs(profile).astype(np.float32)
 
 

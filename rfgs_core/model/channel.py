@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The change of the channel that Gaussians cause, on chosen links and tones."""
+"""The change of the channel that Gaussians cause, on chosen links and subcarriers."""
 
 from __future__ import annotations
 
@@ -14,17 +14,24 @@ from rfgs_core.gaussians import Gaussians
 from rfgs_core.measure.direct_path import direct_paths
 from rfgs_core.measure.observations import Observations
 from rfgs_core.model.head import RadioHead
-from rfgs_core.propagation import EnvironmentPaths, Links, Tones, environment, propagate, shadow
+from rfgs_core.propagation import (
+    EnvironmentPaths,
+    Links,
+    Subcarriers,
+    environment,
+    propagate,
+    shadow,
+)
 
 
 @dataclass(frozen=True)
 class Channel:
-    """Links, tones and direct paths that Gaussians are compared on."""
+    """Links, subcarriers and direct paths that Gaussians are compared on."""
 
     links: Links
     """Antenna pairs."""
-    tones: Tones
-    """Tones."""
+    subcarriers: Subcarriers
+    """Subcarriers."""
     paths: EnvironmentPaths
     """Direct paths of the links that leave their device."""
     tx: Int64[np.ndarray, "link"]
@@ -36,19 +43,21 @@ class Channel:
     def of(
         observations: Observations,
         links: Bool[np.ndarray, "tx rx"],
-        tones: Bool[np.ndarray, "subcarrier"],
+        subcarriers: Bool[np.ndarray, "subcarrier"],
     ) -> Channel:
-        """The marked links and tones of a frame's radio."""
+        """The marked links and subcarriers of a frame's radio."""
         tx, rx = np.nonzero(links)
         freq_hz = observations.freq_hz
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], tones.astype(int), [0]])))
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], subcarriers.astype(int), [0]])))
         blocks = tuple((int(a), int(b - a)) for a, b in zip(edges[::2], edges[1::2], strict=True))
         return Channel(
             links=Links(
                 torch.from_numpy(observations.layout.tx_xyz[tx]),
                 torch.from_numpy(observations.layout.rx_xyz[rx]),
             ),
-            tones=Tones(float(freq_hz[0]), float(freq_hz[1] - freq_hz[0]), len(freq_hz), blocks),
+            subcarriers=Subcarriers(
+                float(freq_hz[0]), float(freq_hz[1] - freq_hz[0]), len(freq_hz), blocks
+            ),
             paths=direct_paths(observations, links),
             tx=tx,
             rx=rx,
@@ -62,7 +71,7 @@ class Channel:
         keep = moved >= 0
         return Channel(
             links=Links(self.links.tx_xyz[chosen], self.links.rx_xyz[chosen]),
-            tones=self.tones,
+            subcarriers=self.subcarriers,
             paths=replace(self.paths.rows(keep), link=moved[keep]),
             tx=self.tx[chosen],
             rx=self.rx[chosen],
@@ -74,16 +83,16 @@ class Channel:
         """What the Gaussians reflect; `gamma` replaces the reflectivity of their features."""
         g = head.radio_gaussians(gaussians)
         strength = g.gamma if gamma is None else gamma[:, None]
-        return propagate(replace(g, gamma=strength), self.links, self.tones)
+        return propagate(replace(g, gamma=strength), self.links, self.subcarriers)
 
     def shadowed(self, head: RadioHead, gaussians: Gaussians) -> Complex[Tensor, "link subcarrier"]:
         """What the Gaussians take away from the direct paths: (T − 1) a e^{−j2πfτ}."""
         if len(self.paths) == 0:
-            size = len(self.links), self.tones.num_selected
+            size = len(self.links), self.subcarriers.num_selected
             return gaussians.means.new_zeros(size, dtype=torch.complex64)
         g = head.radio_gaussians(gaussians)
         passed = shadow(g.means, g.quats, g.scales, g.alpha, self.paths)
-        lost = environment(passed - 1.0, self.paths, self.tones, len(self.links))
+        lost = environment(passed - 1.0, self.paths, self.subcarriers, len(self.links))
         return lost.to(torch.complex64)
 
     def change(self, head: RadioHead, gaussians: Gaussians) -> Complex[Tensor, "link subcarrier"]:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The terms in which a predicted channel change is held against the reported one.
 
-A radio reports the channel, powers per tone or powers per delay; the model predicts a complex
+A radio reports the channel, powers per subcarrier or powers per delay; the model predicts a complex
 change Δ. Each comparison turns Δ into what that radio would have reported.
 """
 
@@ -30,7 +30,7 @@ class Comparison(Protocol):
     def predicted(
         self, change: Complex[Tensor, "batch subcarrier"], links: Int64[np.ndarray, "batch"]
     ) -> Tensor:
-        """What it would report of a change on some of the links, visible tones only."""
+        """What it would report of a change on some of the links, visible subcarriers only."""
         ...
 
     def linear(self, change: Complex[Tensor, "link subcarrier"]) -> Tensor | None:
@@ -76,7 +76,7 @@ class ComplexComparison:
 
 @dataclass(frozen=True)
 class PowerComparison:
-    """Change of power per tone, in units of the reference's level."""
+    """Change of power per subcarrier, in units of the reference's level."""
 
     target: Float[Tensor, "link subcarrier"]
     """(|H₀ + Δ|² − |H₀|²) / level."""
@@ -88,12 +88,12 @@ class PowerComparison:
     @staticmethod
     def of(observations: Observations) -> PowerComparison:
         """From the hologram, whose phase is that of the direct path."""
-        links, tones = observations.links, observations.tones
-        empty = observations.static[links][:, tones]
-        wave = direct_wave(observations.layout, observations.freq_hz)[links][:, tones]
-        target = (observations.delta[links][:, tones] * wave.conj()).real
+        links, subcarriers = observations.links, observations.subcarriers
+        empty = observations.static[links][:, subcarriers]
+        wave = direct_wave(observations.layout, observations.freq_hz)[links][:, subcarriers]
+        target = (observations.delta[links][:, subcarriers] * wave.conj()).real
         # Hidden links are zero in `static`, so that the strongest one is a visible one.
-        level = reference_level(np.abs(observations.static), tones)[links][:, None]
+        level = reference_level(np.abs(observations.static), subcarriers)[links][:, None]
         return PowerComparison(
             torch.from_numpy(target.astype(np.float32)),
             torch.from_numpy(empty.astype(np.complex64)),
@@ -121,7 +121,7 @@ class PowerComparison:
         """The hologram of what is left."""
         left = self.target - self.predicted(change, np.arange(len(self.target)))
         wave = direct_wave(observations.layout, observations.freq_hz)
-        wave = wave[observations.links][:, observations.tones]
+        wave = wave[observations.links][:, observations.subcarriers]
         return observations.with_entries(left.cpu().numpy() * wave)
 
 
@@ -132,9 +132,9 @@ class DelayComparison:
     target: Float32[Tensor, "link delay"]
     """||h| − |h₀||, see `phase_free`."""
     window: Float[Tensor, "subcarrier"]
-    """Window of the visible tones."""
-    tones: Int64[Tensor, "tone"]
-    """Places of the visible tones in the band."""
+    """Window of the visible subcarriers."""
+    subcarriers: Int64[Tensor, "subcarrier"]
+    """Places of the visible subcarriers in the band."""
 
     @staticmethod
     def of(observations: Observations) -> DelayComparison:
@@ -142,8 +142,8 @@ class DelayComparison:
         assert observations.delay_change is not None
         return DelayComparison(
             torch.from_numpy(observations.delay_change[observations.links]),
-            torch.from_numpy(band_window(observations.tones)).float(),
-            torch.from_numpy(np.flatnonzero(observations.tones)),
+            torch.from_numpy(band_window(observations.subcarriers)).float(),
+            torch.from_numpy(np.flatnonzero(observations.subcarriers)),
         )
 
     def measured(self) -> Float32[Tensor, "link delay"]:
@@ -156,7 +156,7 @@ class DelayComparison:
         """|Δh(τ)| of the windowed band."""
         size = self.target.shape[1]
         band = change.new_zeros(len(change), size)
-        band = band.index_copy(1, self.tones, change * self.window[self.tones])
+        band = band.index_copy(1, self.subcarriers, change * self.window[self.subcarriers])
         return torch.fft.ifft(band, dim=1, norm="forward").abs()
 
     def linear(self, change: Complex[Tensor, "link subcarrier"]) -> None:
@@ -179,5 +179,5 @@ def comparison_of(observations: Observations) -> Comparison:
         return PowerComparison.of(observations)
     if observations.kind == "delay_power":
         return DelayComparison.of(observations)
-    links, tones = observations.links, observations.tones
-    return ComplexComparison(torch.from_numpy(observations.delta[links][:, tones].copy()))
+    links, subcarriers = observations.links, observations.subcarriers
+    return ComplexComparison(torch.from_numpy(observations.delta[links][:, subcarriers].copy()))

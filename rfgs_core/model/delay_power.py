@@ -71,7 +71,7 @@ def power_maps(observations: Observations) -> list[PowerMap]:
     """
     if observations.kind == "delay_power":
         return delay_maps(observations)
-    window = band_window(observations.tones)
+    window = band_window(observations.subcarriers)
     wavelength_m = SPEED_OF_LIGHT / observations.centre_hz
     pair, names = observations.pairs
     maps = []
@@ -126,7 +126,7 @@ class DelayPowerModel:
     def __init__(self, observations: Observations, points: Float[np.ndarray, "M 3"]) -> None:
         self.maps = power_maps(observations)
         self._spacing_hz = float(observations.freq_hz[1] - observations.freq_hz[0])
-        self._window = band_window(observations.tones)
+        self._window = band_window(observations.subcarriers)
         self._wavelength_m = SPEED_OF_LIGHT / observations.centre_hz
         parts = [self._factors(entry, points.astype(np.float64)) for entry in self.maps]
         #: Per map: delay response times spreading (delay, M), beam response (M, beam), data.

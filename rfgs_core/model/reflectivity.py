@@ -4,7 +4,7 @@
 The channel is linear in the reflectivities γ. With γ_i ~ CN(0, p_i), where p_i is the
 reflected power of the phase-free fit, and noise of variance σ² per device pair, the posterior
 mean minimises Σ |y − Aγ|²/σ² + Σ |γ_i|²/p_i. Conjugate gradients solve for x = γ/√p. Of powers
-per tone the hologram is linear in real and imaginary parts, which is all that they ask for.
+per subcarrier the hologram is linear in real and imaginary parts, which is all that they ask for.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def fitted_reflectivities(
     """
     device = gaussians.means.device
     comparison = on_device(comparison_of(observations), device)
-    channel = Channel.of(observations, observations.links, observations.tones)
+    channel = Channel.of(observations, observations.links, observations.subcarriers)
     with torch.no_grad():
         shadow = comparison.linear(channel.shadowed(head, gaussians))
     if shadow is None:
@@ -71,7 +71,7 @@ def posterior_mean(
     """Posterior-mean reflectivities [m].
 
     Args:
-        channel: Links and tones of `target`.
+        channel: Links and subcarriers of `target`.
         head: Decodes ρ; its reflectivities are ignored.
         gaussians: Fixed positions, shapes and normals.
         target: Channel change to explain, (link, entry), as `comparison` puts it.

@@ -14,7 +14,7 @@ from jaxtyping import Bool, Complex64, Float
 
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.model.head import RadioHead
-from rfgs_core.propagation import Links, Tones
+from rfgs_core.propagation import Links, Subcarriers
 from rfgs_core.propagation.reference import echoes
 from rfgs_core.radio import Layout
 
@@ -47,7 +47,7 @@ def expected_power(
             radio.means,
             axes @ axes.mT,
             Links(*ends),
-            Tones(freq_hz, 0.0, 1),
+            Subcarriers(freq_hz, 0.0, 1),
             None if radio.normals is None else radio.normals.double(),
             radio.sharpness,
         )

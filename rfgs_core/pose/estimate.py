@@ -38,7 +38,7 @@ class PoseEstimate:
     seated: Bool[np.ndarray, "frame body"]
     """Which bodies the run takes to sit."""
     standing: Float64[np.ndarray, "frame body 17 3"]
-    """Joints of the control: a standing body of average height at the same centroid, which
+    """Joints of the baseline: a standing body of average height at the same centroid, which
     looks where the track leads [m]."""
 
 
@@ -54,7 +54,7 @@ def estimate_poses(run: Run, on_step: Callable[[], Any] = lambda: None) -> PoseE
     time_s = np.array([sequence.time_s(frame) for frame in run.frames])
     centroid = np.array([[cloud.centre for cloud in row] for row in clouds])
     joints = np.zeros((*centroid.shape[:2], 17, 3))
-    control = np.zeros_like(joints)
+    baseline = np.zeros_like(joints)
     knees_rad = np.array([_knees(run, frame) for frame in run.frames])
     sits = np.isfinite(knees_rad)
     for body in range(centroid.shape[1]):
@@ -72,12 +72,12 @@ def estimate_poses(run: Run, on_step: Callable[[], Any] = lambda: None) -> PoseE
             found = fit_body(cloud, headings[k], before, elapsed_s, seed, seated=seated)
             before = found.parameters
             joints[k, body] = joints_of(found.parameters, floor_m)
-            # Of a body at rest the control is told the fit's own heading.
+            # Of a body at rest the baseline is told the fit's own heading.
             own = float(found.parameters[index_of("heading")])
             looks = headings[k][0] if len(headings[k]) == 1 else own
-            control[k, body] = joints_of(standing(cloud, looks), floor_m)
+            baseline[k, body] = joints_of(standing(cloud, looks), floor_m)
             on_step()
-    return PoseEstimate(list(run.frames), time_s, centroid, joints, sits, control)
+    return PoseEstimate(list(run.frames), time_s, centroid, joints, sits, baseline)
 
 
 def _knees(run: Run, frame: int) -> Float64[np.ndarray, "body"]:

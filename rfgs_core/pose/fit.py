@@ -81,7 +81,7 @@ class FittedBody:
 
 
 def standing(cloud: Cloud, heading: float) -> Float64[np.ndarray, "15"]:
-    """A standing body of average height at the cloud's centroid: the control of every fit."""
+    """A standing body of average height at the cloud's centroid: the baseline of every fit."""
     values = {name: mean for name, (mean, _) in _PRIOR.items()}
     values |= {"x": cloud.centre[0], "y": cloud.centre[1], "heading": heading}
     values |= dict.fromkeys(("sink", "pitch", "left_knee", "right_knee"), 0.0)

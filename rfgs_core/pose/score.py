@@ -20,7 +20,7 @@ SITTING_PELVIS_M = 0.75
 
 
 def score_poses(estimate: PoseEstimate, sequence: Sequence) -> dict[str, Any]:
-    """Errors of joints and tracks, beside the standing control.
+    """Errors of joints and tracks, beside the standing baseline.
 
     Bodies are matched to people frame by frame by the distance on the ground between pelvis and
     pelvis. `mpjpe_m` is the mean distance per joint, `aligned_m` the same with pelvis on pelvis;

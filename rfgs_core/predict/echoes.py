@@ -9,13 +9,13 @@ import numpy as np
 import torch
 from jaxtyping import Float, Float64
 
-from rfgs_core.propagation import Links, RadioGaussians, Tones
+from rfgs_core.propagation import Links, RadioGaussians, Subcarriers
 from rfgs_core.propagation.covariance import covariances
-from rfgs_core.propagation.reference import echoes, gamma_at_tones
+from rfgs_core.propagation.reference import echoes, gamma_at_subcarriers
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
-#: Tones, spread over the band, that powers are averaged over.
-POWER_TONES = 5
+#: Subcarriers, spread over the band, that powers are averaged over.
+POWER_SUBCARRIERS = 5
 
 
 @dataclass(frozen=True)
@@ -44,12 +44,14 @@ class Reflectors:
     """d ln|γ|² / d ln f over the band; NaN where γ is one value for the whole band."""
 
 
-def band_tones(freq_hz: Float[np.ndarray, "subcarrier"], count: int = POWER_TONES) -> Tones:
-    """A few tones spread over a band, its edges among them."""
+def band_subcarriers(
+    freq_hz: Float[np.ndarray, "subcarrier"], count: int = POWER_SUBCARRIERS
+) -> Subcarriers:
+    """A few subcarriers spread over a band, its edges among them."""
     low, high = float(freq_hz[0]), float(freq_hz[-1])
     if count == 1 or high == low:
-        return Tones(0.5 * (low + high), 0.0, 1)
-    return Tones(low, (high - low) / (count - 1), count)
+        return Subcarriers(0.5 * (low + high), 0.0, 1)
+    return Subcarriers(low, (high - low) / (count - 1), count)
 
 
 def echoes_at(
@@ -59,13 +61,13 @@ def echoes_at(
     freq_hz: Float[np.ndarray, "subcarrier"],
 ) -> Echoes:
     """Echoes at receiving positions, of a transmitter at `tx_xyz` [m]."""
-    g, tones = gaussians, band_tones(freq_hz)
+    g, subcarriers = gaussians, band_subcarriers(freq_hz)
     tx = torch.from_numpy(np.tile(np.asarray(tx_xyz, dtype=np.float64), (len(rx_xyz), 1)))
     rx = torch.from_numpy(np.ascontiguousarray(rx_xyz, dtype=np.float64))
     with torch.no_grad():
         shape = covariances(g.quats, g.scales_rf)
-        terms = echoes(g.means, shape, Links(tx, rx), tones, g.normals, g.sharpness)
-        terms = terms * gamma_at_tones(g.gamma, tones)[:, None]
+        terms = echoes(g.means, shape, Links(tx, rx), subcarriers, g.normals, g.sharpness)
+        terms = terms * gamma_at_subcarriers(g.gamma, subcarriers)[:, None]
         power = (terms.abs().double() ** 2).mean(dim=2).T.numpy()
     means = g.means.detach().numpy().astype(np.float64)
     leg = means - np.asarray(rx_xyz)[:, None]
@@ -81,7 +83,7 @@ def echoes_at(
 def reflectors(gaussians: RadioGaussians, freq_hz: Float[np.ndarray, "subcarrier"]) -> Reflectors:
     """Reflected power, phase and frequency slope of every Gaussian."""
     gamma = gaussians.gamma.detach().to(torch.complex128)
-    middle = gamma_at_tones(gamma, Tones(float(freq_hz[0]), 1.0, 3, ((1, 1),)))[:, 0]
+    middle = gamma_at_subcarriers(gamma, Subcarriers(float(freq_hz[0]), 1.0, 3, ((1, 1),)))[:, 0]
     power = (gamma.abs() ** 2).numpy()
     slope = np.full(len(power), np.nan)
     if power.shape[1] > 1:

@@ -22,7 +22,7 @@ import numpy as np
 import torch
 from jaxtyping import Float, Float64
 
-from rfgs_core.predict.prediction import tones_of
+from rfgs_core.predict.prediction import subcarriers_of
 from rfgs_core.propagation import Links, RadioGaussians, propagate
 from rfgs_core.radio import Layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
@@ -73,7 +73,7 @@ def levels_of(
     tx, rx = np.concatenate(rows, axis=1)
     links = Links(torch.from_numpy(layout.tx_xyz[tx]), torch.from_numpy(layout.rx_xyz[rx]))
     with torch.no_grad():
-        csi = propagate(gaussians, links, tones_of(freq_hz))
+        csi = propagate(gaussians, links, subcarriers_of(freq_hz))
     centre = gaussians.means.detach().numpy().mean(axis=0)
     spread = np.linalg.norm(layout.tx_xyz[tx] - centre, axis=1)
     spread *= np.linalg.norm(layout.rx_xyz[rx] - centre, axis=1)

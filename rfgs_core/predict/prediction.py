@@ -15,7 +15,14 @@ import numpy as np
 import torch
 from jaxtyping import Complex, Complex64, Complex128, Float, Float64
 
-from rfgs_core.propagation import EnvironmentPaths, Links, RadioGaussians, Tones, propagate, shadow
+from rfgs_core.propagation import (
+    EnvironmentPaths,
+    Links,
+    RadioGaussians,
+    Subcarriers,
+    propagate,
+    shadow,
+)
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.levels import decibels
 
@@ -29,7 +36,7 @@ class Prediction:
     element_xyz: Float64[np.ndarray, "rx element 3"]
     """Receiving elements of each position [m]; one where there is no array."""
     freq_hz: Float64[np.ndarray, "subcarrier"]
-    """Tone frequencies [Hz], equally spaced."""
+    """Subcarrier frequencies [Hz], equally spaced."""
     csi_scatter: Complex64[np.ndarray, "rx element subcarrier"]
     """What the Gaussians scatter."""
     csi_free: Complex64[np.ndarray, "rx element subcarrier"]
@@ -56,10 +63,10 @@ class Prediction:
         return moving if self.csi_room is None else moving + self.csi_room
 
 
-def tones_of(freq_hz: Float[np.ndarray, "subcarrier"]) -> Tones:
-    """The whole of a uniform grid of tones."""
+def subcarriers_of(freq_hz: Float[np.ndarray, "subcarrier"]) -> Subcarriers:
+    """The whole of a uniform grid of subcarriers."""
     spacing_hz = float(freq_hz[1] - freq_hz[0]) if len(freq_hz) > 1 else 0.0
-    return Tones(float(freq_hz[0]), spacing_hz, len(freq_hz))
+    return Subcarriers(float(freq_hz[0]), spacing_hz, len(freq_hz))
 
 
 def predict_channel(
@@ -75,7 +82,7 @@ def predict_channel(
         gaussians: Gaussians as the radio sees them.
         tx_xyz: Transmitting antenna [m].
         element_xyz: Receiving elements of each position [m].
-        freq_hz: Tone frequencies [Hz], equally spaced.
+        freq_hz: Subcarrier frequencies [Hz], equally spaced.
         room: Static Gaussians as the radio sees them, in place of the room's reflections.
     """
     tx = np.asarray(tx_xyz, dtype=np.float64)
@@ -85,7 +92,7 @@ def predict_channel(
     g, echoes = gaussians, []
     with torch.no_grad():
         for part in (g, *([] if room is None else [room])):
-            echo = propagate(part, links, tones_of(freq_hz))
+            echo = propagate(part, links, subcarriers_of(freq_hz))
             echoes.append(echo.numpy().reshape(*shape, -1).astype(np.complex64))
         passed = shadow(g.means, g.quats, g.scales, g.alpha, _straight(links, freq_hz))
     free = friis(np.linalg.norm(flat - tx, axis=1), freq_hz)

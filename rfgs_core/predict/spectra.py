@@ -12,12 +12,12 @@ from rfgs_core.predict.echoes import Echoes
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.delay import delay_profile, hann
 
-#: Delay samples per tone: the peak of a path is read within 0.1 dB.
+#: Delay samples per subcarrier: the peak of a path is read within 0.1 dB.
 OVERSAMPLING = 8
 #: Width of a cell of the spatial spectrum [°].
 CELL_DEG = 2.0
-#: Tones, evenly spread, that the beams of an array are formed on.
-BEAM_TONES = 16
+#: Subcarriers, evenly spread, that the beams of an array are formed on.
+BEAM_SUBCARRIERS = 16
 
 
 def profile_over_delay(
@@ -27,7 +27,7 @@ def profile_over_delay(
 
     Args:
         csi: Channels with absolute delays.
-        freq_hz: Tone frequencies [Hz], equally spaced, at least two.
+        freq_hz: Subcarrier frequencies [Hz], equally spaced, at least two.
 
     Returns:
         Magnitudes, and delays from 0 to 1/Δf [s], after which they repeat.
@@ -80,11 +80,11 @@ def beam_power(
     )
     front = towards @ [np.cos(boresight_rad), np.sin(boresight_rad), 0.0] > 0
     ahead_m = towards[front] @ (element_xyz - element_xyz.mean(axis=0)).T
-    chosen = np.unique(np.linspace(0, len(freq_hz) - 1, BEAM_TONES).astype(int))
+    chosen = np.unique(np.linspace(0, len(freq_hz) - 1, BEAM_SUBCARRIERS).astype(int))
     power = np.zeros(len(ahead_m))
-    for tone in chosen:
-        phase = 2 * np.pi * freq_hz[tone] / SPEED_OF_LIGHT * ahead_m
-        power += np.abs(np.exp(-1j * phase) @ csi[:, tone] / len(csi)) ** 2
+    for subcarrier in chosen:
+        phase = 2 * np.pi * freq_hz[subcarrier] / SPEED_OF_LIGHT * ahead_m
+        power += np.abs(np.exp(-1j * phase) @ csi[:, subcarrier] / len(csi)) ** 2
     spectrum = np.full(front.shape, np.nan)
     spectrum[front] = power / len(chosen)
     return spectrum

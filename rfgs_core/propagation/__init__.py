@@ -26,13 +26,13 @@ from jaxtyping import Complex, Float
 from torch import Tensor
 
 from rfgs_core.device import on_device
-from rfgs_core.propagation.geometry import EnvironmentPaths, Links, Tones
+from rfgs_core.propagation.geometry import EnvironmentPaths, Links, Subcarriers
 
 __all__ = [
     "EnvironmentPaths",
     "Links",
     "RadioGaussians",
-    "Tones",
+    "Subcarriers",
     "environment",
     "propagate",
     "scatter",
@@ -49,7 +49,7 @@ def scatter(
     scales_rf: Float[Tensor, "gaussian 3"],
     gamma: Complex[Tensor, "gaussian knot"],
     links: Links,
-    tones: Tones,
+    subcarriers: Subcarriers,
     normals: Float[Tensor, "gaussian 3"] | None = None,
     sharpness: float = 0.0,
     visibility: Float[Tensor, "gaussian group"] | None = None,
@@ -68,30 +68,30 @@ def scatter(
         gamma: Reflectivity [m], the complex root of the radar cross-section, at knots spread
             evenly over the band and linear in between.
         links: Pairs of antennas, on any device.
-        tones: Subcarriers.
+        subcarriers: Subcarriers.
         normals: Outward unit normals; None: every Gaussian is seen from all sides.
         sharpness: How fast a Gaussian disappears behind its tangent plane; 0: never.
         visibility: Weight per Gaussian and group of links (`links.group`); None: 1.
         backend: Which twin computes it; None: the one for the device of `means`.
 
     Returns:
-        CSI, one row per link and one column per selected tone.
+        CSI, one row per link and one column per selected subcarrier.
 
     Example:
         >>> import torch
         >>> link = Links(torch.tensor([[0.0, 0.0, 0.0]]), torch.tensor([[0.0, 0.0, 0.0]]))
-        >>> tones = Tones(f0=299_792_458.0, df=0.0, count=1)
+        >>> subcarriers = Subcarriers(f0=299_792_458.0, df=0.0, count=1)
         >>> csi = scatter(
         ...     torch.tensor([[1.0, 0.0, 0.0]]), torch.tensor([[1.0, 0.0, 0.0, 0.0]]),
-        ...     torch.full((1, 3), 1e-6), torch.ones(1, 1, dtype=torch.complex64), link, tones,
-        ... )
+        ...     torch.full((1, 3), 1e-6), torch.ones(1, 1, dtype=torch.complex64), link,
+        subcarriers, ... )
         >>> round(csi.real.item() * (4 * torch.pi) ** 1.5, 4)
         1.0
     """
     _check_groups(links, visibility)
     links = on_device(links, means.device)
     return _twin(backend, means.device).scatter(
-        *(means, quats, scales_rf, gamma, links, tones, normals, sharpness, visibility)
+        *(means, quats, scales_rf, gamma, links, subcarriers, normals, sharpness, visibility)
     )
 
 
@@ -129,7 +129,7 @@ def shadow(
 def environment(
     transmission: Complex[Tensor, "path"],
     paths: EnvironmentPaths,
-    tones: Tones,
+    subcarriers: Subcarriers,
     num_links: int,
 ) -> Complex[Tensor, "link subcarrier"]:
     """CSI of the environment's paths, the first sum of the module's formula.
@@ -137,16 +137,16 @@ def environment(
     Args:
         transmission: Factor T of each path.
         paths: Environment paths.
-        tones: Subcarriers.
+        subcarriers: Subcarriers.
         num_links: Rows of the result.
     """
     device = transmission.device
     paths = on_device(paths, device)
-    turns = paths.delay_s.to(torch.float64)[:, None] * tones.freq_hz.to(device)
+    turns = paths.delay_s.to(torch.float64)[:, None] * subcarriers.freq_hz.to(device)
     phase = (-2 * math.pi) * (turns - turns.detach().round())
     phasors = torch.polar(torch.ones_like(phase), phase).to(transmission.dtype)
     terms = (transmission * paths.amplitude.to(transmission.dtype))[:, None] * phasors
-    total = torch.zeros(num_links, tones.num_selected, dtype=terms.dtype, device=device)
+    total = torch.zeros(num_links, subcarriers.num_selected, dtype=terms.dtype, device=device)
     return total.index_add(0, paths.link, terms)
 
 
@@ -177,7 +177,7 @@ class RadioGaussians:
 def propagate(
     gaussians: RadioGaussians,
     links: Links,
-    tones: Tones,
+    subcarriers: Subcarriers,
     paths: EnvironmentPaths | None = None,
     *,
     backend: Backend | None = None,
@@ -187,20 +187,20 @@ def propagate(
     Args:
         gaussians: Gaussians as the radio sees them.
         links: Pairs of antennas.
-        tones: Subcarriers.
+        subcarriers: Subcarriers.
         paths: Paths of the empty scene; None: only what the Gaussians scatter.
         backend: Which twin computes it; None: the one for the device of `means`.
     """
     g = gaussians
     total = scatter(
-        *(g.means, g.quats, g.scales_rf, g.gamma, links, tones),
+        *(g.means, g.quats, g.scales_rf, g.gamma, links, subcarriers),
         *(g.normals, g.sharpness, g.visibility),
         backend=backend,
     )
     if paths is None:
         return total
     transmission = shadow(g.means, g.quats, g.scales, g.alpha, paths, backend=backend)
-    return total + environment(transmission, paths, tones, len(links))
+    return total + environment(transmission, paths, subcarriers, len(links))
 
 
 def _twin(backend: Backend | None, device: torch.device) -> ModuleType:

@@ -15,31 +15,31 @@ from torch.autograd.function import once_differentiable
 from rfgs_core.propagation import kernels_scatter, kernels_scatter_gradient, kernels_shadow
 from rfgs_core.propagation.covariance import packed_covariances
 from rfgs_core.propagation.fresnel import leg_frames
-from rfgs_core.propagation.geometry import EnvironmentPaths, Links, Tones
+from rfgs_core.propagation.geometry import EnvironmentPaths, Links, Subcarriers
 from rfgs_core.propagation.kernels_scatter import UNROLL, Cloud, Plan
 from rfgs_core.propagation.kernels_scatter_gradient import CloudGradient
 from rfgs_core.propagation.kernels_shadow import Screens
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
-#: Tones per chunk: rounding errors of the recurrence stay below 1e-5 in float32.
+#: Subcarriers per chunk: rounding errors of the recurrence stay below 1e-5 in float32.
 CHUNK = 64
 
 
 class _Chunks:
-    """Tones cut into chunks that cross neither a block's end nor a knot of gamma.
+    """Subcarriers cut into chunks that cross neither a block's end nor a knot of gamma.
 
     In each chunk gamma is sum_j basis[piece, j, knot] gamma[knot] kappa^j, kappa being the
-    offset from the chunk's centre in tones.
+    offset from the chunk's centre in subcarriers.
     """
 
-    def __init__(self, tones: Tones, knots: int) -> None:
-        edges = [tones.count * 2]
+    def __init__(self, subcarriers: Subcarriers, knots: int) -> None:
+        edges = [subcarriers.count * 2]
         if knots > 1:
-            width = (tones.count - 1) / (knots - 1)
+            width = (subcarriers.count - 1) / (knots - 1)
             edges = [math.ceil(width * knot) for knot in range(1, knots - 1)] + edges
-        rows, tone_rows, basis, columns, offsets = [], [], [], [], []
+        rows, subcarrier_rows, basis, columns, offsets = [], [], [], [], []
         padded = 0
-        for start, count in tones.spans:
+        for start, count in subcarriers.spans:
             at, end = start, start + count
             while at < end:
                 stop = min(end, at + CHUNK, min(edge for edge in edges if edge > at))
@@ -47,34 +47,36 @@ class _Chunks:
                 piece = 0 if knots == 1 else len(basis)
                 length = -(-(stop - at) // UNROLL) * UNROLL
                 rows.append((padded, length, piece))
-                freq_hz = tones.f0 + tones.df * at
-                tone_rows.append((freq_hz, tones.df, freq_hz + tones.df * centre, centre))
+                freq_hz = subcarriers.f0 + subcarriers.df * at
+                subcarrier_rows.append(
+                    (freq_hz, subcarriers.df, freq_hz + subcarriers.df * centre, centre)
+                )
                 if knots > 1 or not basis:
-                    basis.append(_gain_basis(tones, knots, at, centre))
+                    basis.append(_gain_basis(subcarriers, knots, at, centre))
                 columns.extend(range(padded, padded + stop - at))
                 offsets.extend(i - centre for i in range(stop - at))
                 padded += length
                 at = stop
         self.chunk = np.array(rows, dtype=np.int64)
-        self.tone = np.array(tone_rows, dtype=np.float64)
+        self.subcarrier = np.array(subcarrier_rows, dtype=np.float64)
         self.basis = torch.tensor(np.array(basis))
         self.column = torch.tensor(columns)
         orders = 1 if knots == 1 else 2
-        #: kappa^order of every tone of the output, [order, subcarrier].
+        #: kappa^order of every subcarrier of the output, [order, subcarrier].
         self.power = torch.tensor(offsets, dtype=torch.float64) ** torch.arange(orders)[:, None]
         self.padded = padded
 
 
-def _gain_basis(tones: Tones, knots: int, at: int, centre: float) -> np.ndarray:
-    """Weights [order, knot] of a chunk that starts at tone `at` between two knots."""
+def _gain_basis(subcarriers: Subcarriers, knots: int, at: int, centre: float) -> np.ndarray:
+    """Weights [order, knot] of a chunk that starts at subcarrier `at` between two knots."""
     if knots == 1:
         return np.ones((1, 1))
-    per_tone = (knots - 1) / max(tones.count - 1, 1)
-    left = min(int(at * per_tone + 1e-9), knots - 2)
-    share = (at + centre) * per_tone - left
+    per_subcarrier = (knots - 1) / max(subcarriers.count - 1, 1)
+    left = min(int(at * per_subcarrier + 1e-9), knots - 2)
+    share = (at + centre) * per_subcarrier - left
     weights = np.zeros((2, knots))
-    weights[:, left] = 1 - share, -per_tone
-    weights[:, left + 1] = share, per_tone
+    weights[:, left] = 1 - share, -per_subcarrier
+    weights[:, left + 1] = share, per_subcarrier
     return weights
 
 
@@ -84,7 +86,7 @@ def _rows(tensor: Tensor, real: torch.dtype) -> np.ndarray:
 
 
 class _Scatter(torch.autograd.Function):
-    """H[link, tone] of packed Gaussians; all tensors have the Gaussian axis last."""
+    """H[link, subcarrier] of packed Gaussians; all tensors have the Gaussian axis last."""
 
     @staticmethod
     def forward(
@@ -142,14 +144,14 @@ def scatter(
     scales_rf: Float[Tensor, "gaussian 3"],
     gamma: Complex[Tensor, "gaussian knot"],
     links: Links,
-    tones: Tones,
+    subcarriers: Subcarriers,
     normals: Float[Tensor, "gaussian 3"] | None = None,
     sharpness: float = 0.0,
     visibility: Float[Tensor, "gaussian group"] | None = None,
 ) -> Complex[Tensor, "link subcarrier"]:
     """Twin of `rfgs_core.propagation.scatter` on the CPU's vector units."""
     real = scales_rf.dtype
-    chunks = _Chunks(tones, gamma.shape[1])
+    chunks = _Chunks(subcarriers, gamma.shape[1])
     gain = torch.einsum("pok,mk->pom", chunks.basis.to(gamma.dtype), gamma)
     group = links.group
     if visibility is None:
@@ -159,7 +161,9 @@ def scatter(
     if normals is None or sharpness == 0.0:
         normals, sharpness = torch.zeros(0, 3, dtype=real), 0.0
     ends = torch.cat([links.tx_xyz, links.rx_xyz], dim=1)
-    plan = Plan(*(_rows(ends, torch.float64), _rows(group, torch.int64), chunks.chunk, chunks.tone))
+    plan = Plan(
+        *(_rows(ends, torch.float64), _rows(group, torch.int64), chunks.chunk, chunks.subcarrier)
+    )
     total = _Scatter.apply(
         means.T,
         packed_covariances(quats, scales_rf),
@@ -168,7 +172,7 @@ def scatter(
         normals.T,
         (sharpness, plan, chunks),
     )
-    wavelength_m = (SPEED_OF_LIGHT / tones.freq_hz).to(real)
+    wavelength_m = (SPEED_OF_LIGHT / subcarriers.freq_hz).to(real)
     return total * (wavelength_m / (4 * math.pi) ** 1.5)
 
 

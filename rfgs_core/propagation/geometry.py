@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the propagation model is evaluated on: links, tones and environment paths."""
+"""What the propagation model is evaluated on: links, subcarriers and environment paths."""
 
 from __future__ import annotations
 
@@ -39,17 +39,17 @@ class Links:
 
 
 @dataclass(frozen=True)
-class Tones:
+class Subcarriers:
     """A uniform grid of subcarriers, or contiguous blocks of one."""
 
     f0: float
-    """Frequency of tone 0 [Hz]."""
+    """Frequency of subcarrier 0 [Hz]."""
     df: float
-    """Distance between tones [Hz]."""
+    """Distance between subcarriers [Hz]."""
     count: int
-    """Tones of the whole grid; the knots of gamma are spread over all of them."""
+    """Subcarriers of the whole grid; the knots of gamma are spread over all of them."""
     blocks: tuple[tuple[int, int], ...] | None = None
-    """Tones to evaluate as (start, count) pairs, in the order of the output; None means all."""
+    """Subcarriers to evaluate as (start, count) pairs, in the order of the output; None: all."""
 
     def __post_init__(self) -> None:
         if self.f0 <= 0 or self.df < 0 or self.count < 1:
@@ -59,8 +59,8 @@ class Tones:
         for start, count in self.spans:
             if start < 0 or count < 1 or start + count > self.count:
                 raise ValueError(
-                    f"expected tone blocks within 0..{self.count - 1}, "
-                    f"got {count} tones from {start}"
+                    f"expected subcarrier blocks within 0..{self.count - 1}, "
+                    f"got {count} subcarriers from {start}"
                 )
 
     @property
@@ -70,17 +70,17 @@ class Tones:
 
     @property
     def num_selected(self) -> int:
-        """Tones of the output."""
+        """Subcarriers of the output."""
         return sum(count for _, count in self.spans)
 
     @property
     def indices(self) -> Int64[Tensor, "subcarrier"]:
-        """Index on the whole grid of each tone of the output."""
+        """Index on the whole grid of each subcarrier of the output."""
         return torch.cat([torch.arange(start, start + count) for start, count in self.spans])
 
     @property
     def freq_hz(self) -> Float64[Tensor, "subcarrier"]:
-        """Frequency of each tone of the output [Hz]."""
+        """Frequency of each subcarrier of the output [Hz]."""
         return self.f0 + self.df * self.indices.to(torch.float64)
 
 

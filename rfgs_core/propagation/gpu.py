@@ -18,7 +18,7 @@ from torch.utils.checkpoint import checkpoint
 
 from rfgs_core.propagation import reference
 from rfgs_core.propagation.covariance import packed_covariances
-from rfgs_core.propagation.geometry import EnvironmentPaths, Links, Tones
+from rfgs_core.propagation.geometry import EnvironmentPaths, Links, Subcarriers
 from rfgs_core.propagation.kernels_triton import (
     BY_GAIN,
     BY_GROUP,
@@ -26,7 +26,7 @@ from rfgs_core.propagation.kernels_triton import (
     BY_NORMALS,
     BY_SHAPE,
     ROWS,
-    TONES,
+    SUBCARRIERS,
     scatter_backward,
     scatter_forward,
 )
@@ -41,20 +41,22 @@ MOST_SHADOWS = 1 << 21
 
 
 class _Chunks:
-    """Runs of neighbouring tones, at most `TONES` long, among those marked."""
+    """Runs of neighbouring subcarriers, at most `SUBCARRIERS` long, among those marked."""
 
-    def __init__(self, tones: Tones, marked: Tensor, device: torch.device) -> None:
+    def __init__(self, subcarriers: Subcarriers, marked: Tensor, device: torch.device) -> None:
         rows, frequencies, column = [], [], 0
-        for start, count in tones.spans:
+        for start, count in subcarriers.spans:
             wanted = marked[column : column + count].tolist()
             at = 0
             while at < count:
                 end = at
-                while end < min(count, at + TONES) and wanted[end]:
+                while end < min(count, at + SUBCARRIERS) and wanted[end]:
                     end += 1
                 if end > at:
                     rows.append((column + at, end - at))
-                    frequencies.append((tones.f0 + tones.df * (start + at), tones.df))
+                    frequencies.append(
+                        (subcarriers.f0 + subcarriers.df * (start + at), subcarriers.df)
+                    )
                 at = max(end, at + 1)
             column += count
         cycles = torch.tensor(frequencies, dtype=torch.float64) / SPEED_OF_LIGHT
@@ -64,7 +66,7 @@ class _Chunks:
 
 
 class _Scatter(torch.autograd.Function):
-    """H[link, tone] less its wavelengths; all tensors have the Gaussian axis last."""
+    """H[link, subcarrier] less its wavelengths; all tensors have the Gaussian axis last."""
 
     @staticmethod
     def forward(
@@ -130,7 +132,7 @@ class _Scatter(torch.autograd.Function):
 
 def _launch(kernel: Any, grid: tuple[int, ...], flags: dict[str, bool], *args: Any) -> None:
     """Runs a kernel: one program per place of the grid."""
-    kernel[grid](*args, **flags, ROWS=ROWS, TONES=TONES)
+    kernel[grid](*args, **flags, ROWS=ROWS, SUBCARRIERS=SUBCARRIERS)
 
 
 def _splits(programs: int, count: int, least: int) -> int:
@@ -144,7 +146,7 @@ def scatter(
     scales_rf: Float[Tensor, "gaussian 3"],
     gamma: Complex[Tensor, "gaussian knot"],
     links: Links,
-    tones: Tones,
+    subcarriers: Subcarriers,
     normals: Float[Tensor, "gaussian 3"] | None = None,
     sharpness: float = 0.0,
     visibility: Float[Tensor, "gaussian group"] | None = None,
@@ -161,14 +163,16 @@ def scatter(
     if normals is None or sharpness == 0.0:
         normals = means.new_zeros(0, 3)
     ends = torch.cat([links.tx_xyz, links.rx_xyz], dim=1).double().contiguous()
-    total = means.new_zeros(len(links), tones.num_selected, dtype=torch.complex64)
+    total = means.new_zeros(len(links), subcarriers.num_selected, dtype=torch.complex64)
     for knot in range(knots):
-        weight = reference.gamma_at_tones(torch.eye(knots, dtype=torch.float64)[[knot]], tones)[0]
-        setting = (sharpness, ends, group, _Chunks(tones, weight > 0, device))
+        weight = reference.gamma_at_subcarriers(
+            torch.eye(knots, dtype=torch.float64)[[knot]], subcarriers
+        )[0]
+        setting = (sharpness, ends, group, _Chunks(subcarriers, weight > 0, device))
         gain = torch.stack([gamma[:, knot].real, gamma[:, knot].imag])
         part = _Scatter.apply(means.T, shape, gain, visibility.T, normals.T, setting)
         total = total + part * weight.to(device, torch.float32)
-    wavelength_m = (SPEED_OF_LIGHT / tones.freq_hz).to(device, torch.float32)
+    wavelength_m = (SPEED_OF_LIGHT / subcarriers.freq_hz).to(device, torch.float32)
     return (total * (wavelength_m / (4 * math.pi) ** 1.5)).to(gamma.dtype)
 
 

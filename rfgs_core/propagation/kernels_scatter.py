@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scattering of radio Gaussians on the CPU: forward sum and hand-derived gradients.
 
-For Gaussian i, link l and tone f (wavenumber k) the term without its gain is
+For Gaussian i, link l and subcarrier f (wavenumber k) the term without its gain is
 
     A z(f),  A = v / (d_t d_r),  z = exp(-k^2 Q / 2 - j k d),  d = d_t + d_r,  Q = q^T Sigma q.
 
-Tones are uniform, so z(f + df) = z(f) r(f) and r(f + df) = r(f) (1 + e), with r complex and
+Subcarriers are uniform, so z(f + df) = z(f) r(f) and r(f + df) = r(f) (1 + e), with r complex and
 e = exp(-dk^2 Q) - 1 real: eight multiplications and additions per term instead of three
 transcendental functions. Gaussians are processed in blocks of `LANES`, the innermost loops run
-over the block and become SIMD code, and the recurrence starts afresh at every chunk of tones.
-Within a chunk the gain is a polynomial in the tone's offset from the chunk's centre, kappa:
+over the block and become SIMD code, and the recurrence starts afresh at every chunk of subcarriers.
+Within a chunk the gain is a polynomial in the subcarrier's offset from the chunk's centre, kappa:
 gain = sum_j gain_j kappa^j, so that knots of gamma stay out of the loops.
 
 Sums run in a fixed order (a link's sum in one thread, a Gaussian's gradient in one thread), so
@@ -36,7 +36,7 @@ from rfgs_core.propagation.lanes import (
 )
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
-#: Tones handled in one pass over a block; chunks are padded to a multiple of it.
+#: Subcarriers handled in one pass over a block; chunks are padded to a multiple of it.
 UNROLL = 4
 #: Exponents below this are taken as zero: e^-60 = 1e-26. It keeps denormal numbers, which the
 #: processor handles very slowly, out of the recurrence.
@@ -72,15 +72,15 @@ class Cloud(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """Links and chunks of tones."""
+    """Links and chunks of subcarriers."""
 
     ends: np.ndarray
     """Positions of both antennas [m], float64 [link, 6]."""
     group: np.ndarray
     """Row of `Cloud.visibility` per link, int64 [link]."""
     chunk: np.ndarray
-    """First output column, padded tones and gain piece per chunk, int64 [chunk, 3]."""
-    tone: np.ndarray
+    """First output column, padded subcarriers and gain piece per chunk, int64 [chunk, 3]."""
+    subcarrier: np.ndarray
     """First frequency, spacing, centre frequency [Hz] and centre offset, float64 [chunk, 4]."""
 
 
@@ -138,14 +138,14 @@ def see(cloud: Cloud, group: int, first: int, n: int, w: np.ndarray) -> None:
 
 
 @njit(**OPTIONS)
-def start_tones(tone: np.ndarray, n: int, distance: np.ndarray, w: np.ndarray) -> None:
-    """Sets z, r and e at the first tone of a chunk."""
+def start_subcarriers(subcarrier: np.ndarray, n: int, distance: np.ndarray, w: np.ndarray) -> None:
+    """Sets z, r and e at the first subcarrier of a chunk."""
     real = w.dtype.type
-    k, dk = WAVENUMBER * tone[0], WAVENUMBER * tone[1]
+    k, dk = WAVENUMBER * subcarrier[0], WAVENUMBER * subcarrier[1]
     start, step, bend = real(-0.5 * k * k), real(-0.5 * dk * (2 * k + dk)), real(-dk * dk)
     lowest, zero, one = real(LOWEST_EXPONENT), real(0.0), real(1.0)
     half, sixth, small = real(0.5), real(1.0 / 6.0), real(-1e-2)
-    cycles, cycles_step = tone[0] * _PER_METRE, tone[1] * _PER_METRE
+    cycles, cycles_step = subcarrier[0] * _PER_METRE, subcarrier[1] * _PER_METRE
     for b in range(n):
         turns = distance[b] * cycles
         s, c = sine_cosine_of_turns(real(turns - np.floor(turns + 0.5)))
@@ -179,7 +179,7 @@ def turn(x: float, y: float, u: float, v: float, e: float) -> Any:
 
 
 @njit(**_SUM_OPTIONS)
-def _sum_tones(
+def _sum_subcarriers(
     n: int,
     zr: np.ndarray,
     zi: np.ndarray,
@@ -188,7 +188,7 @@ def _sum_tones(
     e: np.ndarray,
     out: np.ndarray,
 ) -> None:
-    """Adds the block's sum of z to out[re/im, tone], moving z and r on."""
+    """Adds the block's sum of z to out[re/im, subcarrier], moving z and r on."""
     for m in range(0, out.shape[1], UNROLL):
         r0 = r1 = r2 = r3 = i0 = i1 = i2 = i3 = zr.dtype.type(0.0)
         for b in range(n):
@@ -217,7 +217,7 @@ def _sum_tones(
 
 @njit(parallel=True, **OPTIONS)
 def scatter_forward(cloud: Cloud, plan: Plan, out: np.ndarray) -> None:
-    """Writes sum_i A z kappa-coefficients, float64 out[link, order, re/im, padded tone]."""
+    """Writes sum_i A z kappa-coefficients, float64 out[link, order, re/im, padded subcarrier]."""
     total = cloud.means.shape[1]
     for link in prange(plan.ends.shape[0]):
         w, distance = scratch(ROWS, cloud.shape), scratch(1, cloud.means)[0]
@@ -228,7 +228,7 @@ def scatter_forward(cloud: Cloud, plan: Plan, out: np.ndarray) -> None:
             for c in range(plan.chunk.shape[0]):
                 column, count, piece = plan.chunk[c]
                 for order in range(cloud.gain.shape[1]):
-                    start_tones(plan.tone[c], n, distance, w)
+                    start_subcarriers(plan.subcarrier[c], n, distance, w)
                     _gain(cloud.gain[piece, order], first, n, w)
                     part = out[link, order, :, column : column + count]
-                    _sum_tones(n, w[ZR], w[ZI], w[RR], w[RI], w[E], part)
+                    _sum_subcarriers(n, w[ZR], w[ZI], w[RR], w[RI], w[E], part)

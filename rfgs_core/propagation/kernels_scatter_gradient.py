@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Gradients of the scattering sum, derived by hand and checked against `gradcheck`.
 
-With G(f) = conj(dL/dH(f)) lambda / (4 pi)^(3/2), one pass over the tones gives the moments
+With G(f) = conj(dL/dH(f)) lambda / (4 pi)^(3/2), one pass over the subcarriers gives the moments
 c_n = sum_f G z kappa^n. Everything else follows from them per Gaussian and link: with
 S_n = gain c_n and k = k_c + kappa dk,
 
     dL/dA = Re S_0,    dL/dd = A Im(k_c S_0 + dk S_1),
     dL/dQ = -A/2 Re(k_c^2 S_0 + 2 k_c dk S_1 + dk^2 S_2),    dL/dgain = conj(A c_0).
 
-z is computed again, so memory does not grow with links times tones times Gaussians.
+z is computed again, so memory does not grow with links times subcarriers times Gaussians.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ from rfgs_core.propagation.kernels_scatter import (
     Plan,
     illuminate,
     see,
-    start_tones,
+    start_subcarriers,
     turn,
 )
 from rfgs_core.propagation.lanes import LANES, scratch, six_rows, three_rows
@@ -66,7 +66,7 @@ class CloudGradient(NamedTuple):
 
 @njit(inline="always", **OPTIONS)
 def _add(x: float, y: float, g: float, h: float, at: float, sums: Any) -> Any:
-    """Adds one tone, (x + jy)(g + jh) kappa^n, to the moments n = 0, 1, 2."""
+    """Adds one subcarrier, (x + jy)(g + jh) kappa^n, to the moments n = 0, 1, 2."""
     p, q = x * g - y * h, x * h + y * g
     p1, q1 = p * at, q * at
     s, t, s1, t1, s2, t2 = sums
@@ -74,7 +74,7 @@ def _add(x: float, y: float, g: float, h: float, at: float, sums: Any) -> Any:
 
 
 @njit(**OPTIONS)
-def _moment_tones(n: int, seed: np.ndarray, centre: float, w: np.ndarray) -> None:
+def _moment_subcarriers(n: int, seed: np.ndarray, centre: float, w: np.ndarray) -> None:
     """Moments of a chunk for each Gaussian of the block, moving z and r on."""
     zr, zi, rr, ri, e = w[ZR], w[ZI], w[RR], w[RI], w[E]
     c0, d0, c1 = w[MOMENTS], w[MOMENTS + 1], w[MOMENTS + 2]
@@ -106,11 +106,11 @@ def _moment_tones(n: int, seed: np.ndarray, centre: float, w: np.ndarray) -> Non
 
 @njit(**OPTIONS)
 def _contract(
-    gain: np.ndarray, tone: np.ndarray, first: int, n: int, w: np.ndarray, by_gain: np.ndarray
+    gain: np.ndarray, subcarrier: np.ndarray, first: int, n: int, w: np.ndarray, by_gain: np.ndarray
 ) -> None:
     """Adds a chunk's moments to the gradients of gain, A, d and Q."""
     real = w.dtype.type
-    k, dk = real(WAVENUMBER * tone[2]), real(WAVENUMBER * tone[1])
+    k, dk = real(WAVENUMBER * subcarrier[2]), real(WAVENUMBER * subcarrier[1])
     k2, kdk, dk2 = real(-0.5) * k * k, -k * dk, real(-0.5) * dk * dk
     end = first + n
     gain_r, gain_i = gain[0, first:end], gain[1, first:end]
@@ -203,7 +203,7 @@ def _chain_visibility(group: int, first: int, n: int, w: np.ndarray, grad: Cloud
 
 @njit(parallel=True, **OPTIONS)
 def scatter_backward(cloud: Cloud, plan: Plan, seed: np.ndarray, grad: CloudGradient) -> None:
-    """Adds to `grad`, given seed[link, order, re/im, padded tone] = G kappa^order."""
+    """Adds to `grad`, given seed[link, order, re/im, padded subcarrier] = G kappa^order."""
     total = cloud.means.shape[1]
     for block in prange((total + LANES - 1) // LANES):
         w, distance = scratch(ROWS, cloud.shape), scratch(1, cloud.means)[0]
@@ -215,13 +215,13 @@ def scatter_backward(cloud: Cloud, plan: Plan, seed: np.ndarray, grad: CloudGrad
             w[BY_AMPLITUDE:MOMENTS, :n] = 0.0
             for c in range(plan.chunk.shape[0]):
                 column, count, piece = plan.chunk[c]
-                tone = plan.tone[c]
+                subcarrier = plan.subcarrier[c]
                 for order in range(cloud.gain.shape[1]):
-                    start_tones(tone, n, distance, w)
+                    start_subcarriers(subcarrier, n, distance, w)
                     part = seed[link, order, :, column : column + count]
-                    _moment_tones(n, part, tone[3], w)
+                    _moment_subcarriers(n, part, subcarrier[3], w)
                     _contract(
-                        *(cloud.gain[piece, order], tone, first, n, w),
+                        *(cloud.gain[piece, order], subcarrier, first, n, w),
                         grad.gain[piece, order],
                     )
             _chain_shape(cloud.shape, first, n, w, grad)

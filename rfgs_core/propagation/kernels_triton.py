@@ -2,10 +2,10 @@
 """Scattering of radio Gaussians on a GPU: forward sum and hand-derived gradients.
 
 The formulas are those of `kernels_scatter` and `kernels_scatter_gradient`. Lengths and the turns
-of a chunk's first tone are double; everything that exists per link, tone and Gaussian is single
-precision and lives in registers. Half precision has no place here: no matrix is multiplied, and a
-phase of 10 bits would be worse than the quantisation of a radio. Sums run in a fixed order, so
-the same device gives the same bytes.
+of a chunk's first subcarrier are double; everything that exists per link, subcarrier and Gaussian
+is single precision and lives in registers. Half precision has no place here: no matrix is
+multiplied, and a phase of 10 bits would be worse than the quantisation of a radio. Sums run in a
+fixed order, so the same device gives the same bytes.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from __future__ import annotations
 import triton
 import triton.language as tl
 
-#: Gaussians and tones of one tile: sixteen terms per thread of four warps.
-ROWS, TONES = 64, 32
+#: Gaussians and subcarriers of one tile: sixteen terms per thread of four warps.
+ROWS, SUBCARRIERS = 64, 32
 #: Rows of the gradient: positions, covariances, real and imaginary gain, normals; then groups.
 BY_MEANS, BY_SHAPE, BY_GAIN, BY_NORMALS, BY_GROUP = 0, 3, 9, 11, 14
 
@@ -82,13 +82,13 @@ def _sine_cosine(turns):
 
 
 @triton.jit
-def _echo(length_m, spread, tone, TONES: tl.constexpr):
-    """Re z, Im z [row, tone] and wavenumbers of a chunk, z = exp(-k^2 Q / 2 - jkd)."""
-    cycles, step = tl.load(tone), tl.load(tone + 1)
+def _echo(length_m, spread, subcarrier, SUBCARRIERS: tl.constexpr):
+    """Re z, Im z [row, subcarrier] and wavenumbers of a chunk, z = exp(-k^2 Q / 2 - jkd)."""
+    cycles, step = tl.load(subcarrier), tl.load(subcarrier + 1)
     turns, turn = length_m * cycles, length_m * step
     turns = (turns - tl.floor(turns + 0.5)).to(tl.float32)
     turn = (turn - tl.floor(turn + 0.5)).to(tl.float32)
-    offset = tl.arange(0, TONES).to(tl.float32)
+    offset = tl.arange(0, SUBCARRIERS).to(tl.float32)
     k = _TWO_PI * (cycles.to(tl.float32) + step.to(tl.float32) * offset)
     turns = turns[:, None] + turn[:, None] * offset[None, :]
     sine, cosine = _sine_cosine(turns - tl.floor(turns + 0.5))
@@ -107,7 +107,7 @@ def scatter_forward(
     ends,
     group,
     chunk,
-    tone,
+    subcarrier,
     out,
     total,
     columns,
@@ -116,12 +116,12 @@ def scatter_forward(
     FACING: tl.constexpr,
     WEIGHED: tl.constexpr,
     ROWS: tl.constexpr,
-    TONES: tl.constexpr,
+    SUBCARRIERS: tl.constexpr,
 ):
     """Writes out[split, link, re/im, column]: sums over a split of the Gaussians, one chunk."""
     link, part, split = tl.program_id(0), tl.program_id(1), tl.program_id(2)
-    offset = tl.arange(0, TONES)
-    real, imaginary = tl.zeros([TONES], tl.float32), tl.zeros([TONES], tl.float32)
+    offset = tl.arange(0, SUBCARRIERS)
+    real, imaginary = tl.zeros([SUBCARRIERS], tl.float32), tl.zeros([SUBCARRIERS], tl.float32)
     for first in range(split * per_split, tl.minimum(total, (split + 1) * per_split), ROWS):
         row = first + tl.arange(0, ROWS)
         mask = row < total
@@ -138,7 +138,7 @@ def scatter_forward(
             weight *= tl.load(visibility + tl.load(group + link) * total + row, mask, other=0.0)
         g = weight * tl.load(gain + row, mask, other=0.0)
         h = weight * tl.load(gain + total + row, mask, other=0.0)
-        zr, zi, _ = _echo(d_t + d_r, spread, tone + 2 * part, TONES)
+        zr, zi, _ = _echo(d_t + d_r, spread, subcarrier + 2 * part, SUBCARRIERS)
         real += tl.sum(g[:, None] * zr - h[:, None] * zi, axis=0)
         imaginary += tl.sum(g[:, None] * zi + h[:, None] * zr, axis=0)
     column, count = tl.load(chunk + 2 * part), tl.load(chunk + 2 * part + 1)
@@ -171,7 +171,7 @@ def scatter_backward(
     ends,
     group,
     chunk,
-    tone,
+    subcarrier,
     seed,
     out,
     total,
@@ -184,13 +184,13 @@ def scatter_backward(
     FACING: tl.constexpr,
     WEIGHED: tl.constexpr,
     ROWS: tl.constexpr,
-    TONES: tl.constexpr,
+    SUBCARRIERS: tl.constexpr,
 ):
     """Writes out[split, rows_out, gaussian], given seed[link, re/im, column] = conj(dL/dH)."""
     split = tl.program_id(1)
     row = tl.program_id(0) * ROWS + tl.arange(0, ROWS)
     mask = row < total
-    offset = tl.arange(0, TONES)
+    offset = tl.arange(0, SUBCARRIERS)
     px, py, pz = _three(means, row, mask, total, _FAR_M)
     g, h = tl.load(gain + row, mask, other=0.0), tl.load(gain + total + row, mask, other=0.0)
     none = tl.zeros([ROWS], tl.float32)
@@ -215,7 +215,7 @@ def scatter_backward(
             weight *= tl.load(visibility + tl.load(group + link) * total + row, mask, other=0.0)
         by_weight, by_length, by_spread = none, none, none
         for part in range(chunks):
-            zr, zi, k = _echo(d_t + d_r, spread, tone + 2 * part, TONES)
+            zr, zi, k = _echo(d_t + d_r, spread, subcarrier + 2 * part, SUBCARRIERS)
             source = seed + 2 * link * columns + tl.load(chunk + 2 * part)
             inside = offset < tl.load(chunk + 2 * part + 1)
             u = tl.load(source + offset, inside, other=0.0)[None, :]

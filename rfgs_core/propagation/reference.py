@@ -14,22 +14,22 @@ from torch import Tensor
 
 from rfgs_core.propagation.covariance import covariances
 from rfgs_core.propagation.fresnel import EDGE_M, leg_frames
-from rfgs_core.propagation.geometry import EnvironmentPaths, Links, Tones
+from rfgs_core.propagation.geometry import EnvironmentPaths, Links, Subcarriers
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
 #: Elements of the largest intermediate array [gaussian, link, subcarrier].
 MAX_ELEMENTS = 1 << 21
 
 
-def gamma_at_tones(
-    gamma: Complex[Tensor, "gaussian knot"], tones: Tones
+def gamma_at_subcarriers(
+    gamma: Complex[Tensor, "gaussian knot"], subcarriers: Subcarriers
 ) -> Complex[Tensor, "gaussian subcarrier"]:
     """Interpolates gamma linearly between knots spread evenly over the whole band."""
     knots = gamma.shape[1]
     if knots == 1:
-        return gamma.expand(-1, tones.num_selected)
-    position = tones.indices.to(gamma.device, gamma.real.dtype) * (
-        (knots - 1) / max(tones.count - 1, 1)
+        return gamma.expand(-1, subcarriers.num_selected)
+    position = subcarriers.indices.to(gamma.device, gamma.real.dtype) * (
+        (knots - 1) / max(subcarriers.count - 1, 1)
     )
     left = position.floor().clamp(max=knots - 2)
     share = position - left
@@ -68,19 +68,25 @@ def scatter(
     scales_rf: Float[Tensor, "gaussian 3"],
     gamma: Complex[Tensor, "gaussian knot"],
     links: Links,
-    tones: Tones,
+    subcarriers: Subcarriers,
     normals: Float[Tensor, "gaussian 3"] | None = None,
     sharpness: float = 0.0,
     visibility: Float[Tensor, "gaussian group"] | None = None,
 ) -> Complex[Tensor, "link subcarrier"]:
     """Twin of `rfgs_core.propagation.scatter`: the same sum, written out."""
-    total = gamma.new_zeros(len(links), tones.num_selected)
-    rows = max(1, MAX_ELEMENTS // max(1, len(links) * tones.num_selected))
+    total = gamma.new_zeros(len(links), subcarriers.num_selected)
+    rows = max(1, MAX_ELEMENTS // max(1, len(links) * subcarriers.num_selected))
     # At least once: without Gaussians the result still hangs on the graph.
     for first in range(0, max(means.shape[0], 1), rows):
         part = slice(first, first + rows)
         total = total + _scatter_block(
-            *(means[part], covariances(quats[part], scales_rf[part]), gamma[part], links, tones),
+            *(
+                means[part],
+                covariances(quats[part], scales_rf[part]),
+                gamma[part],
+                links,
+                subcarriers,
+            ),
             None if normals is None else normals[part],
             sharpness,
             None if visibility is None else visibility[part],
@@ -93,21 +99,21 @@ def _scatter_block(
     shape: Float[Tensor, "gaussian 3 3"],
     gamma: Complex[Tensor, "gaussian knot"],
     links: Links,
-    tones: Tones,
+    subcarriers: Subcarriers,
     normals: Float[Tensor, "gaussian 3"] | None,
     sharpness: float,
     visibility: Float[Tensor, "gaussian group"] | None,
 ) -> Complex[Tensor, "link subcarrier"]:
     """Sum over a few Gaussians, through arrays of [gaussian, link, subcarrier]."""
-    terms = echoes(means, shape, links, tones, normals, sharpness, visibility)
-    return torch.einsum("mf,mlf->lf", gamma_at_tones(gamma, tones), terms)
+    terms = echoes(means, shape, links, subcarriers, normals, sharpness, visibility)
+    return torch.einsum("mf,mlf->lf", gamma_at_subcarriers(gamma, subcarriers), terms)
 
 
 def echoes(
     means: Float[Tensor, "gaussian 3"],
     shape: Float[Tensor, "gaussian 3 3"],
     links: Links,
-    tones: Tones,
+    subcarriers: Subcarriers,
     normals: Float[Tensor, "gaussian 3"] | None = None,
     sharpness: float = 0.0,
     visibility: Float[Tensor, "gaussian group"] | None = None,
@@ -118,7 +124,7 @@ def echoes(
         means: Centres [m].
         shape: Covariances of the reflecting clouds [m^2].
         links: Pairs of antennas.
-        tones: Subcarriers.
+        subcarriers: Subcarriers.
         normals: Outward unit normals; None: every Gaussian is seen from all sides.
         sharpness: How fast a Gaussian disappears behind its tangent plane.
         visibility: Weight per Gaussian and group of links.
@@ -136,7 +142,7 @@ def echoes(
 
     q = to_tx + to_rx
     spread = torch.einsum("mla,mab,mlb->ml", q, shape, q)
-    freq_hz = tones.freq_hz.to(means.device)
+    freq_hz = subcarriers.freq_hz.to(means.device)
     wavenumber = (2 * math.pi / SPEED_OF_LIGHT * freq_hz).to(real)
     turns = (distance_tx + distance_rx)[..., None] * (freq_hz / SPEED_OF_LIGHT)
     phase = (-2 * math.pi) * (turns - turns.detach().round()).to(real)

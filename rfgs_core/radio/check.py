@@ -52,7 +52,7 @@ def material_problems(radio: Radio, materials: list[dict[str, Any]]) -> list[str
 
 
 def too_far(radio: Radio, bounds_m: Float64[np.ndarray, "2 3"]) -> list[str]:
-    """Why a scene is too large for the spacing of a radio's tones, with the remedy.
+    """Why a scene is too large for the spacing of a radio's subcarriers, with the remedy.
 
     Args:
         radio: The radio.

@@ -73,8 +73,8 @@ class PathTable:
         return PathTable(**{name: value[keep] for name, value in columns.items()}, node_hz=node_hz)
 
     def amplitude_at(
-        self, freq_hz: Float64[np.ndarray, "tone"]
-    ) -> Complex128[np.ndarray, "path port tone"]:
+        self, freq_hz: Float64[np.ndarray, "subcarrier"]
+    ) -> Complex128[np.ndarray, "path port subcarrier"]:
         """Amplitudes at frequencies within the band, without the phase of the delay."""
         if len(self.node_hz) == 1:
             return np.repeat(self.amplitude.astype(np.complex128), len(freq_hz), axis=2)
@@ -84,8 +84,8 @@ class PathTable:
         return self.amplitude[:, :, left] * (1.0 - share) + self.amplitude[:, :, left + 1] * share
 
     def channel(
-        self, layout: Layout, freq_hz: Float64[np.ndarray, "tone"]
-    ) -> Complex128[np.ndarray, "tx rx tone"]:
+        self, layout: Layout, freq_hz: Float64[np.ndarray, "subcarrier"]
+    ) -> Complex128[np.ndarray, "tx rx subcarrier"]:
         """Channel that the paths add up to, for every measured link.
 
         Elements are reached from the centre of their site: a path's own mirror images give
@@ -94,22 +94,22 @@ class PathTable:
 
         Args:
             layout: Antenna elements.
-            freq_hz: Tones within the band [Hz].
+            freq_hz: Subcarriers within the band [Hz].
         """
         return self._summed(
             layout, freq_hz, np.arange(len(layout.tx_site)), np.arange(len(layout.rx_site))
         )
 
     def link(
-        self, layout: Layout, tx: int, rx: int, freq_hz: Float64[np.ndarray, "tone"]
-    ) -> Complex128[np.ndarray, "tone"]:
+        self, layout: Layout, tx: int, rx: int, freq_hz: Float64[np.ndarray, "subcarrier"]
+    ) -> Complex128[np.ndarray, "subcarrier"]:
         """Channel between two elements, as `channel` gives it; zero if not measured."""
         return self._summed(layout, freq_hz, np.array([tx]), np.array([rx]))[0, 0]
 
     def _summed(
         self, layout: Layout, freq_hz: np.ndarray, chosen_tx: np.ndarray, chosen_rx: np.ndarray
     ) -> np.ndarray:
-        """Channel between some elements, shape (tx, rx, tone)."""
+        """Channel between some elements, shape (tx, rx, subcarrier)."""
         out = np.zeros((len(chosen_tx), len(chosen_rx), len(freq_hz)), dtype=np.complex128)
         tx_ports, rx_ports = np.unique(layout.tx_port), np.unique(layout.rx_port)
         for a, b in np.unique(np.stack([self.tx_site, self.rx_site], axis=1), axis=0):
@@ -142,7 +142,7 @@ class PathTable:
             tx_offset: Transmitting elements [m], shape (tx, 3).
             rx_offset: Receiving elements [m], shape (rx, 3).
             port: Pair of ports of each link, shape (tx, rx).
-            freq_hz: Tones [Hz].
+            freq_hz: Subcarriers [Hz].
         """
         extra_m, scale = self._elements(tx_offset, rx_offset)
         turn = -2j * np.pi * freq_hz

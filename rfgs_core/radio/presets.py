@@ -31,7 +31,7 @@ class Radio:
     freq_max_hz: float
     """Upper band edge [Hz]."""
     num_subcarriers: int
-    """Number of tones; they sit at the centres of equal slices of the band."""
+    """Number of subcarriers; they sit at the centres of equal slices of the band."""
     tx_rows: int
     """Transmitting elements of a device along its local z."""
     tx_cols: int
@@ -86,7 +86,7 @@ class Radio:
 
     @property
     def subcarrier_spacing_hz(self) -> float:
-        """Distance between neighbouring tones [Hz]."""
+        """Distance between neighbouring subcarriers [Hz]."""
         return self.bandwidth_hz / self.num_subcarriers
 
     @property
@@ -120,7 +120,7 @@ class Radio:
 
     @property
     def freq_hz(self) -> Float64[np.ndarray, "subcarrier"]:
-        """Absolute tone frequencies [Hz], ascending, shape (subcarrier,)."""
+        """Absolute subcarrier frequencies [Hz], ascending, shape (subcarrier,)."""
         return self.freq_min_hz + (np.arange(self.num_subcarriers) + 0.5) * (
             self.subcarrier_spacing_hz
         )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reports: one self-contained page that shows every number beside its controls."""
+"""Reports: one self-contained page that shows every number beside its baselines."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from rfgs_core.evaluate.scene import EvaluatedRun, Scene
 from rfgs_core.evaluate.verdicts import LOST, OPEN, WON
 from rfgs_core.files import write_text
 from rfgs_core.render.view import pictures_of
-from rfgs_core.report.charts import CONTROL, file_uri, picture_uri
+from rfgs_core.report.charts import BASELINE, file_uri, picture_uri
 from rfgs_core.report.compare import read_metrics
 from rfgs_core.report.motion_chart import write_motion_chart
 from rfgs_core.report.page import (
@@ -40,8 +40,8 @@ from rfgs_core.report.tables import metric_tables, show
 SCENE_SHOTS, VIEW_ROWS = 4, 4
 #: Pictures at least this wide are large enough to lead the page [px].
 HERO_PX = 400
-#: Controls drawn beside the method frame by frame.
-DRAWN = {"matched_filter": CONTROL, "template": "#6a994e", "oracle_init": "#b8a1d9"}
+#: Baselines drawn beside the method frame by frame.
+DRAWN = {"matched_filter": BASELINE, "template": "#6a994e", "oracle_init": "#b8a1d9"}
 #: Pictures a demo may leave beside its report, with their captions.
 BLENDER_PICTURES = {
     "inspect.png": "The fitted Gaussians imported into Blender, beside the scene they came from.",
@@ -166,7 +166,7 @@ def _section(run: EvaluatedRun, metrics: dict[str, Any]) -> RunSection:
             f"Frame {frame}: true mesh (grey), Gaussians coloured by reflected power, and what "
             "the matched filter alone would say.",
         ),
-        f10=Shot(f10_chart(metrics["frames"], DRAWN), "F10 of every frame beside its controls."),
+        f10=Shot(f10_chart(metrics["frames"], DRAWN), "F10 of every frame beside its baselines."),
         motion=_motion(run),
         views=_views(run),
         tables=metric_tables(metrics),
@@ -189,18 +189,18 @@ def _motion(run: EvaluatedRun) -> Shot | None:
 
 
 def _cards(metrics: dict[str, Any]) -> list[Card]:
-    """Headline numbers: F10 with its most important controls, position, pictures."""
+    """Headline numbers: F10 with its most important baselines, position, pictures."""
     own = metrics["geometry"]
     cards = []
     for key, label in (("f05", "F5"), ("f10", "F10")):
-        beside, tones = [], []
+        beside, subcarriers = [], []
         for name in ("matched_filter", "template", "oracle_init"):
-            value = metrics["controls"][name]["geometry"].get(key)
+            value = metrics["baselines"][name]["geometry"].get(key)
             if value is not None:
                 beside.append(f"{name} {show(value, 3)}")
-                tones.append(name == "oracle_init" or own[key] > value)
-        tone = "" if not tones else "won" if all(tones) else "lost"
-        cards.append(Card(show(own[key], 3), label, ", ".join(beside), tone))
+                subcarriers.append(name == "oracle_init" or own[key] > value)
+        subcarrier = "" if not subcarriers else "won" if all(subcarriers) else "lost"
+        cards.append(Card(show(own[key], 3), label, ", ".join(beside), subcarrier))
     people = metrics.get("people")
     if people is None:
         note = f"tracked in {show(100 * own['tracked'], 0)} % of the frames"
@@ -211,16 +211,16 @@ def _cards(metrics: dict[str, Any]) -> list[Card]:
     rf = metrics["rf"]
     known = {
         name: part["rf"]["element_snr_db"]
-        for name, part in metrics["controls"].items()
+        for name, part in metrics["baselines"].items()
         if part["rf"]["element_snr_db"] is not None
     }
     mine = rf["element_snr_db"]
     # Arrays of two columns have none to hold out.
     if known and mine is not None:
         best = max(known, key=lambda name: known[name])
-        tone = "won" if mine > known[best] else "lost"
-        note = f"best control: {best} {show(known[best], 1)} dB"
-        cards.append(Card(f"{show(mine, 1)} dB", "SNR, unseen elements", note, tone))
+        subcarrier = "won" if mine > known[best] else "lost"
+        note = f"best baseline: {best} {show(known[best], 1)} dB"
+        cards.append(Card(f"{show(mine, 1)} dB", "SNR, unseen elements", note, subcarrier))
     train_s = metrics["train_s"]
     time = f"trained in {train_s:.0f} s" if train_s is not None else "training time not recorded"
     cards.append(Card(f"{metrics['n_gaussians']:,}".replace(",", " "), "Gaussians", time))
@@ -228,9 +228,9 @@ def _cards(metrics: dict[str, Any]) -> list[Card]:
 
 
 def _verdict(sentence: str) -> Verdict:
-    for prefix, tone in ((WON, "won"), (LOST, "lost"), (OPEN, "open")):
+    for prefix, subcarrier in ((WON, "won"), (LOST, "lost"), (OPEN, "open")):
         if sentence.startswith(prefix):
-            return Verdict(tone, prefix.rstrip(": "), sentence[len(prefix) :])
+            return Verdict(subcarrier, prefix.rstrip(": "), sentence[len(prefix) :])
     return Verdict("open", "Note", sentence)
 
 

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 #: Text and frame of figures: readable on white and on near-black.
 INK = "#848b95"
-#: Colours of the method, of the truth and of controls.
-METHOD, TRUTH, CONTROL = "#e4572e", "#8d99a6", "#3f88c5"
+#: Colours of the method, of the truth and of baselines.
+METHOD, TRUTH, BASELINE = "#e4572e", "#8d99a6", "#3f88c5"
 
 _STYLE: dict[Any, Any] = {
     "font.size": 9.0,

@@ -20,7 +20,7 @@ from rfgs_core.run import Run
 
 @dataclass(frozen=True)
 class LinkChannels:
-    """csi − csi_static between two devices, all antenna pairs and tones, held-out ones too."""
+    """csi − csi_static between two devices: all antenna pairs, subcarriers, held out or not."""
 
     radio: Radio
     """The radio."""
@@ -78,7 +78,7 @@ def link_channels(run: Run, tx_device: int, rx_device: int) -> LinkChannels:
 
 
 def write_link_chart(path: Path, link: LinkChannels) -> None:
-    """Draws |ΔH| over tones and delay profiles over frames, measured above predicted, as a PNG.
+    """Draws a PNG: |ΔH| over subcarriers, delay profiles over frames; measured above predicted.
 
     Powers are means over the antenna pairs; each column shares one scale.
     """

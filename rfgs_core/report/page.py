@@ -32,7 +32,7 @@ class Card:
     """What it is."""
     note: str
     """What stands beside it."""
-    tone: str = ""
+    subcarrier: str = ""
     """`won`, `lost` or nothing."""
 
 
@@ -40,7 +40,7 @@ class Card:
 class Verdict:
     """One sentence of judgement."""
 
-    tone: str
+    subcarrier: str
     """`won`, `lost` or `open`."""
     word: str
     """Won, Lost or Not decided."""
@@ -73,7 +73,7 @@ class RunSection:
     views: list[list[Shot]]
     """Rows of true, rendered and person-only pictures."""
     tables: list[Table]
-    """Metrics beside controls."""
+    """Metrics beside baselines."""
     limits: list[tuple[str, str]]
     """Names and values."""
     conditions: list[tuple[str, str]]

@@ -166,11 +166,11 @@ def _longest_m(scene: Scene) -> float:
 
 
 def f10_chart(frames: list[dict], shown: dict[str, str]) -> str:
-    """F10 of every frame, the method beside chosen controls.
+    """F10 of every frame, the method beside chosen baselines.
 
     Args:
         frames: `frames` of `metrics.json`.
-        shown: Control name → colour.
+        shown: Baseline name → colour.
     """
     with new_figure(10.5, 2.4) as figure:
         axis = figure.subplots()
@@ -178,7 +178,7 @@ def f10_chart(frames: list[dict], shown: dict[str, str]) -> str:
         own = [row["geometry"]["f10"] for row in frames]
         for name, colour in shown.items():
             values = [
-                row["controls"].get(name, {}).get("geometry", {}).get("f10", np.nan)
+                row["baselines"].get(name, {}).get("geometry", {}).get("f10", np.nan)
                 for row in frames
             ]
             if not np.isnan(values).all():

@@ -10,7 +10,7 @@ from rfgs_core.evaluate.baselines.matched_filter import default_score
 from rfgs_core.evaluate.geometry import best_voxels
 from rfgs_core.evaluate.scene import Scene
 from rfgs_core.render.view import moving_gaussians
-from rfgs_core.report.charts import CONTROL, TRUTH, figure_uri, new_figure, power_colours
+from rfgs_core.report.charts import BASELINE, TRUTH, figure_uri, new_figure, power_colours
 
 #: Title, horizontal and vertical axis of each side.
 SIDES = (("front", 0, 2), ("side", 1, 2), ("top", 0, 1))
@@ -50,7 +50,7 @@ def shape_chart(scene: Scene, frame: int) -> str:
             shown = means[:, [across, up]].T
             points = axes[1, column].scatter(*shown, s=5, c=power_db, lw=0, **style)
             shown = filtered[:, [across, up]].T
-            axes[2, column].scatter(*shown, s=5, c=CONTROL, alpha=0.35, lw=0)
+            axes[2, column].scatter(*shown, s=5, c=BASELINE, alpha=0.35, lw=0)
         bar = figure.colorbar(points, ax=axes, shrink=0.3, pad=0.01)
         bar.set_label("reflected power [dB]")
         bar.outline.set_visible(False)  # type: ignore[operator]

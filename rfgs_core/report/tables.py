@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tables of metrics: the method beside its controls, and two runs beside each other."""
+"""Tables of metrics: the method beside its baselines, and two runs beside each other."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from rfgs_core.evaluate.baselines import CONTROLS
+from rfgs_core.evaluate.baselines import BASELINES
 from rfgs_core.evaluate.residual import GAUSSIANS_ALONE
 
 METHOD_LABEL = "RF-GS"
@@ -33,7 +33,7 @@ class Column:
 
 _CHANNEL_COLUMNS = (
     Column("element_snr_db", "elements", "dB", True, 1, "SNR on unseen array columns"),
-    Column("subcarrier_snr_db", "subcarriers", "dB", True, 1, "SNR on unseen tones"),
+    Column("subcarrier_snr_db", "subcarriers", "dB", True, 1, "SNR on unseen subcarriers"),
     Column("device_gain_mae_db", "pair gain", "dB", False, 1, "error on unseen pairs"),
     Column("delay_profile_corr", "delay profile", "", True, 2, "correlation, unseen links"),
 )
@@ -93,12 +93,12 @@ class Cell:
 
 @dataclass(frozen=True)
 class Row:
-    """One method or control."""
+    """One method or baseline."""
 
     label: str
     """Name."""
     kind: str
-    """`method`, `control` or `ceiling`."""
+    """`method`, `baseline` or `ceiling`."""
     cells: list[Cell]
     """One per column."""
 
@@ -112,13 +112,13 @@ class Table:
     columns: tuple[Column, ...]
     """Metrics."""
     rows: list[Row]
-    """Method, controls, ceiling."""
+    """Method, baselines, ceiling."""
     losses: list[str]
-    """In words: where a control does at least as well as the method."""
+    """In words: where a baseline does at least as well as the method."""
 
 
 def metric_tables(metrics: Mapping[str, Any]) -> list[Table]:
-    """All tables of a run; controls without any value of a group are left out of it."""
+    """All tables of a run; baselines without any value of a group are left out of it."""
     tables = [_table(metrics, group) for group in GROUPS if metrics.get(group)]
     return [*tables, *([_background_table(metrics)] if metrics.get("background") else [])]
 
@@ -134,7 +134,7 @@ def _background_table(metrics: Mapping[str, Any]) -> Table:
             value = _rounded(values, column)
             wins = value is not None and value == best[column.key]
             cells.append(Cell(show(values[column.key], column.digits), wins, "not computed"))
-        rows.append(Row(name, "method" if name.startswith("static") else "control", cells))
+        rows.append(Row(name, "method" if name.startswith("static") else "baseline", cells))
     title = f"The empty room, csi_static, from {part['n_gaussians']} static Gaussians"
     if part["surface_m"]:
         near = {name: f"{100 * value:.0f} cm" for name, value in part["surface_m"].items()}
@@ -148,8 +148,8 @@ def _background_table(metrics: Mapping[str, Any]) -> Table:
 def _table(metrics: Mapping[str, Any], group: str) -> Table:
     title, columns = GROUPS[group]
     values = {METHOD_LABEL: metrics[group]}
-    for name in sorted(metrics["controls"], key=_place):
-        part = metrics["controls"][name].get(group) or {}
+    for name in sorted(metrics["baselines"], key=_place):
+        part = metrics["baselines"][name].get(group) or {}
         # The ceiling stays visible, with the reason, even if it has no value.
         if any(part.get(column.key) is not None for column in columns) or _is_wanted(name, group):
             values[name] = part
@@ -167,8 +167,8 @@ def _table(metrics: Mapping[str, Any], group: str) -> Table:
 
 
 def _place(name: str) -> tuple[int, str]:
-    """Order of controls: as they are listed in the code, the ceiling last."""
-    order = [GAUSSIANS_ALONE, *CONTROLS, "silhouette", "oracle_init"]
+    """Order of baselines: as they are listed in the code, the ceiling last."""
+    order = [GAUSSIANS_ALONE, *BASELINES, "silhouette", "oracle_init"]
     return (order.index(name) if name in order else len(order), name)
 
 
@@ -183,7 +183,7 @@ def _is_wanted(name: str, group: str) -> bool:
 
 
 def _kind(name: str) -> str:
-    return {METHOD_LABEL: "method", "oracle_init": "ceiling"}.get(name, "control")
+    return {METHOD_LABEL: "method", "oracle_init": "ceiling"}.get(name, "baseline")
 
 
 def _best(values: Mapping[str, Mapping[str, Any]], column: Column) -> float | None:
@@ -195,7 +195,7 @@ def _best(values: Mapping[str, Mapping[str, Any]], column: Column) -> float | No
 
 
 def _losses(values: Mapping[str, Mapping[str, Any]], columns: tuple[Column, ...]) -> list[str]:
-    """Sentences on every metric in which a control does better."""
+    """Sentences on every metric in which a baseline does better."""
     sentences = []
     for column in columns:
         mine = _rounded(values[METHOD_LABEL], column)
@@ -204,7 +204,7 @@ def _losses(values: Mapping[str, Mapping[str, Any]], columns: tuple[Column, ...]
         better = []
         for name, part in values.items():
             value = _rounded(part, column)
-            if _kind(name) == "control" and value is not None and value != mine:
+            if _kind(name) == "baseline" and value is not None and value != mine:
                 if (value > mine) == column.higher_is_better:
                     better.append(f"{name} ({show(value, column.digits)})")
         if better:
@@ -219,10 +219,10 @@ def _losses(values: Mapping[str, Mapping[str, Any]], columns: tuple[Column, ...]
 def _reason(metrics: Mapping[str, Any], name: str, group: str, key: str) -> str:
     """The stored reason nearest to a missing value."""
     reasons = metrics.get("reasons", {})
-    start = "" if name == METHOD_LABEL else f"controls.{name}."
+    start = "" if name == METHOD_LABEL else f"baselines.{name}."
     paths = [f"{start}{group}.{key}", f"{start}{group}", start.rstrip("."), f"{group}.{key}", group]
     if group == "image":
-        paths.append("controls.*.image")
+        paths.append("baselines.*.image")
     return next((reasons[path] for path in paths if path in reasons), "not computed")
 
 

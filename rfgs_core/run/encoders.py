@@ -52,7 +52,7 @@ def refuse_other_radios(file: Path, sequence: Sequence, radio: str, packets: Pac
     """Refuses an encoder that was made for another radio, or for other packets of it.
 
     Raises:
-        RfgsError: Tones, antennas or, if its network looks at them, packets differ.
+        RfgsError: Subcarriers, antennas or, if its network looks at them, packets differ.
     """
     encoder = load_encoder(file)
     freq_hz = np.array(sequence.coordinates(radio)["freq_hz"].values, dtype=np.float64)

@@ -213,7 +213,7 @@ class Run:
 
         Of a calibrated run with the offsets of the empty room's capture, as `predict` says it.
         """
-        visible = observations.links[..., None] & observations.tones
+        visible = observations.links[..., None] & observations.subcarriers
         unknown = np.complex64(complex(np.nan, np.nan))
         return self._as_captured(
             frame, observations, np.where(visible, observations.delta, unknown)

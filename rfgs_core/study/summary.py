@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the metrics of a study's cases say together: means over seeds, and marks set before."""
+"""What the metrics of a study's cases say together: means over seeds, and targets set before."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from rfgs_core.evaluate.residual import GAUSSIANS_ALONE
 from rfgs_core.study.cases import Case
 
-#: Controls whose best F10 the method's is held against.
+#: Baselines whose best F10 the method's is held against.
 RIVALS = ("matched_filter", "clean", "omp")
 #: Share of the best rival's error 1 − F10 that is to be cut, or of its gap to the ceiling closed.
 CUT_MARK = {"wifi": 0.5, "mmwave": 0.4, "uwb": 0.4}
@@ -24,7 +24,7 @@ TEMPLATE_MARKS = {"wifi": ("f10",), "mmwave": ("f05", "f10"), "uwb": ("f05", "f1
 FOUND_MARK = 0.95
 #: Decibels above linear interpolation that held-out elements are to reach.
 ELEMENT_MARK_DB = 6.0
-#: Controls that only interpolate the channel.
+#: Baselines that only interpolate the channel.
 INTERPOLATORS = ("linear", "gaussian_process", "spectrum")
 
 _OWN = ("f05", "f10")
@@ -47,11 +47,11 @@ class Row:
     best_rival: str
     """Which of `RIVALS` has the best F10."""
     best_gain: str
-    """Which control has the least error of an unseen device pair's level; empty for none."""
+    """Which baseline has the least error of an unseen device pair's level; empty for none."""
     best_profile: str
-    """Which control has the best delay profiles of unseen links; empty for none."""
-    marks: dict[str, bool | None]
-    """Whether each mark is reached; None where it cannot be told."""
+    """Which baseline has the best delay profiles of unseen links; empty for none."""
+    targets: dict[str, bool | None]
+    """Whether each target is reached; None where it cannot be told."""
 
 
 def summarise(results: Iterable[tuple[Case, Mapping[str, Any]]]) -> list[Row]:
@@ -71,44 +71,48 @@ def _mean(values: Iterable[float | None]) -> float | None:
     return float(np.mean(known)) if known else None
 
 
-def _control(rows: list[Mapping[str, Any]], name: str, group: str, key: str) -> float | None:
-    return _mean(((row["controls"].get(name) or {}).get(group) or {}).get(key) for row in rows)
+def _baseline(rows: list[Mapping[str, Any]], name: str, group: str, key: str) -> float | None:
+    return _mean(((row["baselines"].get(name) or {}).get(group) or {}).get(key) for row in rows)
 
 
 def _row(scene: str, condition: str, radio: str, rows: list[Mapping[str, Any]]) -> Row:
     values = {key: _mean(row["geometry"].get(key) for row in rows) for key in _OWN}
     for key in _PEOPLE:
         values[key] = _mean((row.get("people") or {}).get(key) for row in rows)
-    rivals = {name: _control(rows, name, "geometry", "f10") for name in RIVALS}
+    rivals = {name: _baseline(rows, name, "geometry", "f10") for name in RIVALS}
     best_rival = max(RIVALS, key=lambda name: rivals[name] or 0.0)
     values["rival_f10"] = rivals[best_rival]
-    values["oracle_f10"] = _control(rows, "oracle_init", "geometry", "f10")
+    values["oracle_f10"] = _baseline(rows, "oracle_init", "geometry", "f10")
     for key in ("f05", "f10"):
-        values[f"template_{key}"] = _control(rows, "template", "geometry", key)
-    values["prior_f10"] = _control(rows, "body_prior", "geometry", "f10")
+        values[f"template_{key}"] = _baseline(rows, "template", "geometry", key)
+    values["prior_f10"] = _baseline(rows, "body_prior", "geometry", "f10")
     values["cut"] = _share(values["f10"], values["rival_f10"], 1.0)
     values["gap"] = _share(values["f10"], values["rival_f10"], values["oracle_f10"])
     values["element_snr_db"] = _mean(row["rf"].get("element_snr_db") for row in rows)
     for name in INTERPOLATORS:
-        values[f"{name}_snr_db"] = _control(rows, name, "rf", "element_snr_db")
+        values[f"{name}_snr_db"] = _baseline(rows, name, "rf", "element_snr_db")
     for key in ("device_gain_mae_db", "delay_profile_corr"):
         values[key] = _mean(row["rf"].get(key) for row in rows)
-    best_gain, values["control_device_gain_mae_db"] = _best_channel(rows, "device_gain_mae_db", min)
-    best_corr, values["control_delay_profile_corr"] = _best_channel(rows, "delay_profile_corr", max)
+    best_gain, values["baseline_device_gain_mae_db"] = _best_channel(
+        rows, "device_gain_mae_db", min
+    )
+    best_corr, values["baseline_delay_profile_corr"] = _best_channel(
+        rows, "delay_profile_corr", max
+    )
     f10 = [row["geometry"]["f10"] for row in rows if row["geometry"].get("f10") is not None]
     spread = max(f10) - min(f10) if f10 else 0.0
     return Row(
         *(scene, condition, radio, len(rows), values, spread),
-        *(best_rival, best_gain, best_corr, _marks(radio, values)),
+        *(best_rival, best_gain, best_corr, _targets(radio, values)),
     )
 
 
 def _best_channel(
     rows: list[Mapping[str, Any]], key: str, best: Callable[..., str]
 ) -> tuple[str, float | None]:
-    """Which control is best in a metric of unseen links, and its mean."""
-    names = [name for name in rows[0]["controls"] if name not in (GAUSSIANS_ALONE, "oracle_init")]
-    found = {name: _control(rows, name, "rf", key) for name in names}
+    """Which baseline is best in a metric of unseen links, and its mean."""
+    names = [name for name in rows[0]["baselines"] if name not in (GAUSSIANS_ALONE, "oracle_init")]
+    found = {name: _baseline(rows, name, "rf", key) for name in names}
     known = {name: value for name, value in found.items() if value is not None}
     name = best(known, key=lambda name: known[name], default="")
     return name, known.get(name)
@@ -121,15 +125,15 @@ def _share(own: float | None, rival: float | None, ceiling: float | None) -> flo
     return (own - rival) / (ceiling - rival)
 
 
-def _marks(radio: str, values: Mapping[str, float | None]) -> dict[str, bool | None]:
-    """The marks, each reached or not."""
+def _targets(radio: str, values: Mapping[str, float | None]) -> dict[str, bool | None]:
+    """The targets, each reached or not."""
 
-    def above(name: str, mark: float | None) -> bool | None:
+    def above(name: str, target: float | None) -> bool | None:
         value = values[name]
-        return None if value is None or mark is None else value > mark
+        return None if value is None or target is None else value > target
 
-    def better(name: str, control: str, lead: float) -> bool | None:
-        other = values[control]
+    def better(name: str, baseline: str, lead: float) -> bool | None:
+        other = values[baseline]
         return above(name, None if other is None else other + lead)
 
     kept = values["identity_kept"]
@@ -142,10 +146,10 @@ def _marks(radio: str, values: Mapping[str, float | None]) -> dict[str, bool | N
         "identity": None if kept is None else kept == 1.0,
         "linear": better("element_snr_db", "linear_snr_db", ELEMENT_MARK_DB),
         "gaussian_process": better("element_snr_db", "gaussian_process_snr_db", 0.0),
-        "pair_gain": _less(values["device_gain_mae_db"], values["control_device_gain_mae_db"]),
-        "profiles": better("delay_profile_corr", "control_delay_profile_corr", 0.0),
+        "pair_gain": _less(values["device_gain_mae_db"], values["baseline_device_gain_mae_db"]),
+        "profiles": better("delay_profile_corr", "baseline_delay_profile_corr", 0.0),
     }
 
 
-def _less(value: float | None, mark: float | None) -> bool | None:
-    return None if value is None or mark is None else value < mark
+def _less(value: float | None, target: float | None) -> bool | None:
+    return None if value is None or target is None else value < target

@@ -42,7 +42,7 @@ the body found; found: share of people with it within half a metre; identity: sh
 stay with the person they were with at first. Elements: complex SNR on
 unseen array columns of csi − csi_static, beside three ways to interpolate. Pair level: error of an
 unseen device pair's mean power; profiles: correlation of the delay profiles of unseen links; both
-beside the best control. Missed: marks that were set before and are not reached."""
+beside the best baseline. Missed: targets that were set before and are not reached."""
 
 
 def study_table(rows: Sequence[Row], failed: Mapping[str, str] | None = None) -> str:
@@ -61,7 +61,7 @@ def study_table(rows: Sequence[Row], failed: Mapping[str, str] | None = None) ->
 
 def _cells(row: Row) -> list[str]:
     v = row.values
-    missed = [name.replace("_", " ") for name, reached in row.marks.items() if reached is False]
+    missed = [name.replace("_", " ") for name, reached in row.targets.items() if reached is False]
     return [
         *(row.scene, row.radio, row.condition, str(row.seeds)),
         *(number(v["f05"]), number(v["f10"]), f"{row.spread_f10:.3f}"),
@@ -78,10 +78,10 @@ def _cells(row: Row) -> list[str]:
     ]
 
 
-def _beside(values: Mapping[str, float | None], key: str, control: str, form: str) -> str:
-    """The method's value, and the best control's in brackets."""
+def _beside(values: Mapping[str, float | None], key: str, baseline: str, form: str) -> str:
+    """The method's value, and the best baseline's in brackets."""
     own = number(values[key], form)
-    return f"{own} ({number(values[f'control_{key}'], form)} {control})" if control else own
+    return f"{own} ({number(values[f'baseline_{key}'], form)} {baseline})" if baseline else own
 
 
 def number(value: float | None, form: str = ".3f") -> str:

@@ -10,8 +10,8 @@ from typing import get_args
 import numpy as np
 from jaxtyping import Float, Float32
 
-from rfgs_core.view.choice import ColorMode
 from rfgs_core.view.frame import ShownFrame
+from rfgs_core.view.selection import ColorMode
 
 #: What each mode shows, as the panel says it.
 TITLES: dict[ColorMode, str] = {

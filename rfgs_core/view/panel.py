@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rfgs_core.view.choice import Choice, ColorMode
 from rfgs_core.view.colors import TITLES
 from rfgs_core.view.pictures import Beside
+from rfgs_core.view.selection import ColorMode, Selection
 
 if TYPE_CHECKING:
     from viser import ViserServer
@@ -49,7 +49,7 @@ class Offer:
 class Panel:
     """Controls on a page; `choice` reads them all at once."""
 
-    def __init__(self, server: ViserServer, offer: Offer, start: Choice) -> None:
+    def __init__(self, server: ViserServer, offer: Offer, start: Selection) -> None:
         self._frames = np.asarray(offer.frames)
         gui = server.gui
         gui.set_panel_label("RF-GS")
@@ -69,12 +69,12 @@ class Panel:
             with gui.add_folder("Rendered beside true"):
                 self._add_pictures(gui, offer, start)
 
-    def choice(self) -> Choice:
+    def choice(self) -> Selection:
         """What is chosen now."""
         value = {name: handle.value for name, handle in self._inputs.items()}
         nearest = int(self._frames[np.abs(self._frames - value["frame"]).argmin()])
         floor_db = value["below_peak_db"]
-        return Choice(
+        return Selection(
             **{
                 **value,
                 "frame": nearest,
@@ -105,7 +105,7 @@ class Panel:
         return frame, int(self._frames[(index + 1) % len(self._frames)])
 
     def set(self, field: str, value: Any) -> None:
-        """Moves the control of a number or a tick of `Choice`."""
+        """Moves the control of a number or a tick of `Selection`."""
         self._inputs[field].value = value
 
     def tell(self, shown: str, legend: str) -> None:
@@ -118,14 +118,14 @@ class Panel:
         self._picture.image = beside.picture
         self._caption.content = beside.caption
 
-    def _add_time(self, gui: Any, start: Choice) -> None:
+    def _add_time(self, gui: Any, start: Selection) -> None:
         first, last = int(self._frames[0]), int(self._frames[-1])
         step = int(np.gcd.reduce(np.diff(self._frames))) if len(self._frames) > 1 else 1
         self._inputs["frame"] = gui.add_slider("Frame", first, last, step, start.frame)
         self._play = gui.add_checkbox("Play", False, disabled=first == last)
         self._shown = gui.add_markdown("")
 
-    def _add_gaussians(self, gui: Any, offer: Offer, start: Choice) -> None:
+    def _add_gaussians(self, gui: Any, offer: Offer, start: Selection) -> None:
         names = [TITLES[mode] for mode in offer.modes]
         top = math.ceil(100.0 * offer.max_opacity) / 100.0
         self._inputs |= {
@@ -150,7 +150,7 @@ class Panel:
             ),
         }  # fmt: skip
 
-    def _add_scene(self, gui: Any, offer: Offer, start: Choice) -> None:
+    def _add_scene(self, gui: Any, offer: Offer, start: Selection) -> None:
         for name, label, there in (
             ("truth", "True surface", offer.has_truth),
             ("room", "Room", offer.has_room),
@@ -161,7 +161,7 @@ class Panel:
             ticked = getattr(start, name) and there
             self._inputs[name] = gui.add_checkbox(label, ticked, disabled=not there)
 
-    def _add_pictures(self, gui: Any, offer: Offer, start: Choice) -> None:
+    def _add_pictures(self, gui: Any, offer: Offer, start: Selection) -> None:
         self._inputs["camera"] = gui.add_dropdown(
             "Camera", tuple(offer.cameras), initial_value=start.camera
         )

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import UInt8
 from PIL import Image
 
-from rfgs_core.render.beside import side_by_side, to_bytes
+from rfgs_core.render.side_by_side import side_by_side, to_bytes
 from rfgs_core.render.view import camera_of, pictures_of, render_view
 from rfgs_core.run import Run
 

@@ -9,10 +9,10 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from rfgs_core.render.cameras import Camera
-from rfgs_core.view.choice import Choice
 from rfgs_core.view.frame import Mesh, ShownFrame
 from rfgs_core.view.radios import RadioShapes
 from rfgs_core.view.room import Room
+from rfgs_core.view.selection import Selection
 
 if TYPE_CHECKING:
     from viser import ClientHandle, ViserServer
@@ -45,7 +45,7 @@ class Stage:
         frame: ShownFrame,
         rows: Bool[np.ndarray, "M"],
         rgb: Float[np.ndarray, "M 3"],
-        choice: Choice,
+        choice: Selection,
     ) -> None:
         """Replaces the Gaussians by those of the marked rows."""
         if choice.drawn_as == "points" or not rows.any():
@@ -130,7 +130,7 @@ class Stage:
             client.camera.position = camera.position_m
             client.camera.fov = _fov_rad(camera)
 
-    def set_visible(self, choice: Choice) -> None:
+    def set_visible(self, choice: Selection) -> None:
         """Shows and hides groups as chosen."""
         for name in ("truth", "room", "radios", "links", "cameras"):
             for handle in self._groups.get(name, []):

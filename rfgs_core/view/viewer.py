@@ -15,13 +15,13 @@ from rfgs_core.errors import RfgsError
 from rfgs_core.render.cameras import Camera
 from rfgs_core.render.view import fitted_shader
 from rfgs_core.run import Run
-from rfgs_core.view.choice import GAUSSIAN_FIELDS, Choice, ColorMode
 from rfgs_core.view.colors import colors_of, legend_html, scales_of
 from rfgs_core.view.frame import ShownFrame, load_frame
 from rfgs_core.view.panel import Offer, Panel
 from rfgs_core.view.pictures import beside_true
 from rfgs_core.view.radios import RadioShapes, radio_shapes
 from rfgs_core.view.room import Room, room_of
+from rfgs_core.view.selection import GAUSSIAN_FIELDS, ColorMode, Selection
 from rfgs_core.view.stage import Stage
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ class Viewer:
             has_room=room is not None,
             has_links=len(radio.links) > 0,
         )
-        start = Choice(
+        start = Selection(
             frame=begin,
             mode=mode,
             drawn_as="splats" if mode == "display" else "points",
@@ -101,7 +101,7 @@ class Viewer:
         )
         self.stage = Stage(server, run.sequence.bounds_m)
         self.panel = Panel(server, offer, start)
-        self._drawn: Choice | None = None
+        self._drawn: Selection | None = None
         self._changed = threading.Event()
         self._due_s = 0.0
         self._draw_fixed(room, radio)
@@ -148,7 +148,7 @@ class Viewer:
         if choice.camera is not None and choice.differs(before, "frame", "camera"):
             self.panel.show_picture(beside_true(self._run, choice.camera, choice.frame))
 
-    def _show_gaussians(self, frame: ShownFrame, choice: Choice) -> None:
+    def _show_gaussians(self, frame: ShownFrame, choice: Selection) -> None:
         scale = self.scales[choice.mode]
         strongest_db = float(np.nanmax(frame.power_db, initial=-np.inf))
         rows = frame.rows(choice.min_opacity, strongest_db - choice.below_peak_db)

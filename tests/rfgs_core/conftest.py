@@ -51,14 +51,14 @@ def small_radio(**changes: Any) -> Radio:
 def make_observations() -> MakeObservations:
     """Observations of a room without a body; nothing is held out unless masks say so.
 
-    Arguments are a radio (or changes to the small one) and masks of links and tones. The empty
-    room holds Friis' direct path times `gain[transmitting device, receiving device]`.
+    Arguments are a radio (or changes to the small one) and masks of links and subcarriers. The
+    empty room holds Friis' direct path times `gain[transmitting device, receiving device]`.
     """
 
     def make(
         radio: Radio | None = None,
         links: np.ndarray | None = None,
-        tones: np.ndarray | None = None,
+        subcarriers: np.ndarray | None = None,
         gain: np.ndarray | None = None,
         bounds_m: np.ndarray = BOUNDS_M,
         **changes: Any,
@@ -66,18 +66,18 @@ def make_observations() -> MakeObservations:
         radio = radio or small_radio(**changes)
         elements = layout(radio, place_devices(radio, bounds_m))
         links = elements.measured if links is None else links & elements.measured
-        tones = np.ones(radio.num_subcarriers, bool) if tones is None else tones
+        subcarriers = np.ones(radio.num_subcarriers, bool) if subcarriers is None else subcarriers
         length = np.linalg.norm(elements.tx_xyz[:, None] - elements.rx_xyz, axis=-1)[..., None]
         wavelength = SPEED_OF_LIGHT / radio.freq_hz
         static = wavelength / (4 * np.pi * length) * np.exp(-2j * np.pi * length / wavelength)
         if gain is not None:
             static = static * gain[elements.tx_device][:, elements.rx_device, None]
-        seen = links[..., None] & tones
+        seen = links[..., None] & subcarriers
         return Observations(
             delta=np.zeros(static.shape, np.complex64),
             static=np.where(seen, static, 0).astype(np.complex64),
             links=links,
-            tones=tones,
+            subcarriers=subcarriers,
             layout=elements,
             freq_hz=radio.freq_hz,
             bounds_m=bounds_m,
@@ -117,7 +117,7 @@ def head() -> RadioHead:
 def observations(make_observations, make_gaussians, head) -> Observations:
     """What a dozen Gaussians do to the channel."""
     empty = make_observations()
-    channel = Channel.of(empty, empty.links, empty.tones)
+    channel = Channel.of(empty, empty.links, empty.subcarriers)
     delta = np.zeros_like(empty.delta)
     delta[channel.tx, channel.rx] = channel.change(head, make_gaussians(12)).numpy()
     return empty.with_delta(delta)

@@ -95,10 +95,10 @@ def test_a_stride_is_found_in_its_own_cloud() -> None:
     cloud = Cloud(around(joints, 1500), np.ones(1500), floor_m=0.0)
     found = fit_body(cloud, [0.0, np.pi / 2, np.pi, -np.pi / 2])
     error = np.linalg.norm(joints_of(found.parameters, 0.0) - joints, axis=1)
-    control = np.linalg.norm(joints_of(standing(cloud, 0.7), 0.0) - joints, axis=1)
+    baseline = np.linalg.norm(joints_of(standing(cloud, 0.7), 0.0) - joints, axis=1)
     # The prior of the height costs some 4 cm.
     assert error.mean() < 0.065
-    assert error.mean() < 0.4 * control.mean()
+    assert error.mean() < 0.4 * baseline.mean()
     turned = found.parameters[index_of("heading")] - 0.7
     assert abs(np.angle(np.exp(1j * turned))) < 0.25
 

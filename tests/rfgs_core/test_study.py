@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The study asks for every case once, and its marks say what the metrics say."""
+"""The study asks for every case once, and its targets say what the metrics say."""
 
 from __future__ import annotations
 
@@ -23,24 +23,24 @@ def metrics(f10: float, **changes: float) -> dict[str, Any]:
     for name, value in changes.items():
         next(group for group in (rf, people, geometry) if name in group)[name] = value
 
-    def control(f10: float | None, snr_db: float | None = None, **rf: float) -> dict[str, Any]:
+    def baseline(f10: float | None, snr_db: float | None = None, **rf: float) -> dict[str, Any]:
         own = {"f05": 0.5, "f10": f10} if f10 is not None else {"f05": None, "f10": None}
         return {"geometry": own, "rf": {"element_snr_db": snr_db, **rf}}
 
-    controls = {
-        "matched_filter": control(0.5),
-        "clean": control(0.6),
-        "omp": control(None),
-        "template": control(0.7),
-        "body_prior": control(0.75),
-        "oracle_init": control(0.9),
-        "linear": control(None, 2.0, device_gain_mae_db=5.0, delay_profile_corr=0.6),
-        "gaussian_process": control(None, 9.5, device_gain_mae_db=4.0, delay_profile_corr=0.8),
-        "spectrum": control(None, 9.7),
+    baselines = {
+        "matched_filter": baseline(0.5),
+        "clean": baseline(0.6),
+        "omp": baseline(None),
+        "template": baseline(0.7),
+        "body_prior": baseline(0.75),
+        "oracle_init": baseline(0.9),
+        "linear": baseline(None, 2.0, device_gain_mae_db=5.0, delay_profile_corr=0.6),
+        "gaussian_process": baseline(None, 9.5, device_gain_mae_db=4.0, delay_profile_corr=0.8),
+        "spectrum": baseline(None, 9.7),
         # Neither the method's own parts nor its ceiling are rivals.
-        "gaussians_alone": control(None, 1.0, device_gain_mae_db=0.5, delay_profile_corr=0.9),
+        "gaussians_alone": baseline(None, 1.0, device_gain_mae_db=0.5, delay_profile_corr=0.9),
     }
-    return {"geometry": geometry, "people": people, "rf": rf, "controls": controls}
+    return {"geometry": geometry, "people": people, "rf": rf, "baselines": baselines}
 
 
 def test_every_case_once_and_seeds_share_a_dataset() -> None:
@@ -70,7 +70,7 @@ def test_unknown_names_and_empty_choices_are_refused() -> None:
         cases(["living_room_walk"], ["clean"], ["wifi"], 0)
 
 
-def test_marks_follow_from_means_over_seeds() -> None:
+def test_targets_follow_from_means_over_seeds() -> None:
     wifi = [Case("living_room_walk", "clean", "wifi", seed) for seed in range(2)]
     (row,) = summarise([(wifi[0], metrics(0.80)), (wifi[1], metrics(0.84))])
     assert row.seeds == 2 and row.best_rival == "clean"
@@ -79,7 +79,7 @@ def test_marks_follow_from_means_over_seeds() -> None:
     # From CLEAN's 0.6: 0.22 of 0.4 cut, 0.22 of 0.3 to the ceiling closed.
     assert row.values["cut"] == pytest.approx(0.55)
     assert row.values["gap"] == pytest.approx(0.22 / 0.3)
-    assert row.marks == {
+    assert row.targets == {
         "cut": True,
         "template_f10": True,
         "centroid": True,
@@ -93,19 +93,19 @@ def test_marks_follow_from_means_over_seeds() -> None:
     assert (row.best_gain, row.best_profile) == ("gaussian_process", "gaussian_process")
 
 
-def test_marks_differ_by_radio_and_a_lower_ceiling_counts() -> None:
+def test_targets_differ_by_radio_and_a_lower_ceiling_counts() -> None:
     case = Case("two_crossing", "walls", "mmwave", 0)
     (row,) = summarise(
         [(case, metrics(0.73, centroid_m=0.12, found=0.9, identity_kept=0.75, f05=0.4))]
     )
     # A third of the error, but 43 % of the way to the ceiling: the share that counts is the gap's.
     assert row.values["cut"] == pytest.approx(0.13 / 0.4)
-    assert row.marks["cut"] is True
-    assert row.marks["template_f05"] is False and row.marks["template_f10"] is True
-    assert row.marks["centroid"] is False and row.marks["found"] is False
-    assert row.marks["identity"] is False
+    assert row.targets["cut"] is True
+    assert row.targets["template_f05"] is False and row.targets["template_f10"] is True
+    assert row.targets["centroid"] is False and row.targets["found"] is False
+    assert row.targets["identity"] is False
     (low,) = summarise([(case, metrics(0.55))])
-    assert low.marks["cut"] is False
+    assert low.targets["cut"] is False
 
 
 def test_the_table_names_what_is_missed() -> None:

@@ -66,7 +66,7 @@ def direct_channel(
     """Single-bounce channel of the moving points, for every measured link.
 
     Antenna patterns are taken in the direction between points and the centre of each site;
-    distances and facets are exact per element and tone.
+    distances and facets are exact per element and subcarrier.
 
     Args:
         points: Scattering points.
@@ -75,7 +75,7 @@ def direct_channel(
         layout: Antenna elements.
         devices: Poses of the devices, for pattern and polarisation.
         gamma: Reflection coefficient by material index, each of shape (subcarrier,).
-        radio: Gives tones, antenna pattern and polarisation.
+        radio: Gives subcarriers, antenna pattern and polarisation.
 
     Returns:
         Complex128, shape (tx, rx, subcarrier), zero where a link is not measured.

@@ -91,13 +91,13 @@ def _geometry(
 
 
 @numba.njit(cache=True)
-def _next_tone(
+def _next_subcarrier(
     value: tuple[np.ndarray, np.ndarray],
     turn: tuple[np.ndarray, np.ndarray],
     fade: np.ndarray,
     filled: int,
 ) -> None:
-    """Moves a block's phasors, given as real and imaginary parts, on to the next tone."""
+    """Moves a block's phasors, given as real and imaginary parts, on to the next subcarrier."""
     for j in range(filled):
         re, im, turn_re, turn_im = value[0][j], value[1][j], turn[0][j], turn[1][j]
         value[0][j], value[1][j] = re * turn_re - im * turn_im, re * turn_im + im * turn_re
@@ -114,15 +114,16 @@ def _facet_sum(
     rx_xyz: np.ndarray,
     k_0: float,
     k_step: float,
-    tones: int,
+    subcarriers: int,
 ) -> np.ndarray:
-    """Sums phasors over facets, tone by tone, through recurrences.
+    """Sums phasors over facets, subcarrier by subcarrier, through recurrences.
 
-    From tone to tone the phase advances by a constant and the damping exp(−k²Q) by a factor
-    that itself shrinks by exp(−2 k_step² Q): two multiplications instead of exp, sin and cos.
+    From subcarrier to subcarrier the phase advances by a constant and the damping exp(−k²Q) by a
+    factor that itself shrinks by exp(−2 k_step² Q): two multiplications instead of exp, sin and
+    cos.
     """
     n_tx, n_rx, n_points = len(tx_xyz), len(rx_xyz), len(points)
-    out = np.zeros((n_tx, n_rx, tones), dtype=np.complex128)
+    out = np.zeros((n_tx, n_rx, subcarriers), dtype=np.complex128)
     for link in numba.prange(n_tx * n_rx):
         tx, rx = link // n_rx, link % n_rx
         value_re, value_im = np.zeros(_BLOCK), np.zeros(_BLOCK)
@@ -145,10 +146,10 @@ def _facet_sum(
                 turn_im[filled] = -drop * math.sin(k_step * d)
                 fade[filled] = math.exp(-2.0 * k_step * k_step * damping)
                 filled += 1
-            for tone in range(tones):
+            for subcarrier in range(subcarriers):
                 value, turn = (value_re, value_im), (turn_re, turn_im)
                 sum_re, sum_im = summed(value_re[:filled]), summed(value_im[:filled])
-                _next_tone(value, turn, fade, filled)
+                _next_subcarrier(value, turn, fade, filled)
                 # The facet's constant phase: Kirchhoff's j.
-                out[tx, rx, tone] += complex(-sum_im, sum_re)
+                out[tx, rx, subcarrier] += complex(-sum_im, sum_re)
     return out

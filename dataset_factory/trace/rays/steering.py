@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From paths between centres of sites to every antenna element and tone.
+"""From paths between centres of sites to every antenna element and subcarrier.
 
 A path of specular reflections and refractions has one mirror image of its transmitter: the
 element-to-element distance is |r − I(t)|, exact for plane surfaces, which is the design's
@@ -32,7 +32,7 @@ def steer(
     nodes_hz: np.ndarray,
     transmission: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Sums paths for every measured pair of elements and every tone.
+    """Sums paths for every measured pair of elements and every subcarrier.
 
     H(f) = Σ_p a_p(f) T_p(f) e^{−j2πf d_p/c}, distances in double precision, paths in their own
     order within each link, so the bytes do not depend on the number of threads.
@@ -40,7 +40,7 @@ def steer(
     Args:
         paths: Paths, sorted.
         layout: Antenna elements.
-        freq_hz: Equally spaced tones [Hz].
+        freq_hz: Equally spaced subcarriers [Hz].
         nodes_hz: Frequencies of the amplitudes, ascending; linear in between.
         transmission: Shadow factors, shape (path, tx place of the site, rx place of the site,
             node); None for none.
@@ -94,7 +94,7 @@ def resampled(paths: PathSet, nodes_hz: np.ndarray, grid_hz: np.ndarray) -> Path
 
 
 def _interpolation(freq_hz: np.ndarray, nodes_hz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Left node of each tone and the share of the right one."""
+    """Left node of each subcarrier and the share of the right one."""
     if len(nodes_hz) == 1:
         return np.zeros(len(freq_hz), dtype=np.int64), np.zeros(len(freq_hz))
     left = np.clip(np.searchsorted(nodes_hz, freq_hz, side="right") - 1, 0, len(nodes_hz) - 2)
@@ -129,18 +129,18 @@ def _path_to(
 
 @numba.njit(cache=True)
 def _add_block(
-    phasor: np.ndarray, turn: np.ndarray, gain: np.ndarray, tones: tuple, out: np.ndarray
+    phasor: np.ndarray, turn: np.ndarray, gain: np.ndarray, subcarriers: tuple, out: np.ndarray
 ) -> None:
-    """Adds a block of paths to every tone of one link.
+    """Adds a block of paths to every subcarrier of one link.
 
     Args:
-        phasor: Real and imaginary part at the first tone, shape (2, path); changed.
-        turn: Factor from tone to tone, shape (2, path).
+        phasor: Real and imaginary part at the first subcarrier, shape (2, path); changed.
+        turn: Factor from subcarrier to subcarrier, shape (2, path).
         gain: Amplitudes, shape (node, 2, path).
-        tones: Left node of each tone and share of the right one.
+        subcarriers: Left node of each subcarrier and share of the right one.
         out: Channel of the link, shape (subcarrier,).
     """
-    left, share = tones
+    left, share = subcarriers
     # Rows of their own: one index that cannot be negative, so the loop becomes vector code.
     phasor_re, phasor_im, turn_re, turn_im = phasor[0], phasor[1], turn[0], turn[1]
     term_re, term_im = np.zeros(len(phasor_re)), np.zeros(len(phasor_re))
@@ -169,11 +169,11 @@ def _steer(
     ends: np.ndarray,
     tx_xyz: np.ndarray,
     rx_xyz: np.ndarray,
-    tones: tuple[np.ndarray, np.ndarray, float, float],
+    subcarriers: tuple[np.ndarray, np.ndarray, float, float],
 ) -> np.ndarray:
     """Channel of one pair of sites and ports, shape (tx, rx, subcarrier)."""
     amplitude, passed = gain
-    left, share, k_0, k_step = tones
+    left, share, k_0, k_step = subcarriers
     n_paths, n_nodes = amplitude.shape
     n_tx, n_rx = len(tx_xyz), len(rx_xyz)
     out = np.zeros((n_tx, n_rx, len(left)), dtype=np.complex128)

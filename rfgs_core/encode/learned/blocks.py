@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A frame's channel, one block of antennas and tones per device pair, preprocessed."""
+"""A frame's channel, one block of antennas and subcarriers per device pair, preprocessed."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Blocks:
     rx_xyz: Float64[Tensor, "pair rx 3"]
     """Their positions [m]."""
     freq_hz: Float64[Tensor, "subcarrier"]
-    """Tones [Hz]."""
+    """Subcarriers [Hz]."""
     packets: Complex64[Tensor, "pair packet tx rx subcarrier"] | None = None
     """Preprocessed change of each packet, in units of the RMS of all of a pair's packets; None
     where one was read."""
@@ -47,7 +47,7 @@ class Blocks:
         tx = np.array([np.flatnonzero(seen.layout.tx_device == a) for a, _ in pairs])
         rx = np.array([np.flatnonzero(seen.layout.rx_device == b) for _, b in pairs])
         rows = (tx[:, :, None], rx[:, None, :])
-        visible = seen.links[rows][..., None] & seen.tones
+        visible = seen.links[rows][..., None] & seen.subcarriers
         csi = np.where(visible, normal[rows], 0)
         return Blocks(
             csi=_unit_rms(csi, visible),

@@ -41,13 +41,13 @@ DOPPLER_BANDS = 16
 
 def feature_windows(freq_hz: Float[Tensor, "subcarrier"]) -> Float[Tensor, "32 subcarrier"]:
     """Hamming windows centred on equal parts of the band, each of mean square one."""
-    tones = freq_hz.numpy()
-    spacing_hz = tones[1] - tones[0]
-    width_hz = spacing_hz * len(tones)
+    subcarriers = freq_hz.numpy()
+    spacing_hz = subcarriers[1] - subcarriers[0]
+    width_hz = spacing_hz * len(subcarriers)
     rows = []
     for part in range(FEATURES):
-        centre_hz = tones[0] - 0.5 * spacing_hz + (part + 0.5) / FEATURES * width_hz
-        row = torch.from_numpy(hamming(tones, centre_hz, WINDOW_SHARE * width_hz))
+        centre_hz = subcarriers[0] - 0.5 * spacing_hz + (part + 0.5) / FEATURES * width_hz
+        row = torch.from_numpy(hamming(subcarriers, centre_hz, WINDOW_SHARE * width_hz))
         rows.append(row / row.square().mean().sqrt())
     return torch.stack(rows).float()
 
@@ -100,7 +100,7 @@ class CubeGates(Gates):
         super().__init__(nn.Conv3d, 3)
 
     def weigh(self, blocks: Blocks) -> Complex[Tensor, "pair 32 tx rx subcarrier"]:
-        """Weights per cell of the cube; the weighed cube is turned back to antennas and tones."""
+        """Weights per cell of the cube; the weighed one is turned back to antennas, subcarriers."""
         window = _band_window(blocks.freq_hz)
         gates = self.gates(_parts(_cube(blocks.csi * window)))
         cube = gates * _cube(blocks.csi)[:, None]
@@ -140,7 +140,7 @@ class RangeGates(Gates):
         super().__init__(nn.Conv1d, 5)
 
     def weigh(self, blocks: Blocks) -> Complex[Tensor, "pair 32 tx rx subcarrier"]:
-        """Weights per delay; the weighed profile is turned back to tones."""
+        """Weights per delay; the weighed profile is turned back to subcarriers."""
         window = _band_window(blocks.freq_hz)
         picture = _parts(torch.fft.ifft(blocks.csi * window, norm="ortho"))
         links = picture.permute(0, 2, 3, 1, 4)
@@ -156,15 +156,15 @@ def csi_picture(
 ) -> Float[Tensor, "pair tx 3 rx subcarrier"]:
     """Amplitude, phase in half turns less its bulk slope, and what is visible.
 
-    The phase is unwrapped over the visible tones of each link at their own frequencies, and
+    The phase is unwrapped over the visible subcarriers of each link at their own frequencies, and
     zero elsewhere.
     """
     phase = torch.zeros(csi.shape, dtype=torch.float64)
     shown = visible.flatten(0, 2).any(dim=0).numpy()
     if shown.sum() > 1:
-        tones = freq_hz.numpy()[shown]
-        unwrapped, slope = unwrap_phase(csi[..., shown].numpy(), tones)
-        line = slope[..., None] * (tones - tones[0])
+        subcarriers = freq_hz.numpy()[shown]
+        unwrapped, slope = unwrap_phase(csi[..., shown].numpy(), subcarriers)
+        line = slope[..., None] * (subcarriers - subcarriers[0])
         phase[..., shown] = torch.from_numpy((unwrapped - line) / torch.pi)
     return torch.stack([csi.abs(), (phase * visible).float(), visible.float()], dim=2)
 
@@ -204,8 +204,10 @@ def doppler_picture(
 
 def _band_window(freq_hz: Float[Tensor, "subcarrier"]) -> Float[Tensor, "subcarrier"]:
     """Hamming window over the whole band."""
-    tones = freq_hz.numpy()
-    return torch.from_numpy(hamming(tones, tones.mean(), tones[-1] - tones[0])).float()
+    subcarriers = freq_hz.numpy()
+    return torch.from_numpy(
+        hamming(subcarriers, subcarriers.mean(), subcarriers[-1] - subcarriers[0])
+    ).float()
 
 
 def _cube(

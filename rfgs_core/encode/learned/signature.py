@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What of a radio a learned encoder depends on: its tones and the arrays of one device."""
+"""What of a radio a learned encoder depends on: its subcarriers and the arrays of one device."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from rfgs_core.radio.layout import Layout, rotation
 
 @dataclass(frozen=True)
 class RadioSignature:
-    """Tones, and antennas in their device's own axes; where devices stand does not count."""
+    """Subcarriers, and antennas in their device's own axes; where devices stand does not count."""
 
     freq_hz: Float64[np.ndarray, "subcarrier"]
-    """Tones [Hz]."""
+    """Subcarriers [Hz]."""
     tx_offset_m: Float64[np.ndarray, "tx 3"]
     """Transmitting elements of a device from their centre [m]."""
     rx_offset_m: Float64[np.ndarray, "rx 3"]
@@ -46,7 +46,7 @@ class RadioSignature:
     def __str__(self) -> str:
         low, high = self.freq_hz[[0, -1]] * 1e-9
         arrays = f"{len(self.tx_offset_m)} TX and {len(self.rx_offset_m)} RX antennas per device"
-        band = f"{len(self.freq_hz)} tones from {low:.4g} to {high:.4g} GHz"
+        band = f"{len(self.freq_hz)} subcarriers from {low:.4g} to {high:.4g} GHz"
         if self.packets == 1:
             return f"{band}, {arrays}"
         return (
@@ -57,7 +57,7 @@ class RadioSignature:
         """Refuses another radio.
 
         Raises:
-            RfgsError: Tones, antennas or packets differ.
+            RfgsError: Subcarriers, antennas or packets differ.
         """
         rhythm = [(one.packets, round(one.packet_interval_s * 1e9)) for one in (self, other)]
         if rhythm[0] != rhythm[1]:

@@ -29,7 +29,7 @@ def _legs(
 def steering(
     blocks: Blocks, pair: int, points: Float64[Tensor, "N 3"]
 ) -> Complex64[Tensor, "tx rx subcarrier N"]:
-    """exp(+j2πf (d_t + d_r)/c) of one device pair's antennas and tones."""
+    """exp(+j2πf (d_t + d_r)/c) of one device pair's antennas and subcarriers."""
     out = _legs(blocks.tx_xyz[pair], points, blocks.freq_hz)
     back = _legs(blocks.rx_xyz[pair], points, blocks.freq_hz)
     return out[:, None] * back[None]

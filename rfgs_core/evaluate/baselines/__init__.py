@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Controls: what anybody could do with the same evidence. Every table shows all of them."""
+"""Baselines: what anybody could do with the same evidence. Every table shows all of them."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from rfgs_core.evaluate.baselines import (
     template,
     zero,
 )
-from rfgs_core.evaluate.evidence import Control, ControlResult, Evidence
+from rfgs_core.evaluate.evidence import Baseline, BaselineResult, Evidence
 
-#: Controls that look at one frame's evidence, by the name they have in `metrics.json`.
-CONTROLS: dict[str, Control] = {
-    "zero": zero.control,
-    "nearest_element": nearest_element.control,
-    "linear": linear.control,
-    "gaussian_process": gaussian_process.control,
-    "spectrum": spectrum.control,
-    "empty_room": empty_room.control,
-    "matched_filter": matched_filter.control,
+#: Baselines that look at one frame's evidence, by the name they have in `metrics.json`.
+BASELINES: dict[str, Baseline] = {
+    "zero": zero.baseline,
+    "nearest_element": nearest_element.baseline,
+    "linear": linear.baseline,
+    "gaussian_process": gaussian_process.baseline,
+    "spectrum": spectrum.baseline,
+    "empty_room": empty_room.baseline,
+    "matched_filter": matched_filter.baseline,
     "matched_filter_all_sum": matched_filter.all_sum,
     "matched_filter_all_log_mean": matched_filter.all_log_mean,
     "matched_filter_different_sum": matched_filter.different_sum,
     "matched_filter_different_log_mean": matched_filter.different_log_mean,
-    "clean": clean.control,
-    "omp": omp.control,
-    "template": template.control,
+    "clean": clean.baseline,
+    "omp": omp.baseline,
+    "template": template.baseline,
     "template_filled": template.filled,
-    "body_prior": body_prior.control,
+    "body_prior": body_prior.baseline,
 }
 
-__all__ = ["CONTROLS", "Control", "ControlResult", "Evidence"]
+__all__ = ["BASELINES", "Baseline", "BaselineResult", "Evidence"]

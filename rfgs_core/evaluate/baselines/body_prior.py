@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the start of a fit assumes of bodies, where the method has them, and nothing else.
 
-The places and postures come from the radio; within a body this control knows nothing. What the
+The places and postures come from the radio; within a body this baseline knows nothing. What the
 method has above it is what Gaussians say of a body's shape.
 """
 
@@ -11,16 +11,16 @@ import numpy as np
 
 from rfgs_core.bodies.body_prior import surface_prior
 from rfgs_core.evaluate.baselines.template import WHY_NO_CHANNEL
-from rfgs_core.evaluate.evidence import ControlResult, Evidence
+from rfgs_core.evaluate.evidence import BaselineResult, Evidence
 
 WHY_NO_BODIES = "the method does not tell where its bodies stand or sit"
 
 
-def control(evidence: Evidence) -> ControlResult:
+def baseline(evidence: Evidence) -> BaselineResult:
     """The prior's density at the method's own bodies, likeliest voxels first."""
     if evidence.method_bodies is None:
-        return ControlResult(reason=WHY_NO_BODIES)
+        return BaselineResult(reason=WHY_NO_BODIES)
     points = evidence.grid.centres(np.arange(evidence.grid.size))
     density = np.exp(surface_prior(points, evidence.method_bodies)[0])
     score = density.astype(np.float32).reshape(evidence.grid.shape)
-    return ControlResult(score=score, reason=WHY_NO_CHANNEL)
+    return BaselineResult(score=score, reason=WHY_NO_CHANNEL)

@@ -12,7 +12,7 @@ import numpy as np
 
 from rfgs_core.evaluate.baselines.matched_filter import default_score
 from rfgs_core.evaluate.baselines.scatterers import PointModel
-from rfgs_core.evaluate.evidence import ControlResult, Evidence
+from rfgs_core.evaluate.evidence import BaselineResult, Evidence
 from rfgs_core.evaluate.geometry import best_voxels
 
 #: Maps computed at most, and peaks taken from each.
@@ -41,12 +41,12 @@ def separated_peaks(points: np.ndarray, power: np.ndarray, count: int) -> list[i
     return chosen
 
 
-def control(evidence: Evidence) -> ControlResult:
+def baseline(evidence: Evidence) -> BaselineResult:
     """Points found by CLEAN, shown with a round beam."""
     model = PointModel(evidence)
     search = best_voxels(default_score(evidence), SEARCH_FACTOR * evidence.voxels)
     if len(search) == 0:
-        return ControlResult(reason="the frame holds no energy")
+        return BaselineResult(reason="the frame holds no energy")
     points = evidence.grid.centres(search)
     residual = model.measurements()
     total = sum(float(np.sum(np.abs(part) ** 2)) for part in residual)

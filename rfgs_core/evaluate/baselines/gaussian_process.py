@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Kriging with phase: a Gaussian process whose covariance turns as the wave does.
 
-Covariance between positions x and x' on an array (or between tones):
+Covariance between positions x and x' on an array (or between subcarriers):
 
     k(x − x') = σ² exp(jω(x − x')) (exp(−(x − x')² / 2ℓ²) + ν δ),
 
@@ -16,8 +16,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from rfgs_core.evaluate.baselines.interpolation import interpolating_control
-from rfgs_core.evaluate.evidence import ControlResult, Evidence
+from rfgs_core.evaluate.baselines.interpolation import interpolating_baseline
+from rfgs_core.evaluate.evidence import BaselineResult, Evidence
 
 #: Correlation lengths tried, in steps of the coordinate.
 LENGTHS = (0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 40.0)
@@ -82,6 +82,6 @@ def krige_level(values: np.ndarray, known: np.ndarray, wanted: np.ndarray) -> np
     return mean + cross @ np.linalg.solve(prior, values - mean)
 
 
-def control(evidence: Evidence) -> ControlResult:
-    """Kriges array columns and tones with phase, and levels between device pairs."""
-    return interpolating_control(evidence, krige, krige_level)
+def baseline(evidence: Evidence) -> BaselineResult:
+    """Kriges array columns and subcarriers with phase, and levels between device pairs."""
+    return interpolating_baseline(evidence, krige, krige_level)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Filling hidden channel entries from visible ones: what all interpolating controls share.
+"""Filling hidden channel entries from visible ones: what all interpolating baselines share.
 
-Three kinds of entries are hidden: array columns, tones and whole device pairs. Tones and
-columns keep the phase; a pair of other devices has a phase of its own that nothing visible
+Three kinds of entries are hidden: array columns, subcarriers and whole device pairs. Subcarriers
+and columns keep the phase; a pair of other devices has a phase of its own that nothing visible
 determines, so only the level of the nearest visible pair's channel is adapted.
 """
 
@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Complex, Float, Int
 
-from rfgs_core.evaluate.evidence import ControlResult, Evidence
+from rfgs_core.evaluate.evidence import BaselineResult, Evidence
 from rfgs_core.radio import Layout
 from rfgs_core.radio.levels import decibels, power_of
 
@@ -24,18 +24,18 @@ Interpolator = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 WHY_NO_SCORE = "interpolates channels and says nothing about space"
 
 
-def interpolating_control(
+def interpolating_baseline(
     evidence: Evidence, along: Interpolator, level_db: Interpolator | None
-) -> ControlResult:
+) -> BaselineResult:
     """Fills csi − csi_static and csi_static alike.
 
     Args:
         evidence: The frame.
-        along: Interpolates complex values along columns and along tones.
+        along: Interpolates complex values along columns and along subcarriers.
         level_db: Interpolates mean power [dB] between device pairs, whose coordinates are both
             device positions [m]; None keeps the level of the nearest pair.
     """
-    return ControlResult(
+    return BaselineResult(
         delta=fill(evidence.delta, evidence, along, level_db),
         static=fill(evidence.static, evidence, along, level_db),
         reason=WHY_NO_SCORE,
@@ -49,14 +49,14 @@ def fill(
     level_db: Interpolator | None = None,
 ) -> Complex[np.ndarray, "tx rx subcarrier"]:
     """A field without NaN: hidden entries interpolated, links that are not measured zero."""
-    layout, tone_visible = evidence.layout, evidence.tone_visible
+    layout, subcarrier_visible = evidence.layout, evidence.subcarrier_visible
     out = np.zeros_like(field)
     pairs: dict[tuple[int, int], np.ndarray] = {}
     for (a, b), (tx, rx) in _device_blocks(layout).items():
         seen = evidence.link_visible[np.ix_(tx, rx)].any(axis=0)
         if not seen.any():
             continue
-        block = _fill_tones(field[np.ix_(tx, rx[seen])], tone_visible, along)
+        block = _fill_subcarriers(field[np.ix_(tx, rx[seen])], subcarrier_visible, along)
         block = _fill_columns(block, layout.rx_column[rx], seen, along)
         out[np.ix_(tx, rx)] = pairs[a, b] = block
     _fill_pairs(out, pairs, evidence, level_db)
@@ -94,18 +94,18 @@ def _device_blocks(layout: Layout) -> dict[tuple[int, int], tuple[np.ndarray, np
     return blocks
 
 
-def _fill_tones(
+def _fill_subcarriers(
     block: Complex[np.ndarray, "tx rx subcarrier"],
-    tone_visible: np.ndarray,
+    subcarrier_visible: np.ndarray,
     along: Interpolator,
 ) -> Complex[np.ndarray, "tx rx subcarrier"]:
-    """Fills hidden tones of links that are otherwise visible."""
-    tones = np.arange(block.shape[2], dtype=np.float64)[:, None]
+    """Fills hidden subcarriers of links that are otherwise visible."""
+    subcarriers = np.arange(block.shape[2], dtype=np.float64)[:, None]
     out = np.nan_to_num(block, nan=0.0)
-    if not tone_visible.all():
-        values = block[:, :, tone_visible].reshape(-1, int(tone_visible.sum())).T
-        filled = along(values, tones[tone_visible], tones[~tone_visible])
-        out[:, :, ~tone_visible] = filled.T.reshape(*block.shape[:2], -1)
+    if not subcarrier_visible.all():
+        values = block[:, :, subcarrier_visible].reshape(-1, int(subcarrier_visible.sum())).T
+        filled = along(values, subcarriers[subcarrier_visible], subcarriers[~subcarrier_visible])
+        out[:, :, ~subcarrier_visible] = filled.T.reshape(*block.shape[:2], -1)
     return out
 
 
@@ -116,8 +116,8 @@ def _fill_columns(
     along: Interpolator,
 ) -> Complex[np.ndarray, "tx rx subcarrier"]:
     """Fills hidden columns of one device's array, each row from its own visible elements."""
-    num_tx, _, num_tones = visible.shape
-    out = np.zeros((num_tx, len(column), num_tones), dtype=visible.dtype)
+    num_tx, _, num_subcarriers = visible.shape
+    out = np.zeros((num_tx, len(column), num_subcarriers), dtype=visible.dtype)
     out[:, seen] = visible
     hidden = np.flatnonzero(~seen)
     if len(hidden) == 0:

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rfgs_core.evaluate.baselines.interpolation import interpolating_control
-from rfgs_core.evaluate.evidence import ControlResult, Evidence
+from rfgs_core.evaluate.baselines.interpolation import interpolating_baseline
+from rfgs_core.evaluate.evidence import BaselineResult, Evidence
 
 
 def linear(values: np.ndarray, known: np.ndarray, wanted: np.ndarray) -> np.ndarray:
@@ -26,6 +26,6 @@ def inverse_distance(values: np.ndarray, known: np.ndarray, wanted: np.ndarray) 
     return weight @ values / weight.sum(axis=1, keepdims=True)
 
 
-def control(evidence: Evidence) -> ControlResult:
-    """Extends lines along array columns and tones; levels by inverse distance."""
-    return interpolating_control(evidence, linear, inverse_distance)
+def baseline(evidence: Evidence) -> BaselineResult:
+    """Extends lines along array columns and subcarriers; levels by inverse distance."""
+    return interpolating_baseline(evidence, linear, inverse_distance)

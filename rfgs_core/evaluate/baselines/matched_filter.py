@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool, Float, Float32
 
-from rfgs_core.evaluate.evidence import ControlResult, Evidence
+from rfgs_core.evaluate.evidence import BaselineResult, Evidence
 
 WHY_NO_CHANNEL = "a picture of power; it predicts no channel"
 
@@ -33,14 +33,14 @@ def combine(
     return chosen.sum(axis=0)
 
 
-def variant(evidence: Evidence, different_only: bool, log_mean: bool) -> ControlResult:
+def variant(evidence: Evidence, different_only: bool, log_mean: bool) -> BaselineResult:
     """One way of joining the pairs."""
     maps = evidence.maps
     use = maps.different if different_only else np.ones(len(maps.pairs), dtype=bool)
     if not use.any():
-        return ControlResult(reason="this radio measures no links between different devices")
+        return BaselineResult(reason="this radio measures no links between different devices")
     score = maps.on_grid(combine(maps.power, use, log_mean))
-    return ControlResult(score=score, reason=WHY_NO_CHANNEL)
+    return BaselineResult(score=score, reason=WHY_NO_CHANNEL)
 
 
 def default_score(evidence: Evidence) -> Float32[np.ndarray, "x y z"]:
@@ -51,26 +51,26 @@ def default_score(evidence: Evidence) -> Float32[np.ndarray, "x y z"]:
     return score.astype(np.float32)
 
 
-def control(evidence: Evidence) -> ControlResult:
+def baseline(evidence: Evidence) -> BaselineResult:
     """The default variant."""
-    return ControlResult(score=default_score(evidence), reason=WHY_NO_CHANNEL)
+    return BaselineResult(score=default_score(evidence), reason=WHY_NO_CHANNEL)
 
 
-def all_sum(evidence: Evidence) -> ControlResult:
+def all_sum(evidence: Evidence) -> BaselineResult:
     """Sum over all pairs."""
     return variant(evidence, different_only=False, log_mean=False)
 
 
-def all_log_mean(evidence: Evidence) -> ControlResult:
+def all_log_mean(evidence: Evidence) -> BaselineResult:
     """Log-mean over all pairs."""
     return variant(evidence, different_only=False, log_mean=True)
 
 
-def different_sum(evidence: Evidence) -> ControlResult:
+def different_sum(evidence: Evidence) -> BaselineResult:
     """Sum over pairs of different devices."""
     return variant(evidence, different_only=True, log_mean=False)
 
 
-def different_log_mean(evidence: Evidence) -> ControlResult:
+def different_log_mean(evidence: Evidence) -> BaselineResult:
     """Log-mean over pairs of different devices."""
     return variant(evidence, different_only=True, log_mean=True)

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The nearest measured value: element of the same array, tone, or device pair."""
+"""The nearest measured value: element of the same array, subcarrier, or device pair."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from rfgs_core.evaluate.baselines.interpolation import interpolating_control
-from rfgs_core.evaluate.evidence import ControlResult, Evidence
+from rfgs_core.evaluate.baselines.interpolation import interpolating_baseline
+from rfgs_core.evaluate.evidence import BaselineResult, Evidence
 
 
 def nearest(values: np.ndarray, known: np.ndarray, wanted: np.ndarray) -> np.ndarray:
@@ -15,6 +15,6 @@ def nearest(values: np.ndarray, known: np.ndarray, wanted: np.ndarray) -> np.nda
     return values[distance.argmin(axis=1)]
 
 
-def control(evidence: Evidence) -> ControlResult:
-    """Copies the nearest measured element of the same array, tone and device pair."""
-    return interpolating_control(evidence, nearest, None)
+def baseline(evidence: Evidence) -> BaselineResult:
+    """Copies the nearest measured element of the same array, subcarrier and device pair."""
+    return interpolating_baseline(evidence, nearest, None)

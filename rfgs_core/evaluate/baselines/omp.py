@@ -11,7 +11,7 @@ import numpy as np
 
 from rfgs_core.evaluate.baselines.matched_filter import default_score
 from rfgs_core.evaluate.baselines.scatterers import PointModel
-from rfgs_core.evaluate.evidence import ControlResult, Evidence
+from rfgs_core.evaluate.evidence import BaselineResult, Evidence
 from rfgs_core.evaluate.geometry import best_voxels
 
 #: Points picked.
@@ -45,12 +45,12 @@ def _best_point(
     return near[int(power.argmax())]
 
 
-def control(evidence: Evidence) -> ControlResult:
+def baseline(evidence: Evidence) -> BaselineResult:
     """Points found by OMP, shown with a round beam."""
     model = PointModel(evidence)
     search = best_voxels(default_score(evidence), SEARCH_FACTOR * evidence.voxels)
     if len(search) == 0:
-        return ControlResult(reason="the frame holds no energy")
+        return BaselineResult(reason="the frame holds no energy")
     fine = evidence.grid.centres(search)
     coarse = evidence.grid.centres(np.sort(search)[::COARSE_STEP])
     measured = model.measurements()

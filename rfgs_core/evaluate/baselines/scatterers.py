@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Complex, Float
 
 from rfgs_core.encode.matched_filter import matched_filter
-from rfgs_core.evaluate.evidence import ControlResult, Evidence
+from rfgs_core.evaluate.evidence import BaselineResult, Evidence
 from rfgs_core.evaluate.grid import splat_gaussians
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
@@ -26,20 +26,20 @@ class PointModel:
         layout = evidence.layout
         self.layout = layout
         self.pair, self.pairs = layout.pairs_of(evidence.link_visible)
-        self.tones = np.flatnonzero(evidence.tone_visible)
+        self.subcarriers = np.flatnonzero(evidence.subcarrier_visible)
         self.wavenumber = 2.0 * np.pi * evidence.freq_hz / SPEED_OF_LIGHT
         self.links = [np.nonzero(self.pair == index) for index in range(len(self.pairs))]
 
-    def measurements(self) -> list[Complex[np.ndarray, "link tone"]]:
+    def measurements(self) -> list[Complex[np.ndarray, "link subcarrier"]]:
         """Visible csi − csi_static per pair."""
-        return [self.evidence.delta[tx, rx][:, self.tones] for tx, rx in self.links]
+        return [self.evidence.delta[tx, rx][:, self.subcarriers] for tx, rx in self.links]
 
     def steering(
         self, point: Float[np.ndarray, "3"], pair: int
-    ) -> Complex[np.ndarray, "link tone"]:
+    ) -> Complex[np.ndarray, "link subcarrier"]:
         """Unit phasors of one point on the visible entries of a pair."""
         tx, rx = self.links[pair]
-        return self._phasor(point, tx, rx)[:, self.tones]
+        return self._phasor(point, tx, rx)[:, self.subcarriers]
 
     def _phasor(
         self, point: Float[np.ndarray, "3"], tx: np.ndarray, rx: np.ndarray
@@ -49,12 +49,14 @@ class PointModel:
         return np.exp(-1j * length[:, None] * self.wavenumber).astype(np.complex64)
 
     def back_project(
-        self, residual: list[Complex[np.ndarray, "link tone"]], points: Float[np.ndarray, "N 3"]
+        self,
+        residual: list[Complex[np.ndarray, "link subcarrier"]],
+        points: Float[np.ndarray, "N 3"],
     ) -> Complex[np.ndarray, "pair N"]:
         """Mean of residual times conjugate steering per pair: the best amplitude of each point."""
         full = np.zeros(self.evidence.delta.shape, dtype=np.complex64)
         for (tx, rx), values in zip(self.links, residual, strict=True):
-            full[tx[:, None], rx[:, None], self.tones[None, :]] = values
+            full[tx[:, None], rx[:, None], self.subcarriers[None, :]] = values
         answer = matched_filter(
             full,
             self.layout.tx_xyz,
@@ -63,8 +65,8 @@ class PointModel:
             self.evidence.freq_hz,
             points,
         )[:, 0]
-        # The filter divides by all tones; hidden ones are zero here.
-        return answer * (full.shape[2] / len(self.tones))
+        # The filter divides by all subcarriers; hidden ones are zero here.
+        return answer * (full.shape[2] / len(self.subcarriers))
 
     def spreading(self, points: Float[np.ndarray, "N 3"], a: int, b: int) -> np.ndarray:
         """d_t · d_r between points and the arrays of a device pair [m²], shape (N,)."""
@@ -74,7 +76,7 @@ class PointModel:
 
     def result(
         self, points: Float[np.ndarray, "N 3"], amplitude: Complex[np.ndarray, "pair N"]
-    ) -> ControlResult:
+    ) -> BaselineResult:
         """Score and channel of a set of points.
 
         A pair of devices that was never seen gets the mean reflectivity of the seen ones and
@@ -99,4 +101,4 @@ class PointModel:
                 gain = reflectivity / self.spreading(points, a, b)
             for point, value in zip(points, gain, strict=True):
                 delta[tx, rx] += value * self._phasor(point, tx, rx)
-        return ControlResult(score=score, delta=delta)
+        return BaselineResult(score=score, delta=delta)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Controls of pictures: the empty room, and a flat silhouette in front of it."""
+"""Baselines of pictures: the empty room, and a flat silhouette in front of it."""
 
 from __future__ import annotations
 

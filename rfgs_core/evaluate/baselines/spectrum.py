@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Kriging whose covariance is that of a spectrum: of directions along arrays, of delays over tones.
+"""Kriging with the covariance of a spectrum: directions along arrays, delays over subcarriers.
 
 Values at whole-numbered positions x are taken for a sum of waves exp(jωx) with independent
 amplitudes of power p(ω), plus noise of power σ². Their covariance R = A diag(p) Aᴴ + σ²I has a
 free shape, so echoes from several directions, or with several delays, are carried on each with a
-phase of its own, where the control `gaussian_process` knows one. Powers are the likeliest ones
+phase of its own, where the baseline `gaussian_process` knows one. Powers are the likeliest ones
 given the samples' covariance S, by the multiplicative steps
 
     p ← p √(aᴴR⁻¹SR⁻¹a / aᴴR⁻¹a),   σ² ← σ² √(tr R⁻¹SR⁻¹ / tr R⁻¹),
@@ -19,8 +19,8 @@ import numpy as np
 from jaxtyping import Complex128, Float64, Int64
 
 from rfgs_core.evaluate.baselines.gaussian_process import krige_level
-from rfgs_core.evaluate.baselines.interpolation import interpolating_control
-from rfgs_core.evaluate.evidence import ControlResult, Evidence
+from rfgs_core.evaluate.baselines.interpolation import interpolating_baseline
+from rfgs_core.evaluate.evidence import BaselineResult, Evidence
 
 #: Multiplicative steps; after more of them, noise becomes lines.
 STEPS = 10
@@ -101,6 +101,6 @@ def _likeliest(
     return power, noise
 
 
-def control(evidence: Evidence) -> ControlResult:
-    """Carries array columns and tones on by their spectra; levels between pairs are kriged."""
-    return interpolating_control(evidence, spectral, krige_level)
+def baseline(evidence: Evidence) -> BaselineResult:
+    """Carries array columns and subcarriers on by spectra; levels between pairs are kriged."""
+    return interpolating_baseline(evidence, spectral, krige_level)

@@ -3,14 +3,14 @@
 
 It knows nothing of limbs or pose. A method that does not beat it has found where the person
 is, not what the person looks like. The template is a surface, as the reference is; filled, it is
-shown as a control of its own.
+shown as a baseline of its own.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from rfgs_core.evaluate.evidence import ControlResult, Evidence
+from rfgs_core.evaluate.evidence import BaselineResult, Evidence
 
 #: Semi-axes of the ellipsoid [m]; it stands on the floor, the lower bound of the scene.
 SEMI_AXES_M = (0.25, 0.20, 0.85)
@@ -33,20 +33,20 @@ def _radius(evidence: Evidence) -> tuple[np.ndarray, np.ndarray]:
     return radius, slope / np.maximum(radius, 1e-6)
 
 
-def control(evidence: Evidence) -> ControlResult:
+def baseline(evidence: Evidence) -> BaselineResult:
     """The ellipsoid's surface at the method's own centroid."""
     if evidence.method_centroid_m is None:
-        return ControlResult(reason=WHY_NO_CENTROID)
+        return BaselineResult(reason=WHY_NO_CENTROID)
     radius, slope = _radius(evidence)
     # Distance to the surface to first order: (radius − 1) over the gradient's length.
     distance_m = np.abs(radius - 1.0) / np.maximum(slope, 1e-6)
     score = np.exp(-distance_m / evidence.grid.voxel_m).astype(np.float32)
-    return ControlResult(score=score, reason=WHY_NO_CHANNEL)
+    return BaselineResult(score=score, reason=WHY_NO_CHANNEL)
 
 
-def filled(evidence: Evidence) -> ControlResult:
+def filled(evidence: Evidence) -> BaselineResult:
     """The same ellipsoid filled from its axis outwards; K voxels do not reach its surface."""
     if evidence.method_centroid_m is None:
-        return ControlResult(reason=WHY_NO_CENTROID)
+        return BaselineResult(reason=WHY_NO_CENTROID)
     score = np.exp(-_radius(evidence)[0]).astype(np.float32)
-    return ControlResult(score=score, reason=WHY_NO_CHANNEL)
+    return BaselineResult(score=score, reason=WHY_NO_CHANNEL)

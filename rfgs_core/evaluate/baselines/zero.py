@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from rfgs_core.evaluate.evidence import ControlResult, Evidence
+from rfgs_core.evaluate.evidence import BaselineResult, Evidence
 
 
-def control(evidence: Evidence) -> ControlResult:
+def baseline(evidence: Evidence) -> BaselineResult:
     """A channel of zeros and an empty map."""
     nothing = np.zeros(evidence.delta.shape, dtype=np.complex64)
     score = np.zeros(evidence.grid.shape, dtype=np.float32)
-    return ControlResult(score=score, delta=nothing, static=nothing)
+    return BaselineResult(score=score, delta=nothing, static=nothing)

@@ -78,7 +78,7 @@ class ResidualDensity:
     observations: Observations
     """What was measured."""
     channel: Channel
-    """Its visible links and tones."""
+    """Its visible links and subcarriers."""
     comparison: Comparison
     """The terms of the measurement."""
     noise: Tensor

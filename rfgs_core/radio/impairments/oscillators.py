@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What imperfect oscillators and clocks do to a channel: a phase per link, tone and sample."""
+"""What imperfect oscillators and clocks do: a phase per link, subcarrier and sample."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ REFERENCE_TEMPERATURE_K = 290.0
 def noise_variance(settings: Impairments, radio: Radio) -> float:
     """Power E|n|² of the noise on one channel coefficient, kTBF/P, a ratio like the channel.
 
-    Transmit power P and bandwidth B are shared by all tones alike, so P/N over Δf = B/N is P
+    Transmit power P and bandwidth B are shared by all subcarriers alike, so P/N over Δf = B/N is P
     over B. One symbol lasts 1/Δf; averaging several divides the power.
     """
     figure_db = (

@@ -15,14 +15,14 @@ from rfgs_core.dataset import open_dataset
 
 
 def test_delay_spread_of_two_paths_is_half_their_distance() -> None:
-    tones, spacing_hz = 256, 1e6
-    freq_hz = np.arange(tones) * spacing_hz
+    subcarriers, spacing_hz = 256, 1e6
+    freq_hz = np.arange(subcarriers) * spacing_hz
     apart_s = 200e-9
     for first_s in (10e-9, 900e-9):
         paths = np.exp(-2j * np.pi * freq_hz * first_s)
         both = paths + np.exp(-2j * np.pi * freq_hz * (first_s + apart_s))
         one, two = delay_spread_s(np.stack([paths, both]), spacing_hz)
-        assert one < 1 / (tones * spacing_hz)
+        assert one < 1 / (subcarriers * spacing_hz)
         # Two equal paths: σ = distance / 2, widened by the window's own width.
         assert np.isclose(two, np.hypot(apart_s / 2, one), rtol=0.02)
 
@@ -55,4 +55,4 @@ def test_the_command_prints_a_table_and_json(
     table = factory("stats", str(tiny_dataset))
     assert table.returncode == 0 and "radios.wifi.dynamic_to_static_db" in table.stdout
     value = json.loads(factory("stats", str(tiny_dataset), "--json").stdout)
-    assert value["sequences"]["tiny"]["radios"]["wifi"]["tones"] == 16
+    assert value["sequences"]["tiny"]["radios"]["wifi"]["subcarriers"] == 16

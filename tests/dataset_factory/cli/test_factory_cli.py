@@ -40,7 +40,8 @@ def test_help_teaches(factory: Factory) -> None:
     assert one_line(factory("destroy")).startswith("error: unknown command 'destroy'")
 
 
-#: Bounds whose diagonal is 25.63 m: 2 · 25.63 + 5 = 56.27 m, 4 GHz · 56.27 m / c = 750.8 tones.
+#: Bounds whose diagonal is 25.63 m: 2 · 25.63 + 5 = 56.27 m, 4 GHz · 56.27 m / c = 750.8
+# subcarriers.
 WIDE = ["--bounds", "-8", "-8", "0", "10", "10", "3"]
 
 

@@ -89,7 +89,7 @@ def test_deepmimo_reads_what_was_stored(
             angles = {"aoa_el": rows.arrival_zenith_rad, "aod_az": rows.departure_azimuth_rad}
             for name, own in angles.items():
                 assert np.allclose(station[name][rx], np.rad2deg(own), atol=1e-3)
-            # What the tones add up to, by DeepMIMO's own numbers.
+            # What the subcarriers add up to, by DeepMIMO's own numbers.
             gain = 10 ** (station.power[rx] / 20) * np.exp(1j * np.deg2rad(station.phase[rx]))
             offset_hz = spec.freq_hz - spec.centre_hz
             late = np.exp(-2j * np.pi * offset_hz * np.float64(station.delay[rx])[:, None])

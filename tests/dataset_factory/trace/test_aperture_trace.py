@@ -65,7 +65,7 @@ def test_a_ball_turns_the_phase_and_fades_as_its_range_tells(
     level = np.abs(turned) * (out * back)[:, None]
     assert level.std(axis=0).max() < 0.15 * level.mean()
     assert np.abs(np.angle(turned / turned.mean(axis=0))).max() < 0.3
-    # The slope over the tones is the delay.
+    # The slope over the subcarriers is the delay.
     steps = np.angle(turned[:, 1:] / turned[:, :-1]).mean(axis=1)
     assert np.abs(steps / np.diff(wavenumber)[0]).max() < 0.03
 

@@ -21,7 +21,7 @@ STEEP = 0.999
 
 @pytest.mark.parametrize("name", [n for n, each in PRESETS.items() if each.samples_per_frame == 1])
 def test_free_space_is_friis_in_amplitude_and_phase(make_bundle: MakeBundle, name: str) -> None:
-    """H = λ/(4πd) e^{−jkd} for every measured link and tone."""
+    """H = λ/(4πd) e^{−jkd} for every measured link and subcarrier."""
     from dataset_factory.trace import Tracer
     from dataset_factory.trace.rays.scene import centres
 

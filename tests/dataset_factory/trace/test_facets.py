@@ -81,7 +81,7 @@ def naive(points, normals, areas, tx, rx, freq_hz):
     return total
 
 
-def test_recurrence_over_tones_matches_the_formula() -> None:
+def test_recurrence_over_subcarriers_matches_the_formula() -> None:
     rng = np.random.default_rng(0)
     points = rng.uniform(-0.5, 0.5, (150, 3))
     normals = rng.normal(size=(150, 3))

@@ -19,7 +19,7 @@ from dataset_factory.trace.people.facets import facet_sum
 from dataset_factory.trace.shadow.frequencies import nodes_for
 from dataset_factory.trace.shadow.kirchhoff import _shade
 from dataset_factory.trace.rays.steering import _steer
-from rfgs_core.propagation import EnvironmentPaths, Links, Tones, scatter, shadow
+from rfgs_core.propagation import EnvironmentPaths, Links, Subcarriers, scatter, shadow
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
 def show(name, arrays):
@@ -75,7 +75,7 @@ paths = EnvironmentPaths(
     torch.arange(links), torch.ones(links, dtype=torch.complex64), length_m / SPEED_OF_LIGHT,
     ends.tx_xyz, ends.rx_xyz, torch.zeros(links), torch.zeros(links), 0.05,
 )
-csi = scatter(means, quats, scales_rf, gamma, ends, Tones(5.72e9, 2.5e6, 33))
+csi = scatter(means, quats, scales_rf, gamma, ends, Subcarriers(5.72e9, 2.5e6, 33))
 through = shadow(means, quats, scales, alpha, paths)
 (csi.abs().sum() + through.abs().sum()).backward()
 show("channel", [csi.detach(), through.detach()])

@@ -59,7 +59,7 @@ def test_plate_turns_the_phase_by_its_doppler(
 ) -> None:
     from dataset_factory.trace import Tracer
 
-    # Receding along x, so that phase falls by 2π · 2v/λ per second at every tone.
+    # Receding along x, so that phase falls by 2π · 2v/λ per second at every subcarrier.
     bundle = in_motion(make_bundle(static=[], mover=plate()), (speed_m_s, 0.0, 0.0))
     radio = replace(
         small_radio,

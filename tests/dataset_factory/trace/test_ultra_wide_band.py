@@ -19,7 +19,7 @@ def test_channel_is_continuous_across_sub_bands(
     two_devices: list[DevicePose],
     coarse_capsule: tuple[np.ndarray, np.ndarray],
 ) -> None:
-    """Between fine tones a smooth channel bends by (2π δf τ)²; a jump of a sub-band adds itself."""
+    """Between fine subcarriers a smooth channel bends by (2π δf τ)²; a sub-band's jump adds itself."""
     from dataset_factory.trace import Tracer
     from dataset_factory.trace.environment import node_frequencies
 
@@ -35,7 +35,7 @@ def test_channel_is_continuous_across_sub_bands(
     assert bend[at_border].max() < 1.2 * bend[~at_border].max() < 0.02
 
 
-def test_tones_are_those_of_narrow_bands_around_them(
+def test_subcarriers_are_those_of_narrow_bands_around_them(
     make_bundle: MakeBundle, two_devices: list[DevicePose]
 ) -> None:
     """Paths found at the band's edges and evaluated within are those found there anew.
@@ -47,15 +47,15 @@ def test_tones_are_those_of_narrow_bands_around_them(
     wide = replace(preset("uwb"), rx_cols=1, own_device_links="excluded")
     bundle = make_bundle()
     csi = Tracer(bundle, wide, two_devices, depth=1).static()[0, 1]
-    for tone in (3, 304, 604):
+    for subcarrier in (3, 304, 604):
         spacing_hz = wide.subcarrier_spacing_hz
         narrow = replace(
             wide,
-            freq_min_hz=float(wide.freq_hz[tone]) - 1.5 * spacing_hz,
-            freq_max_hz=float(wide.freq_hz[tone]) + 1.5 * spacing_hz,
+            freq_min_hz=float(wide.freq_hz[subcarrier]) - 1.5 * spacing_hz,
+            freq_max_hz=float(wide.freq_hz[subcarrier]) + 1.5 * spacing_hz,
             num_subcarriers=3,
         )
         near = Tracer(bundle, narrow, two_devices, depth=1).static()[0, 1]
-        error = csi[tone - 1 : tone + 2] - near
+        error = csi[subcarrier - 1 : subcarrier + 2] - near
         error_db = 10 * np.log10((np.abs(error) ** 2).sum() / (np.abs(near) ** 2).sum())
-        assert error_db < -30.0, (tone, error_db)
+        assert error_db < -30.0, (subcarrier, error_db)

@@ -51,10 +51,12 @@ def test_the_median_is_closer_to_the_room_than_any_frame(walk: Path, kind) -> No
     sequence = open_dataset(walk).sequence()
     background = learned_background(sequence, "wifi", "clean", kind)
     seen = observe(sequence, "wifi", 4)
-    keep = seen.links[..., None] & (seen.tones if kind != "delay_power" else True)
+    keep = seen.links[..., None] & (seen.subcarriers if kind != "delay_power" else True)
 
     def visible(csi: np.ndarray) -> np.ndarray:
-        return np.where(keep, KINDS[kind].report(np.where(seen.tones, csi, 0), seen.tones), 0)
+        return np.where(
+            keep, KINDS[kind].report(np.where(seen.subcarriers, csi, 0), seen.subcarriers), 0
+        )
 
     room = visible(sequence.csi_static("wifi"))
     error = np.sum(np.abs(background - room) ** 2)
@@ -73,7 +75,7 @@ def test_still_entries_are_exact(walk: Path, monkeypatch) -> None:
     )
     seen = observe(sequence, "wifi", 4)
     got = learned_background(sequence, "wifi", "clean", "complex")
-    keep = seen.links[..., None] & seen.tones
+    keep = seen.links[..., None] & seen.subcarriers
     np.testing.assert_array_equal(got, np.where(keep, room, 0))
 
 
@@ -94,7 +96,7 @@ def test_who_moves_is_found_without_an_empty_room(
     opened = open_run(run.path)
     evidence = Scene.of(opened).evidence(2, np.ones(Scene.of(opened).grid.shape, np.float32))
     seen = opened.observations(2)
-    keep = seen.links[..., None] & seen.tones
+    keep = seen.links[..., None] & seen.subcarriers
     np.testing.assert_allclose(evidence.delta[keep], seen.delta[keep], atol=1e-8)
 
 
@@ -116,7 +118,7 @@ def test_taking_movers_out_in_turn_leaves_less_of_them_in_the_room(
     room = seen.static
     errors = [np.sum(np.abs(background - room) ** 2) for background in (first, better)]
     assert errors[1] < 0.8 * errors[0]
-    keep = seen.links[..., None] & seen.tones
+    keep = seen.links[..., None] & seen.subcarriers
     assert (better[~keep] == 0).all()
 
 

@@ -44,12 +44,12 @@ BARE_CHANNELS = tiny.channels
 @pytest.fixture
 def room(make_observations):
     """Direct paths and five reflectors, a fifth of the array and of the band hidden."""
-    tones = np.ones(32, bool)
-    tones[24:28] = False
+    subcarriers = np.ones(32, bool)
+    subcarriers[24:28] = False
     band = {"freq_min_hz": 5.5e9, "freq_max_hz": 6.1e9, "num_subcarriers": 32}
     elements = make_observations(**band).layout
     links = elements.rx_column < elements.rx_column.max()
-    bare = make_observations(None, elements.measured & links, tones, **band)
+    bare = make_observations(None, elements.measured & links, subcarriers, **band)
     normals = np.array([2.0, 1.75, 1.25]) - PLACES
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     head = RadioHead.create(0, 0.06, 0.04, 1.0)
@@ -57,7 +57,7 @@ def room(make_observations):
     gaussians = gaussians_at(PLACES, normals)
     features = head.with_gamma(gaussians.features, gamma)
     truth = StaticSet(replace(gaussians, features=features), head)
-    seen = links[..., None] & tones
+    seen = links[..., None] & subcarriers
     whole = truth.background(bare)
     return replace(bare, static=np.where(seen, whole, 0)), whole, truth
 
@@ -122,8 +122,10 @@ def test_known_reflectors_are_found_in_their_own_background(room) -> None:
     assert near.min() > 0.02 * power.sum()
     # What they scatter, with the direct paths taken off: on what was seen, and on hidden columns.
     straight = StaticSet(Gaussians.none(), truth.head).background(observations)
-    seen = observations.links[..., None] & observations.tones
-    hidden = (observations.layout.measured & ~observations.links)[..., None] & observations.tones
+    seen = observations.links[..., None] & observations.subcarriers
+    hidden = (observations.layout.measured & ~observations.links)[
+        ..., None
+    ] & observations.subcarriers
     scattered, got = whole - straight, found.background(observations) - straight
     assert error_db(got[seen], scattered[seen]) < -11
     assert error_db(got[hidden], scattered[hidden]) < -3

@@ -16,7 +16,7 @@ from rfgs_core.bodies.localise import PairMaps, pair_maps
 from rfgs_core.bodies.posture import NOISE_SHARES, PairSample, pair_samples, tell_postures
 from rfgs_core.bodies.start import StartDensity
 from rfgs_core.measure.observations import Observations
-from rfgs_core.propagation import Links, Tones, scatter
+from rfgs_core.propagation import Links, Subcarriers, scatter
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.settings import TrainConfig
 
@@ -56,7 +56,7 @@ def responses(sample: PairSample, points: np.ndarray, normals: np.ndarray) -> np
         each = [
             scatter(
                 *(means[[row]], quats, torch.full((1, 3), 1e-9, dtype=torch.float64)),
-                *(torch.ones(1, 1, dtype=torch.complex128), links, Tones(float(f), 1.0, 1)),
+                *(torch.ones(1, 1, dtype=torch.complex128), links, Subcarriers(float(f), 1.0, 1)),
                 normals=turned[[row]],
                 sharpness=6.0,
                 backend="torch",
@@ -91,12 +91,12 @@ def test_evidence_does_not_know_units(sample: PairSample, cloud) -> None:
 
 
 def test_only_what_is_visible_is_sampled(make_observations: Callable[..., Observations]) -> None:
-    links, tones = np.ones((4, 64), bool), np.ones(32, bool)
-    links[:, 5], tones[7] = False, False
-    seen = make_observations(links=links, tones=tones)
+    links, subcarriers = np.ones((4, 64), bool), np.ones(32, bool)
+    links[:, 5], subcarriers[7] = False, False
+    seen = make_observations(links=links, subcarriers=subcarriers)
     rng = np.random.default_rng(0)
     delta = rng.standard_normal(seen.delta.shape) + 1j
-    delta = np.where(seen.links[..., None] & seen.tones, delta, np.nan)
+    delta = np.where(seen.links[..., None] & seen.subcarriers, delta, np.nan)
     seen = replace(seen, delta=delta.astype(np.complex64))
     samples = pair_samples(seen, 0)
     assert len(samples) == len(seen.pairs[1])

@@ -13,7 +13,7 @@ BOUNDS_M = np.array([[0.0, 0.0, 0.0], [5.0, 4.0, 2.7]])
 
 
 def circle() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Places of the preset's transmitter and receiver [m], and its tones [Hz]."""
+    """Places of the preset's transmitter and receiver [m], and its subcarriers [Hz]."""
     radio = preset("sar")
     samples = frame_samples(radio, 10.0, place_devices(radio, BOUNDS_M))
     assert samples.tx_xyz is not None and samples.rx_xyz is not None
@@ -21,7 +21,7 @@ def circle() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def echo(tx_xyz: np.ndarray, rx_xyz: np.ndarray, freq_hz: np.ndarray, at: tuple) -> np.ndarray:
-    """exp(−j k (d_t + d_r)) at every place and tone."""
+    """exp(−j k (d_t + d_r)) at every place and subcarrier."""
     path_m = np.linalg.norm(tx_xyz - at, axis=1) + np.linalg.norm(rx_xyz - at, axis=1)
     return np.exp(-2j * np.pi * freq_hz / SPEED_OF_LIGHT * path_m[:, None]).astype(np.complex64)
 

@@ -41,19 +41,19 @@ PACKETS, INTERVAL_S = 20, 0.25e-3
 
 
 def scattered(kind: str, hide: bool = True, point: np.ndarray = SCATTERER_M) -> Observations:
-    """One scatterer; some links and tones are hidden."""
+    """One scatterer; some links and subcarriers are hidden."""
     radio = RADIOS[kind]
     elements = layout(radio, place_devices(radio, BOUNDS_M))
     out = np.linalg.norm(elements.tx_xyz - point, axis=1)
     back = np.linalg.norm(elements.rx_xyz - point, axis=1)
     path_m = out[:, None, None] + back[:, None]
     wave = np.exp(-2j * np.pi * radio.freq_hz * path_m / SPEED_OF_LIGHT) * 3e-4 / path_m**2
-    links, tones = elements.measured.copy(), np.ones(radio.num_subcarriers, bool)
+    links, subcarriers = elements.measured.copy(), np.ones(radio.num_subcarriers, bool)
     if hide:
         links[:, -1] = False
-        tones[5:8] = False
-    delta = np.where(links[..., None] & tones, wave, 0).astype(np.complex64)
-    seen = Observations(delta, 0 * delta, links, tones, elements, radio.freq_hz, BOUNDS_M)
+        subcarriers[5:8] = False
+    delta = np.where(links[..., None] & subcarriers, wave, 0).astype(np.complex64)
+    seen = Observations(delta, 0 * delta, links, subcarriers, elements, radio.freq_hz, BOUNDS_M)
     return seen if kind != "doppler" else turning(seen, 2.3)
 
 
@@ -89,7 +89,7 @@ def test_the_radio_chooses_its_network(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_with_all_weights_alike_it_is_a_windowed_matched_filter(kind: str) -> None:
-    """φ_c = RMS over pairs of |mean over links and tones of w_c H e^{+jkd}|, H of power one."""
+    """φ_c = RMS over pairs of |mean over entries of w_c H e^{+jkd}|, H of power one."""
     seen = scattered(kind)
     points = near(12)
     encoder = LearnedEncoder.untrained(kind, seen, 0)
@@ -98,18 +98,24 @@ def test_with_all_weights_alike_it_is_a_windowed_matched_filter(kind: str) -> No
     got = encoder(seen, points)
     window = feature_windows(torch.from_numpy(seen.freq_hz)).numpy()
     level = np.sqrt(np.mean(np.abs(seen.delta[seen.links].astype(complex)) ** 2, axis=0))
-    csi = seen.delta / np.where(seen.tones, level, 1.0)
+    csi = seen.delta / np.where(seen.subcarriers, level, 1.0)
     pair, names = seen.pairs
     power = np.zeros((len(points), 32))
     for number in range(len(names)):
-        mine = csi[pair == number][:, seen.tones]
+        mine = csi[pair == number][:, seen.subcarriers]
         rms = np.sqrt(np.mean(np.abs(mine) ** 2))
         for row, point in enumerate(points):
             out = np.linalg.norm(seen.layout.tx_xyz - point, axis=1)
             back = np.linalg.norm(seen.layout.rx_xyz - point, axis=1)
             path_m = (out[:, None] + back)[pair == number]
-            turn = np.exp(2j * np.pi * seen.freq_hz[seen.tones] * path_m[:, None] / SPEED_OF_LIGHT)
-            image = (mine / rms * turn).mean(axis=0) @ window[:, seen.tones].T / len(seen.tones)
+            turn = np.exp(
+                2j * np.pi * seen.freq_hz[seen.subcarriers] * path_m[:, None] / SPEED_OF_LIGHT
+            )
+            image = (
+                (mine / rms * turn).mean(axis=0)
+                @ window[:, seen.subcarriers].T
+                / len(seen.subcarriers)
+            )
             power[row] += np.abs(image) ** 2 / len(names)
     np.testing.assert_allclose(got, np.sqrt(power), atol=0.01 * np.sqrt(power).max())
 
@@ -158,7 +164,7 @@ def test_the_picture_shows_amplitude_phase_and_what_is_visible() -> None:
     torch.testing.assert_close(picture[:, :, 0], blocks.csi.abs())
     phase = picture[:, :, 1]
     assert (phase[~shown] == 0).all()
-    by_link = phase[shown].reshape(-1, int(seen.tones.sum()))
+    by_link = phase[shown].reshape(-1, int(seen.subcarriers.sum()))
     assert (by_link - by_link[:, :1]).abs().max() < 1e-3
     assert torch.equal(picture[:, :, 2] == 1, shown)
 
@@ -186,7 +192,9 @@ def test_other_radios_are_refused_and_other_places_are_not(tmp_path: Path) -> No
     save_encoder(tmp_path / "wifi.npz", LearnedEncoder.untrained("csi", seen, 0))
     encoder = load_encoder(tmp_path / "wifi.npz")
     for kind in ("cube", "range"):
-        with pytest.raises(RfgsError, match=r"wifi\.npz was made for a radio of 16 tones .* this"):
+        with pytest.raises(
+            RfgsError, match=r"wifi\.npz was made for a radio of 16 subcarriers .* this"
+        ):
             encoder(scattered(kind), near(1))
     shifted = replace(seen, freq_hz=seen.freq_hz + 1e6)
     with pytest.raises(RfgsError, match=r"5\.726"):

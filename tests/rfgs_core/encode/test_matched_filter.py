@@ -18,7 +18,7 @@ FREQ_HZ = 5.72e9 + 2.5e6 * np.arange(64)
 def waves(
     tx_xyz: np.ndarray, rx_xyz: np.ndarray, freq_hz: np.ndarray, point: np.ndarray
 ) -> np.ndarray:
-    """exp(−j k (d_t + d_r)) of every link and tone."""
+    """exp(−j k (d_t + d_r)) of every link and subcarrier."""
     path = np.linalg.norm(tx_xyz - point, axis=1)[:, None] + np.linalg.norm(rx_xyz - point, axis=1)
     return np.exp(-2j * np.pi / SPEED_OF_LIGHT * freq_hz * path[..., None])
 
@@ -31,7 +31,7 @@ def plain(
     freq_hz: np.ndarray,
     points: np.ndarray,
 ) -> np.ndarray:
-    """The module's formula, link by link and tone by tone; (pair, point)."""
+    """The module's formula, link by link and subcarrier by subcarrier; (pair, point)."""
     out = np.zeros((pair.max() + 1, len(points)), np.complex128)
     for index, point in enumerate(points):
         turned = (csi * np.conj(waves(tx_xyz, rx_xyz, freq_hz, point))).mean(axis=2)
@@ -67,12 +67,12 @@ def test_long_paths_alias_as_the_plain_sum_does(small: tuple) -> None:
     assert np.abs(got - expected).max() < 0.01 * np.abs(expected).std()
 
 
-def test_sub_bands_are_the_sums_over_their_tones(small: tuple) -> None:
+def test_sub_bands_are_the_sums_over_their_subcarriers(small: tuple) -> None:
     csi, tx_xyz, rx_xyz, pair, freq_hz = small
     points = np.random.default_rng(2).uniform(0, 4, (40, 3))
     got = matched_filter(*small, points, num_bands=5)
-    for band, tones in enumerate(np.array_split(np.arange(64), 5)):
-        expected = plain(csi[..., tones], tx_xyz, rx_xyz, pair, freq_hz[tones], points)
+    for band, subcarriers in enumerate(np.array_split(np.arange(64), 5)):
+        expected = plain(csi[..., subcarriers], tx_xyz, rx_xyz, pair, freq_hz[subcarriers], points)
         assert np.abs(got[:, band] - expected).max() < 0.01 * np.abs(expected).std()
 
 
@@ -80,7 +80,7 @@ def test_sub_bands_average_to_the_full_band(small: tuple) -> None:
     points = np.random.default_rng(3).uniform(0, 4, (40, 3))
     full = matched_filter(*small, points)[:, 0]
     bands = matched_filter(*small, points, num_bands=7)
-    width = np.array([len(tones) for tones in np.array_split(np.arange(64), 7)]) / 64
+    width = np.array([len(subcarriers) for subcarriers in np.array_split(np.arange(64), 7)]) / 64
     averaged = np.einsum("pbn,b->pn", bands, width)
     assert np.abs(averaged - full).max() < 0.01 * np.abs(full).std()
 
@@ -130,7 +130,7 @@ def test_angle_response_of_an_array() -> None:
     rx_xyz = np.zeros((count, 3))
     rx_xyz[:, 1] = (np.arange(count) - 0.5 * (count - 1)) * 0.5 * wavelength_m
     tx_xyz = np.zeros((1, 3))
-    # Two tones around the centre: practically one frequency, and far away: plane waves.
+    # Two subcarriers around the centre: practically one frequency, and far away: plane waves.
     freq_hz = FREQ_HZ.mean() + np.array([-10.0, 10.0])
     far_m = 3000.0
     csi = waves(tx_xyz, rx_xyz, freq_hz, np.array([far_m, 0.0, 0.0])).astype(np.complex64)
@@ -152,7 +152,7 @@ def test_features_have_rms_norm_one_and_follow_frequency(small: tuple) -> None:
     assert features.dtype == np.float32
     assert (features >= 0).all()
     assert np.mean(np.sum(features.astype(float) ** 2, axis=1)) == pytest.approx(1.0, rel=1e-5)
-    # Only the tones of entry 5 sound: only entry 5 speaks.
+    # Only the subcarriers of entry 5 sound: only entry 5 speaks.
     quiet = np.zeros_like(csi)
     quiet[..., 10:12] = csi[..., 10:12]
     features = matched_filter_features(quiet, tx_xyz, rx_xyz, pair, freq_hz, points)
@@ -174,7 +174,7 @@ def test_features_add_pairs_without_phase(small: tuple) -> None:
     np.testing.assert_allclose(before, expected, rtol=1e-5)
 
 
-def test_fewer_tones_than_features_repeat_sub_bands(small: tuple) -> None:
+def test_fewer_subcarriers_than_features_repeat_sub_bands(small: tuple) -> None:
     csi, tx_xyz, rx_xyz, _, freq_hz = small
     points = np.random.default_rng(7).uniform(0, 4, (20, 3))
     pair = np.zeros((2, 5), np.int64)
@@ -182,8 +182,8 @@ def test_fewer_tones_than_features_repeat_sub_bands(small: tuple) -> None:
     features = matched_filter_features(csi[..., :16], *rest)
     assert features.shape == (20, 32)
     np.testing.assert_array_equal(features[:, ::2], features[:, 1::2])
-    tones = np.abs(matched_filter(csi[..., :16], *rest, 16)[0]).T
-    ratio = features[:, ::2] / tones
+    subcarriers = np.abs(matched_filter(csi[..., :16], *rest, 16)[0]).T
+    ratio = features[:, ::2] / subcarriers
     np.testing.assert_allclose(ratio, ratio[0, 0], rtol=1e-4)
 
 

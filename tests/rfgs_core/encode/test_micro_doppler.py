@@ -17,7 +17,7 @@ def echo(time_s: np.ndarray, velocity: float, amplitude: float, freq_hz: np.ndar
 
 
 def test_two_speeds_peak_where_they_are_with_their_power() -> None:
-    # 26 % bandwidth: at one wavelength for all tones the faster line would be 1 m/s wide.
+    # 26 % bandwidth: at one wavelength for all subcarriers the faster line would be 1 m/s wide.
     freq_hz, time_s = np.linspace(5.0e9, 6.5e9, 12), np.arange(400) * 1e-3
     links = [echo(time_s, 1.2, 1.0, freq_hz), echo(time_s, 1.2, 1.0, freq_hz) * 1j]
     slow = np.stack(links, axis=1)
@@ -39,7 +39,7 @@ def test_windows_stay_within_bursts_of_chirps() -> None:
     found = micro_doppler(echo(time_s, 2.5, 1.0, freq_hz), time_s, freq_hz)
     assert np.allclose(found.time_s, np.arange(3) * 0.1 + 0.5 * 63 * 0.25e-3)
     assert np.allclose(found.velocity_m_s[found.power.argmax(axis=0)], 2.5, atol=0.08)
-    # The largest speed that 4 kHz tells apart at the lowest tone.
+    # The largest speed that 4 kHz tells apart at the lowest subcarrier.
     assert found.velocity_m_s.max() == pytest.approx(SPEED_OF_LIGHT / freq_hz[0] * 1e3)
 
 

@@ -23,8 +23,8 @@ PLACE_M = np.array([1.7, 2.1, 1.2])
 def seen() -> Observations:
     elements = layout(RADIO, place_devices(RADIO, BOUNDS_M))
     nothing = np.zeros((4, 16, 32), np.complex64)
-    links, tones = elements.measured.copy(), np.ones(32, bool)
-    return Observations(nothing, nothing, links, tones, elements, RADIO.freq_hz, BOUNDS_M)
+    links, subcarriers = elements.measured.copy(), np.ones(32, bool)
+    return Observations(nothing, nothing, links, subcarriers, elements, RADIO.freq_hz, BOUNDS_M)
 
 
 def table_of(seen: Observations, pairs: list[tuple[int, int]], place: np.ndarray) -> PathTable:

@@ -37,7 +37,7 @@ def test_hamming_is_numpys_on_a_full_grid() -> None:
     width_hz = GRID_HZ[-1] - GRID_HZ[0]
     window = hamming(GRID_HZ, GRID_HZ.mean(), width_hz)
     np.testing.assert_allclose(window, np.hamming(64), atol=1e-9)
-    # Tones next to a gap keep their place.
+    # Subcarriers next to a gap keep their place.
     kept = np.r_[0:20, 30:64]
     np.testing.assert_array_equal(hamming(GRID_HZ[kept], GRID_HZ.mean(), width_hz), window[kept])
     assert (hamming(GRID_HZ, GRID_HZ[10], 4 * SPACING_HZ)[[7, 13]] == 0).all()
@@ -55,7 +55,7 @@ def test_hamming_pushes_side_lobes_below_40_db() -> None:
 @pytest.mark.parametrize("length_m", [0.0, 3.0, 40.0, 300.0])
 @pytest.mark.parametrize("gaps", ["none", "dc", "sub-bands"])
 def test_one_paths_phase_is_a_line_over_any_gap(length_m: float, gaps: str) -> None:
-    """−2πfτ, up to one whole number of turns for all tones."""
+    """−2πfτ, up to one whole number of turns for all subcarriers."""
     kept = {"none": np.r_[0:64], "dc": np.r_[0:31, 34:64], "sub-bands": np.r_[0:12, 50:64]}[gaps]
     freq_hz, delay_s = GRID_HZ[kept], length_m / 299792458.0
     true = -2 * np.pi * freq_hz * delay_s
@@ -64,7 +64,7 @@ def test_one_paths_phase_is_a_line_over_any_gap(length_m: float, gaps: str) -> N
     np.testing.assert_allclose(turns, np.round(turns[0]), atol=1e-6)
     assert slope == pytest.approx(-2 * np.pi * delay_s, abs=1e-13)
     if gaps == "sub-bands" and length_m == 300.0:
-        # Tone by tone the same phases come out wrong.
+        # Subcarrier by subcarrier the same phases come out wrong.
         naive = (np.unwrap(np.angle(np.exp(1j * true))) - true) / (2 * np.pi)
         assert np.ptp(np.round(naive)) >= 1
 

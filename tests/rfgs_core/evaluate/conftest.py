@@ -75,7 +75,7 @@ class SurfaceRun:
         return self.predict(frame)
 
     def visible_change(self, frame: int, observations: Observations) -> np.ndarray:
-        visible = observations.links[..., None] & observations.tones
+        visible = observations.links[..., None] & observations.subcarriers
         return np.where(visible, observations.delta, np.nan)
 
 

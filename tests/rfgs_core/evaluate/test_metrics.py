@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rfgs_core.evaluate.baselines import CONTROLS
+from rfgs_core.evaluate.baselines import BASELINES
 from rfgs_core.evaluate.geometry import GEOMETRY_KEYS
 from rfgs_core.evaluate.image import IMAGE_KEYS
 from rfgs_core.evaluate.metrics import evaluate_run
@@ -43,7 +43,7 @@ def walk(value: Any, path: str = ""):
 
 
 def test_metrics_hold_every_promised_group(metrics) -> None:
-    for groups in (metrics, *(metrics["controls"][name] for name in (*REQUIRED, *CONTROLS))):
+    for groups in (metrics, *(metrics["baselines"][name] for name in (*REQUIRED, *BASELINES))):
         assert set(groups["geometry"]) == set(GEOMETRY_KEYS)
         assert set(RF_KEYS) <= set(groups["rf"])
         assert set(groups["image"]) == set(IMAGE_KEYS)
@@ -60,7 +60,7 @@ def test_gaussians_on_the_surface_find_it_and_their_channel_counts(metrics) -> N
     # The ball has 1.1 m² of surface, K follows from 1.6 m²: precision suffers a little.
     assert metrics["geometry"]["f10"] > 0.95
     assert metrics["geometry"]["centroid_m"] < 0.03
-    alone = metrics["controls"]["gaussians_alone"]["rf"]
+    alone = metrics["baselines"]["gaussians_alone"]["rf"]
     assert alone["element_snr_db"] == pytest.approx(20.0, abs=1e-3)
     assert alone["subcarrier_snr_db"] == pytest.approx(20.0, abs=1e-3)
     assert alone["device_gain_mae_db"] == pytest.approx(0.915, abs=1e-3)
@@ -68,22 +68,22 @@ def test_gaussians_on_the_surface_find_it_and_their_channel_counts(metrics) -> N
     assert metrics["rf"]["element_snr_db"] > 30.0
     assert metrics["rf"]["subcarrier_snr_db"] > 30.0
     assert metrics["rf"]["device_gain_mae_db"] == pytest.approx(0.915, abs=1e-3)
-    assert metrics["controls"]["zero"]["rf"]["element_snr_db"] == pytest.approx(0.0, abs=1e-9)
+    assert metrics["baselines"]["zero"]["rf"]["element_snr_db"] == pytest.approx(0.0, abs=1e-9)
     assert any(line.startswith(WON) and "matched_filter" in line for line in metrics["verdicts"])
 
 
 def test_missing_values_have_reasons(metrics) -> None:
-    assert "--no-oracle" in metrics["reasons"]["controls.oracle_init"]
+    assert "--no-oracle" in metrics["reasons"]["baselines.oracle_init"]
     if metrics["image"]["lpips"] is None:
         assert metrics["reasons"]["image.lpips"]
-    assert metrics["controls"]["linear"]["geometry"]["f10"] is None
-    assert metrics["reasons"]["controls.linear"]
+    assert metrics["baselines"]["linear"]["geometry"]["f10"] is None
+    assert metrics["reasons"]["baselines.linear"]
 
 
-def test_pictures_have_their_controls(metrics) -> None:
+def test_pictures_have_their_baselines(metrics) -> None:
     assert metrics["image"]["psnr"] is not None
-    silhouette = metrics["controls"]["silhouette"]["image"]
-    empty = metrics["controls"]["empty_room"]["image"]
+    silhouette = metrics["baselines"]["silhouette"]["image"]
+    empty = metrics["baselines"]["empty_room"]["image"]
     # The ball is one colour, so the silhouette is almost the true picture.
     assert silhouette["psnr_person"] > 35.0 > empty["psnr_person"]
     assert silhouette["psnr"] > empty["psnr"]
@@ -101,17 +101,17 @@ def test_a_displaced_fit_is_reported_as_losing(surface_run) -> None:
     assert "half a metre" in line
 
 
-def judged(own: float, control: float, oracle: float | None) -> list[str]:
+def judged(own: float, baseline: float, oracle: float | None) -> list[str]:
     def group(f10: float | None) -> dict[str, Any]:
         return {"geometry": {"f05": f10, "f10": f10}, "rf": {}, "image": {}}
 
-    controls = {name: group(None) for name in CONTROLS} | {
-        "matched_filter": group(control),
-        "matched_filter_different_sum": group(control),
+    baselines = {name: group(None) for name in BASELINES} | {
+        "matched_filter": group(baseline),
+        "matched_filter_different_sum": group(baseline),
         "oracle_init": group(oracle),
     }
     limits = {"range_resolution_m": 0.9, "cross_range_m": 0.6}
-    return verdicts({**group(own), "controls": controls, "limits": limits})
+    return verdicts({**group(own), "baselines": baselines, "limits": limits})
 
 
 def test_a_lost_comparison_says_whether_the_optimisation_is_at_fault() -> None:

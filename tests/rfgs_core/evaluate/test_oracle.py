@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The ceiling control starts on the true surface and nowhere else."""
+"""The ceiling baseline starts on the true surface and nowhere else."""
 
 from __future__ import annotations
 

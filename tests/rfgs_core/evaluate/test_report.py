@@ -19,7 +19,7 @@ HEADINGS = (
     "What the radio measures",
     "Gaussians beside the true mesh",
     "Rendered beside true views",
-    "Every metric beside its controls",
+    "Every metric beside its baselines",
     "Resolution limits",
     "Conditions",
     "Time of each stage",
@@ -70,7 +70,7 @@ def test_radios_without_unseen_elements_have_no_card_of_them(evaluated_run) -> N
     """Arrays of two columns hold none out, so nobody is measured on any."""
     metrics = json.loads((evaluated_run.path / "metrics.json").read_text())
     assert any(card.label == "SNR, unseen elements" for card in _cards(metrics))
-    for part in (metrics, *metrics["controls"].values()):
+    for part in (metrics, *metrics["baselines"].values()):
         part["rf"]["element_snr_db"] = None
     assert not any(card.label == "SNR, unseen elements" for card in _cards(metrics))
 
@@ -85,11 +85,11 @@ def test_tables_mark_the_best_and_say_who_wins(evaluated_run) -> None:
     assert "F10" in text_table(metrics)
 
 
-def test_what_looks_equal_is_no_loss_and_controls_keep_their_order(evaluated_run) -> None:
+def test_what_looks_equal_is_no_loss_and_baselines_keep_their_order(evaluated_run) -> None:
     metrics = json.loads((evaluated_run.path / "metrics.json").read_text())
     metrics["geometry"]["f10"] = 0.70000
-    metrics["controls"]["clean"]["geometry"]["f10"] = 0.70001
-    metrics["controls"]["omp"]["geometry"]["f10"] = 0.8
+    metrics["baselines"]["clean"]["geometry"]["f10"] = 0.70001
+    metrics["baselines"]["omp"]["geometry"]["f10"] = 0.8
     table = metric_tables(metrics)[0]
     line = next(line for line in table.losses if line.startswith("F10:"))
     assert "omp (0.800)" in line and "clean" not in line

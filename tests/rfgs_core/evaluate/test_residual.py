@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rfgs_core.evaluate.baselines import CONTROLS
+from rfgs_core.evaluate.baselines import BASELINES
 from rfgs_core.evaluate.evidence import Evidence
 from rfgs_core.evaluate.residual import Answer, with_residual
 from rfgs_core.measure.observations import Kept
@@ -19,15 +19,15 @@ def always(prediction: np.ndarray, evidence: Evidence):
     """A method that says the same whatever it was fitted to."""
 
     def from_less(kept: Kept) -> Answer:
-        links, tones = kept
-        seen = np.where(links[..., None] & tones, evidence.delta, np.nan)
+        links, subcarriers = kept
+        seen = np.where(links[..., None] & subcarriers, evidence.delta, np.nan)
         return Answer(seen.astype(np.complex64), prediction)
 
     return from_less
 
 
 def error(found: np.ndarray, made) -> float:
-    """Relative error on held-out elements and tones."""
+    """Relative error on held-out elements and subcarriers."""
     hidden = made.held_out.element | made.held_out.subcarrier
     left = np.linalg.norm(found[hidden] - made.delta[hidden])
     return float(left / np.linalg.norm(made.delta[hidden]))
@@ -43,7 +43,7 @@ def test_a_perfect_prediction_stays(scatterers) -> None:
 def test_of_an_empty_prediction_a_part_of_the_spectrum_is_left(scatterers) -> None:
     made = scatterers(ONE)
     layout, nothing = made.evidence.layout, np.zeros_like(made.delta)
-    carried = CONTROLS["spectrum"](made.evidence).delta
+    carried = BASELINES["spectrum"](made.evidence).delta
     assert carried is not None
     found = with_residual(nothing, made.evidence, always(nothing, made.evidence))
     for a, b in layout.device_pairs:
@@ -81,15 +81,15 @@ def test_what_does_not_hold_on_left_out_entries_is_not_believed(scatterers) -> N
         said = np.where(seen, made.delta, noise).astype(np.complex64)
         return Answer(np.where(seen, made.delta, np.nan).astype(np.complex64), said)
 
-    seen = made.evidence.link_visible, made.evidence.tone_visible
+    seen = made.evidence.link_visible, made.evidence.subcarrier_visible
     found = with_residual(repeats(seen).predicted, made.evidence, repeats)
-    carried = CONTROLS["spectrum"](made.evidence).delta
+    carried = BASELINES["spectrum"](made.evidence).delta
     assert carried is not None
     assert error(found, made) < 1.5 * error(carried, made)
 
 
 def test_as_much_is_left_out_as_is_held_out(scatterers) -> None:
-    """Two of eight columns, and an eighth of the tones amid others."""
+    """Two of eight columns, and an eighth of the subcarriers amid others."""
     made, asked = scatterers(ONE), []
 
     def remembers(kept: Kept) -> Answer:
@@ -97,12 +97,12 @@ def test_as_much_is_left_out_as_is_held_out(scatterers) -> None:
         return always(np.zeros_like(made.delta), made.evidence)(kept)
 
     with_residual(np.zeros_like(made.delta), made.evidence, remembers)
-    ((links, tones),) = asked
+    ((links, subcarriers),) = asked
     column, seen = made.evidence.layout.rx_column, made.evidence.link_visible
     np.testing.assert_array_equal(links, seen & (column < 4))
     assert seen[:, column == 5].any() and not seen[:, column >= 6].any()
-    assert np.flatnonzero(~made.evidence.tone_visible).tolist() == [20, 21, 22, 23]
-    assert np.flatnonzero(~tones).tolist() == [8, 9, 10, 11, 20, 21, 22, 23]
+    assert np.flatnonzero(~made.evidence.subcarrier_visible).tolist() == [20, 21, 22, 23]
+    assert np.flatnonzero(~subcarriers).tolist() == [8, 9, 10, 11, 20, 21, 22, 23]
 
 
 def test_without_columns_to_leave_out_the_residual_is_carried_on(scatterers) -> None:
@@ -115,7 +115,7 @@ def test_without_columns_to_leave_out_the_residual_is_carried_on(scatterers) -> 
         link_visible=made.evidence.link_visible & (made.evidence.layout.rx_column == 0),
     )
     found = with_residual(nothing, one, always(nothing, one))
-    carried = CONTROLS["spectrum"](one).delta
+    carried = BASELINES["spectrum"](one).delta
     assert carried is not None
     pair = made.evidence.layout.measured & ~made.held_out.pair_links
     hidden = pair & (made.evidence.layout.rx_column == 1)

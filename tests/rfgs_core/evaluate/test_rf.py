@@ -43,7 +43,7 @@ def test_kinds_of_held_out_entries_do_not_overlap() -> None:
     held = held_out()
     pair = np.repeat(held.pair_links[:, :, None], 16, axis=2)
     total = held.element.astype(int) + held.subcarrier + held.visible + pair
-    # Only held-out tones of held-out elements belong to none of them.
+    # Only held-out subcarriers of held-out elements belong to none of them.
     corner = held.element_links[:, :, None] & np.isin(np.arange(16), [5, 6])
     np.testing.assert_array_equal(total, 1 - corner)
 
@@ -89,9 +89,9 @@ def test_errors_of_visible_entries_do_not_count() -> None:
 
 
 def test_delay_profiles_of_different_paths_do_not_correlate() -> None:
-    tone = np.arange(16)
-    true = np.ones((2, 8, 1)) * np.exp(-2j * np.pi * tone * 3 / 16)
-    other = np.ones((2, 8, 1)) * np.exp(-2j * np.pi * tone * 11 / 16)
+    subcarrier = np.arange(16)
+    true = np.ones((2, 8, 1)) * np.exp(-2j * np.pi * subcarrier * 3 / 16)
+    other = np.ones((2, 8, 1)) * np.exp(-2j * np.pi * subcarrier * 11 / 16)
     value = rf_values(score(true, other))["delay_profile_corr"]
     assert value is not None and value < 0.1
 

@@ -116,7 +116,7 @@ def test_predictions_are_those_of_devices_with_the_captures_offsets(calibrated: 
 def test_a_calibrated_run_is_tried_on_what_its_own_fit_sees(calibrated: Run) -> None:
     """The drift of a frame is no change, and both sides have the offsets of the capture."""
     seen = calibrated.observations(1)
-    visible = seen.links[..., None] & seen.tones
+    visible = seen.links[..., None] & seen.subcarriers
     change = calibrated.visible_change(1, seen)
     np.testing.assert_array_equal(np.isfinite(change), visible)
     turn = read_calibration(calibrated.path, 1).capture.turn(seen.layout, seen.freq_hz)
@@ -136,7 +136,7 @@ def test_echoes_alone_tell_offsets_too(calibrated: Run, quick_config: TrainConfi
     change = explained_change(seen, solved_frame(seen, config, 0))
     shape = np.vdot(change, seen.delta) / np.linalg.norm(change) / np.linalg.norm(seen.delta)
     assert 0.75 < abs(shape) < 1 - 1e-6
-    assert not change[~seen.links].any() and not change[..., ~seen.tones].any()
+    assert not change[~seen.links].any() and not change[..., ~seen.subcarriers].any()
     found = estimate_offsets(CrossSpectra.of(seen, seen.delta, change), pooled=True)
     assert np.rad2deg(np.abs(found.phase_rad)).max() < 6.0
     assert np.abs(found.delay_s).max() < 310e-12

@@ -81,9 +81,9 @@ def test_a_silent_pair_is_not_trusted_without_end(observations) -> None:
 
 
 def test_target_keeps_the_order_of_links(observations) -> None:
-    channel = Channel.of(observations, observations.links, observations.tones)
-    tones = np.flatnonzero(observations.tones)
-    expected = observations.delta[channel.tx, channel.rx][:, tones]
+    channel = Channel.of(observations, observations.links, observations.subcarriers)
+    subcarriers = np.flatnonzero(observations.subcarriers)
+    expected = observations.delta[channel.tx, channel.rx][:, subcarriers]
     np.testing.assert_array_equal(comparison_of(observations).measured(), expected)
 
 

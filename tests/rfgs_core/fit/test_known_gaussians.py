@@ -60,7 +60,7 @@ def test_fifty_known_gaussians_are_recovered(
     head = RadioHead.create(0, wavelength_m, 0.02, 0.05)
     truth = scatterers(head, rng)
     empty = make_observations(radio=radio)
-    channel = Channel.of(empty, empty.links, empty.tones)
+    channel = Channel.of(empty, empty.links, empty.subcarriers)
     delta = np.zeros_like(empty.delta)
     delta[channel.tx, channel.rx] = channel.change(head, truth).numpy()
     observations = empty.with_delta(delta)

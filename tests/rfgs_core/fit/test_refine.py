@@ -24,7 +24,7 @@ from rfgs_core.settings import TrainConfig
 
 def cost(observations: Observations, state: FrameState, config: TrainConfig) -> float:
     """Channel loss over all visible links."""
-    channel = Channel.of(observations, observations.links, observations.tones)
+    channel = Channel.of(observations, observations.links, observations.subcarriers)
     target = comparison_of(observations).measured()
     noise = noise_per_link(observations, target, config.unexplained)
     return channel_loss(channel.change(state.head, state.gaussians), target, noise).item()

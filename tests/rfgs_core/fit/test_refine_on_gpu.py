@@ -73,7 +73,7 @@ def test_a_step_meets_no_tensor_of_another_device(
 ) -> None:
     """Tensors of the device `meta` hold nothing, but refuse to meet those of the CPU."""
     monkeypatch.setattr("rfgs_core.propagation._twin", lambda backend, device: reference)
-    profile = np.abs(delay_amplitude(observations.static, observations.tones))
+    profile = np.abs(delay_amplitude(observations.static, observations.subcarriers))
     seen = replace(observations, kind=kind, delay_change=profile)
     config = replace(quick_config, objective="both")
     task = Task.of(seen, config, 0, MATCHED_FILTER)
@@ -100,7 +100,7 @@ needs_gpu = pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a CU
 def test_a_gpu_descends_as_the_cpu_does(
     kind, observations: Observations, state: FrameState, quick_config
 ) -> None:
-    profile = np.abs(delay_amplitude(observations.static, observations.tones))
+    profile = np.abs(delay_amplitude(observations.static, observations.subcarriers))
     seen = replace(observations, kind=kind, delay_change=profile)
     ends = []
     for device in ("cpu", "cuda"):

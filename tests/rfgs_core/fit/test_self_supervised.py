@@ -79,13 +79,13 @@ def test_masks_hide_runs_and_nothing_else(frames) -> None:
     assert (seen.csi[hidden] == 0).all()
     assert torch.equal(seen.csi[~hidden], full.csi[~hidden])
     for pair in hidden:
-        tones = pair.all(dim=1).all(dim=0)
+        subcarriers = pair.all(dim=1).all(dim=0)
         antennas = pair.all(dim=2).all(dim=0)
-        assert tones.sum() == 2
+        assert subcarriers.sum() == 2
         assert antennas.sum() == 2
-        for run in (tones, antennas):
+        for run in (subcarriers, antennas):
             assert run.nonzero().diff(dim=0).abs().max() == 1
-        assert torch.equal(pair, (tones | antennas[:, None]).expand_as(pair))
+        assert torch.equal(pair, (subcarriers | antennas[:, None]).expand_as(pair))
 
 
 @pytest.fixture

@@ -49,7 +49,7 @@ def noise(shape: tuple[int, ...], power: float, seed: int) -> np.ndarray:
 
 
 def passing(speed_m_s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Change, links and tones of a point that approaches the first radar, seen by that one."""
+    """Change, links and subcarriers of a point that approaches the first radar, as it sees it."""
     elements = layout(RADAR, place_devices(RADAR, BOUNDS_M))
     own = elements.measured & (elements.tx_device == 0)[:, None]
     radar = elements.rx_xyz[elements.rx_device == 0].mean(axis=0)
@@ -60,18 +60,18 @@ def passing(speed_m_s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     back = np.linalg.norm(places[:, None] - elements.rx_xyz, axis=2)
     path_m = out[:, :, None] + back[:, None]
     wave = np.exp(-2j * np.pi * path_m[..., None] * RADAR.freq_hz / SPEED_OF_LIGHT)
-    tones = np.ones(RADAR.num_subcarriers, bool)
-    tones[30:36] = False
-    return (wave * (own[..., None] & tones)).astype(np.complex64), own, tones
+    subcarriers = np.ones(RADAR.num_subcarriers, bool)
+    subcarriers[30:36] = False
+    return (wave * (own[..., None] & subcarriers)).astype(np.complex64), own, subcarriers
 
 
 def test_noise_is_told_from_an_echo_a_thousand_times_stronger() -> None:
-    tones = np.ones(160, bool)
-    tones[20:30] = False
+    subcarriers = np.ones(160, bool)
+    subcarriers[20:30] = False
     echo = np.exp(2j * np.pi * (0.13 * np.arange(COUNT)[:, None, None] + 0.21 * np.arange(160)))
     change = 30.0 * echo + noise((COUNT, 12, 160), 1.0, 0)
-    assert noise_power(change, tones) == pytest.approx(1.0, rel=0.05)
-    assert noise_power(change - noise((COUNT, 12, 160), 1.0, 0), tones) < 1e-6 * 900
+    assert noise_power(change, subcarriers) == pytest.approx(1.0, rel=0.05)
+    assert noise_power(change - noise((COUNT, 12, 160), 1.0, 0), subcarriers) < 1e-6 * 900
 
 
 @pytest.mark.parametrize("speed_m_s", [0.0, 1.5, -3.2])
@@ -90,16 +90,16 @@ def test_the_filter_errs_as_little_as_theory_allows() -> None:
     """E|x̂ − x₀|² = r(0) − r₀ᴴ (R + σ²I)⁻¹ r₀ of a process with a known spectrum."""
     cells, power, level = 20_000, np.zeros(DOPPLER_GRID * COUNT), 3.0
     power[[2, 3, 4, 20]] = 8.0, 16.0, 8.0, 4.0
-    tone = np.exp(2j * np.pi * np.outer(np.arange(COUNT), np.arange(len(power))) / len(power))
+    subcarrier = np.exp(2j * np.pi * np.outer(np.arange(COUNT), np.arange(len(power))) / len(power))
     amplitude = noise((len(power), cells), 1.0, 1) * np.sqrt(power / len(power))[:, None]
-    true = tone @ amplitude
+    true = subcarrier @ amplitude
     heard = np.arange(COUNT) != 5
     seen = np.where(heard[:, None], true + noise(true.shape, level, 2), 0)
     spectrum = np.broadcast_to(power[:, None], (len(power), cells))
     found = wiener_estimate(seen.astype(np.complex64), spectrum, level, heard)[0]
-    basis = tone[heard] * np.sqrt(power / len(power))
+    basis = subcarrier[heard] * np.sqrt(power / len(power))
     covariance = basis @ basis.conj().T
-    towards = basis @ (np.sqrt(power / len(power)) * tone[0]).conj()
+    towards = basis @ (np.sqrt(power / len(power)) * subcarrier[0]).conj()
     total = covariance + level * np.eye(heard.sum())
     least = power.mean() - np.real(towards.conj() @ np.linalg.solve(total, towards))
     assert least < 0.5 * power.mean()
@@ -120,27 +120,27 @@ def test_who_stands_still_gains_the_number_of_packets() -> None:
 
 def test_an_echo_comes_out_of_noise_and_noise_alone_stays_out() -> None:
     """Of noise ten times the echo in every entry less than a thirtieth is left."""
-    change, own, tones = passing(1.0)
+    change, own, subcarriers = passing(1.0)
     elements = layout(RADAR, place_devices(RADAR, BOUNDS_M))
     dirt = noise(change.shape, 10.0, 5).astype(np.complex64)
-    found = change_of_packets(change + dirt, own, tones, elements)
-    visible = own[..., None] & tones
+    found = change_of_packets(change + dirt, own, subcarriers, elements)
+    visible = own[..., None] & subcarriers
     error = np.mean(np.abs(found - change)[:, visible] ** 2, axis=1)
     # Packets in the middle know those before and after them.
     assert error[COUNT // 2] < 0.7 * error[0] and error[0] < 10.0 / 30
     assert (found[:, ~visible] == 0).all()
-    alone = change_of_packets(dirt, own, tones, elements)[:, visible]
+    alone = change_of_packets(dirt, own, subcarriers, elements)[:, visible]
     assert np.mean(np.abs(alone) ** 2) < 1e-3 * 10.0
     # Without its first packet the echo at that time is still known.
     lost = change + dirt
     lost[0] = np.nan
-    late = change_of_packets(lost, own, tones, elements)
+    late = change_of_packets(lost, own, subcarriers, elements)
     assert np.mean(np.abs(late[0] - change[0])[visible] ** 2) < 10.0 / 20
 
 
 def test_links_that_may_not_be_read_are_not() -> None:
     """Also one among the visible links of its device pair, and whatever it holds."""
-    change, own, tones = passing(1.0)
+    change, own, subcarriers = passing(1.0)
     elements = layout(RADAR, place_devices(RADAR, BOUNDS_M))
     dirty = change + noise(change.shape, 10.0, 7).astype(np.complex64)
     links = own.copy()
@@ -149,19 +149,19 @@ def test_links_that_may_not_be_read_are_not() -> None:
     found = []
     for value in (0.0, 1e3, np.nan):
         dirty[:, tx, rx] = value
-        found.append(change_of_packets(dirty, links, tones, elements))
+        found.append(change_of_packets(dirty, links, subcarriers, elements))
         np.testing.assert_array_equal(found[-1], found[0])
     assert found[0].any() and not found[0][:, tx, rx].any()
 
 
 def test_without_noise_packets_stay_as_they_are() -> None:
-    change, own, tones = passing(1.0)
+    change, own, subcarriers = passing(1.0)
     elements = layout(RADAR, place_devices(RADAR, BOUNDS_M))
-    np.testing.assert_array_equal(change_of_packets(change, own, tones, elements), change)
+    np.testing.assert_array_equal(change_of_packets(change, own, subcarriers, elements), change)
     # A little noise: the filter runs, and errs less than the noise it meets.
     dirt = noise(change.shape, 1e-4, 6).astype(np.complex64)
-    found = change_of_packets(change + dirt, own, tones, elements)
-    error = np.mean(np.abs(found - change)[:, own[..., None] & tones] ** 2)
+    found = change_of_packets(change + dirt, own, subcarriers, elements)
+    error = np.mean(np.abs(found - change)[:, own[..., None] & subcarriers] ** 2)
     assert 0 < error < 1e-4
 
 
@@ -214,12 +214,12 @@ def test_the_fit_and_its_controls_see_the_same_estimate(
     raw = observe(walking(), "wifi", frame, "impaired")
     # Links that lost their first packet are known from the others.
     assert seen.links.sum() == clean.links.sum() > raw.links.sum()
-    both = raw.links[..., None] & raw.tones
+    both = raw.links[..., None] & raw.subcarriers
     error = [np.mean(np.abs(one.delta - clean.delta)[both] ** 2) for one in (seen, raw)]
     assert error[0] < 0.5 * error[1]
     scene = Scene.of(run)
     evidence = scene.evidence(frame, np.ones(scene.grid.shape, np.float32))
-    heard = seen.links[..., None] & seen.tones
+    heard = seen.links[..., None] & seen.subcarriers
     np.testing.assert_allclose(evidence.delta[heard], seen.delta[heard], rtol=1e-6)
     assert np.isnan(evidence.delta[~heard]).all()
     # The truth is still the clean channel at the frame's own time.
@@ -232,7 +232,7 @@ def test_the_room_is_learned_from_all_packets(walking: Callable[[], Sequence], m
     sequence = walking()
     seen = observe(sequence, "wifi", 1)
     room = learned_background(sequence, "wifi", "clean", "complex", "all")
-    visible = seen.links[..., None] & seen.tones
+    visible = seen.links[..., None] & seen.subcarriers
     np.testing.assert_allclose(room[visible], seen.static[visible], rtol=1e-4, atol=1e-9)
     first = learned_background(sequence, "wifi", "clean", "complex")
     assert np.abs(first - room)[visible].max() > 1e2 * np.abs(room - seen.static)[visible].max()

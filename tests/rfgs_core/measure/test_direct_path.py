@@ -32,10 +32,10 @@ def test_friis_has_gain_one(make_observations) -> None:
     np.testing.assert_allclose(got, np.ones(16), atol=1e-5)
 
 
-def test_each_pairs_factor_is_found_without_held_out_tones(make_observations, gain) -> None:
-    tones = np.ones(32, bool)
-    tones[20:24] = False
-    observations = make_observations(gain=gain, tones=tones)
+def test_each_pairs_factor_is_found_without_held_out_subcarriers(make_observations, gain) -> None:
+    subcarriers = np.ones(32, bool)
+    subcarriers[20:24] = False
+    observations = make_observations(gain=gain, subcarriers=subcarriers)
     pair, names = observations.pairs
     got = direct_gain(observations, pair, len(names))
     np.testing.assert_allclose(got, [gain[a, b] for a, b in names], rtol=1e-5)

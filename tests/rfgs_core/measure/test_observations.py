@@ -22,9 +22,9 @@ def test_held_out_entries_are_zero_and_the_rest_is_the_data(tiny_dataset: Path) 
     split = sequence.splits["rf"]["wifi"]
     seen = observe(sequence, "wifi", 2)
     csi, static = sequence.csi("wifi", 2), sequence.csi_static("wifi")
-    # Held out: the last of four columns of 2 elements, 2 of 16 tones, one pair both ways.
+    # Held out: the last of four columns of 2 elements, 2 of 16 subcarriers, one pair both ways.
     assert len(split["rx_elements"]) == 8
-    assert (~seen.tones).nonzero()[0].tolist() == [10, 11]
+    assert (~seen.subcarriers).nonzero()[0].tolist() == [10, 11]
     assert seen.links.sum() == 4 * 24 - 2 * 6
     ((a, b),) = split["device_pairs"]
     for tx in range(4):
@@ -32,7 +32,7 @@ def test_held_out_entries_are_zero_and_the_rest_is_the_data(tiny_dataset: Path) 
             pair = {int(seen.layout.tx_device[tx]), int(seen.layout.rx_device[rx])}
             expected = rx not in split["rx_elements"] and pair != {a, b}
             assert seen.links[tx, rx] == expected
-    keep = seen.links[..., None] & seen.tones
+    keep = seen.links[..., None] & seen.subcarriers
     np.testing.assert_array_equal(seen.delta[keep], (csi - static)[keep])
     np.testing.assert_array_equal(seen.static[keep], static[keep])
     assert (seen.delta[~keep] == 0).all()
@@ -52,7 +52,7 @@ def test_visible_nan_is_refused_and_hidden_nan_is_not_read(own_dataset: Path) ->
         array[0] = values
         write_json(files.csi_done("wifi", 1), {"sha256": digest(values)})
 
-    hidden = ~(clean.links[..., None] & clean.tones)
+    hidden = ~(clean.links[..., None] & clean.subcarriers)
     poison(hidden)
     again = observe(sequence, "wifi", 1)
     np.testing.assert_array_equal(again.delta, clean.delta)

@@ -50,9 +50,9 @@ def test_the_turn_is_that_of_the_factory(make_observations) -> None:
 
 
 def test_offsets_are_found_exactly_without_noise(make_observations) -> None:
-    tones = np.ones(32, bool)
-    tones[4:8] = False
-    observations = make_observations(tones=tones)
+    subcarriers = np.ones(32, bool)
+    subcarriers[4:8] = False
+    observations = make_observations(subcarriers=subcarriers)
     spectra = CrossSpectra.of(observations, turned(observations), direct_channel(observations))
     found = estimate_offsets(spectra)
     np.testing.assert_allclose(np.rad2deg(found.phase_rad - PHASE_RAD), 0, atol=0.01)
@@ -75,7 +75,7 @@ def test_each_kind_alone(make_observations) -> None:
 
 
 def test_errors_under_noise_meet_the_cramer_rao_bound(make_observations) -> None:
-    """N devices, all ordered pairs alike with E = links · tones · SNR each.
+    """N devices, all ordered pairs alike with E = links · subcarriers · SNR each.
 
     The information on φ_a − φ_b from both directions is w = 4E, and a complete graph of N gives
     φ_d − φ_0 the variance 2/(N w); for delays E is weighted by (2π(f − f_c))².
@@ -125,7 +125,7 @@ def test_models_count_by_what_all_their_pairs_leave_unexplained(make_observation
     coherences, spectra = (0.9, 0.6), []
     for ahead, coherence in zip((0 * apart, apart), coherences, strict=True):
         turn = Offsets(PHASE_RAD + ahead, np.zeros(4)).turn(layout, observations.freq_hz)
-        # Signs that alternate from tone to tone are orthogonal to the model.
+        # Signs that alternate from subcarrier to subcarrier are orthogonal to the model.
         other = np.sqrt(1 - coherence**2) * (-1.0) ** np.arange(turn.shape[2])
         share = np.where(exact, 1.0, coherence + other) * between[..., None]
         spectra.append(CrossSpectra.of(observations, model * turn * share, model))

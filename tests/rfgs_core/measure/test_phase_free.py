@@ -42,9 +42,11 @@ def reports(seen: Observations, delta: np.ndarray, kind: str) -> Observations:
     now, empty = seen.static + delta, seen.static
     if kind == "power":
         wave = direct_wave(seen.layout, seen.freq_hz)
-        change = hologram(np.abs(now), np.abs(empty), seen.tones, wave)
+        change = hologram(np.abs(now), np.abs(empty), seen.subcarriers, wave)
         return replace(seen, delta=change, kind="power")
-    change = np.abs(delay_amplitude(now, seen.tones) - delay_amplitude(empty, seen.tones))
+    change = np.abs(
+        delay_amplitude(now, seen.subcarriers) - delay_amplitude(empty, seen.subcarriers)
+    )
     return replace(seen, delay_change=change, kind="delay_power")
 
 
@@ -55,7 +57,7 @@ def test_a_hologram_is_the_change_and_its_twin(make_observations) -> None:
     delta = echo(seen, PLACE_M, small)
     wave = direct_wave(seen.layout, seen.freq_hz)
     flat = np.abs(seen.static).mean(axis=2, keepdims=True) * wave
-    got = hologram(np.abs(flat + delta), np.abs(flat), seen.tones, wave)
+    got = hologram(np.abs(flat + delta), np.abs(flat), seen.subcarriers, wave)
     expected = delta + wave**2 * delta.conj() + wave * np.abs(delta) ** 2 / np.abs(flat)
     np.testing.assert_allclose(got, expected, atol=1e-3 * small)
 
@@ -90,7 +92,7 @@ def test_the_comparison_of_the_true_change_is_what_is_reported(make_observations
     delta = echo(seen, PLACE_M, 1e-3)
     comparison = comparison_of(reports(seen, delta, kind))
     rows = np.arange(int(seen.links.sum()))
-    change = torch.from_numpy(delta[seen.links][:, seen.tones].astype(np.complex64))
+    change = torch.from_numpy(delta[seen.links][:, seen.subcarriers].astype(np.complex64))
     got, want = comparison.predicted(change, rows), comparison.measured()
     torch.testing.assert_close(got, want, rtol=1e-3, atol=1e-3 * float(want.abs().max()))
     linear = comparison.linear(1e-3 * change)
@@ -107,18 +109,18 @@ def test_profiles_bound_the_change_from_below(make_observations) -> None:
     seen = make_observations()
     delta = echo(seen, PLACE_M, 1e-3)
     change = reports(seen, delta, "delay_power").delay_change
-    bound = delay_amplitude(delta, seen.tones)
+    bound = delay_amplitude(delta, seen.subcarriers)
     assert (change <= bound * (1 + 1e-4) + 1e-9).all()
 
 
-def test_learned_encoders_are_refused_without_tones(make_observations) -> None:
+def test_learned_encoders_are_refused_without_subcarriers(make_observations) -> None:
     seen = reports(make_observations(), echo(make_observations(), PLACE_M, 1e-3), "delay_power")
     # Any encoder but the default one stands for a learned one.
-    with pytest.raises(RfgsError, match="learned encoder reads the channel over tones"):
+    with pytest.raises(RfgsError, match="learned encoder reads the channel over subcarriers"):
         encode(seen, PLACE_M[None], MatchedFilter())
 
 
-def turn_phases(dataset: Path, per_tone: bool) -> None:
+def turn_phases(dataset: Path, per_subcarrier: bool) -> None:
     """Multiplies random quarter turns, which are exact, onto every stored channel."""
     files = SequenceFiles(dataset / "tiny")
     store, rng = files.csi("wifi"), np.random.default_rng(3)
@@ -126,7 +128,7 @@ def turn_phases(dataset: Path, per_tone: bool) -> None:
     for frame in (1, 2, None):
         name = "csi" if frame else "csi_static"
         value = sequence.csi("wifi", frame) if frame else sequence.csi_static("wifi")
-        shape = value.shape if per_tone else (*value.shape[:-1], 1)
+        shape = value.shape if per_subcarrier else (*value.shape[:-1], 1)
         value = (value * np.array([1, 1j, -1, -1j])[rng.integers(4, size=shape)]).astype(
             value.dtype
         )
@@ -135,13 +137,13 @@ def turn_phases(dataset: Path, per_tone: bool) -> None:
         write_json(files.csi_done("wifi", frame), {"sha256": digest(value)})
 
 
-@pytest.mark.parametrize(("kind", "per_tone"), [("power", True), ("delay_power", False)])
+@pytest.mark.parametrize(("kind", "per_subcarrier"), [("power", True), ("delay_power", False)])
 def test_no_stage_reads_a_phase(
-    tiny_dataset: Path, own_dataset: Path, train, quick_config, tmp_path, kind, per_tone
+    tiny_dataset: Path, own_dataset: Path, train, quick_config, tmp_path, kind, per_subcarrier
 ) -> None:
     config = replace(quick_config, observe=kind)
     run = train(tiny_dataset, tmp_path / "plain", config)
-    turn_phases(own_dataset, per_tone)
+    turn_phases(own_dataset, per_subcarrier)
     turned = train(own_dataset, tmp_path / "turned", config)
     before, after = (open_dataset(d).sequence().csi("wifi", 1) for d in (tiny_dataset, own_dataset))
     assert not np.allclose(before, after)

@@ -19,7 +19,7 @@ def head() -> RadioHead:
 
 def test_rows_are_slices_of_the_whole(make_observations, make_gaussians, head) -> None:
     observations = make_observations()
-    channel = Channel.of(observations, observations.links, observations.tones)
+    channel = Channel.of(observations, observations.links, observations.subcarriers)
     whole = channel.change(head, make_gaussians(12))
     assert whole.shape == (256, 32)
     # Neither contiguous nor ascending: links with and without a direct path.
@@ -33,23 +33,25 @@ def test_rows_are_slices_of_the_whole(make_observations, make_gaussians, head) -
     assert len(part.paths) == np.isin(channel.paths.link.numpy(), chosen).sum()
 
 
-def test_tones_and_links_are_slices_of_the_whole(make_observations, make_gaussians, head) -> None:
+def test_subcarriers_and_links_are_slices_of_the_whole(
+    make_observations, make_gaussians, head
+) -> None:
     gaussians = make_gaussians(9)
     everything = make_observations()
-    channel = Channel.of(everything, everything.links, everything.tones)
+    channel = Channel.of(everything, everything.links, everything.subcarriers)
     whole = np.zeros((4, 64, 32), np.complex64)
     whole[channel.tx, channel.rx] = channel.change(head, gaussians).numpy()
-    tones = np.ones(32, bool)
-    tones[[0, 7, 8, 9, 31]] = False
+    subcarriers = np.ones(32, bool)
+    subcarriers[[0, 7, 8, 9, 31]] = False
     links = np.random.default_rng(1).random((4, 64)) < 0.4
-    part = Channel.of(everything, links, tones)
+    part = Channel.of(everything, links, subcarriers)
     got = part.change(head, gaussians).numpy()
-    np.testing.assert_allclose(got, whole[links][:, tones], rtol=1e-5, atol=1e-9)
+    np.testing.assert_allclose(got, whole[links][:, subcarriers], rtol=1e-5, atol=1e-9)
 
 
 def test_the_change_is_scattering_plus_shadow(make_observations, make_gaussians, head) -> None:
     observations = make_observations()
-    channel = Channel.of(observations, observations.links, observations.tones)
+    channel = Channel.of(observations, observations.links, observations.subcarriers)
     gaussians = make_gaussians(12)
     scattered, shadowed = channel.scattered(head, gaussians), channel.shadowed(head, gaussians)
     torch.testing.assert_close(channel.change(head, gaussians), scattered + shadowed)
@@ -66,7 +68,7 @@ def test_a_given_reflectivity_replaces_that_of_the_features(
     make_observations, make_gaussians, head
 ) -> None:
     observations = make_observations()
-    channel = Channel.of(observations, observations.links, observations.tones)
+    channel = Channel.of(observations, observations.links, observations.subcarriers)
     gaussians = make_gaussians(5)
     own = channel.scattered(head, gaussians)
     gamma = head.gamma(gaussians.features)
@@ -79,7 +81,7 @@ def test_an_opaque_screen_takes_away_the_direct_path(make_observations, head) ->
     observations = make_observations()
     elements = observations.layout
     chosen = (elements.tx_device[:, None] == 0) & (elements.rx_device == 2)
-    channel = Channel.of(observations, chosen, observations.tones)
+    channel = Channel.of(observations, chosen, observations.subcarriers)
     a, b = elements.tx_xyz[0], elements.rx_xyz[elements.rx_device == 2].mean(axis=0)
     along = (b - a) / np.linalg.norm(b - a)
     side = np.cross(along, [0.0, 0.0, 1.0])

@@ -9,7 +9,7 @@ import torch
 
 from rfgs_core.measure.observations import Observations
 from rfgs_core.model.delay_power import DelayPowerModel, power_maps
-from rfgs_core.propagation import Links, Tones, scatter
+from rfgs_core.propagation import Links, Subcarriers, scatter
 from rfgs_core.radio import preset
 
 POINTS = np.array([[1.2, 1.0, 0.8], [2.4, 2.0, 1.2], [1.9, 1.6, 1.6], [2.7, 1.1, 0.5]])
@@ -18,14 +18,14 @@ TOLERANCE = 0.02
 
 
 def channels(observations: Observations, points: np.ndarray) -> np.ndarray:
-    """What points of unit reflectivity scatter on the visible entries, (point, tx, rx, tone)."""
+    """What points of unit reflectivity scatter on visible entries, (point, tx, rx, subcarrier)."""
     tx, rx = np.nonzero(observations.links)
     links = Links(
         torch.from_numpy(observations.layout.tx_xyz[tx]),
         torch.from_numpy(observations.layout.rx_xyz[rx]),
     )
     freq_hz = observations.freq_hz
-    tones = Tones(float(freq_hz[0]), float(freq_hz[1] - freq_hz[0]), len(freq_hz))
+    subcarriers = Subcarriers(float(freq_hz[0]), float(freq_hz[1] - freq_hz[0]), len(freq_hz))
     result = np.zeros((len(points), *observations.delta.shape), np.complex64)
     for index, point in enumerate(points):
         csi = scatter(
@@ -34,17 +34,17 @@ def channels(observations: Observations, points: np.ndarray) -> np.ndarray:
             torch.full((1, 3), 1e-6, dtype=torch.float64),
             torch.ones(1, 1, dtype=torch.complex128),
             links,
-            tones,
+            subcarriers,
         )
         result[index, tx, rx] = csi.numpy()
-    return result * observations.tones
+    return result * observations.subcarriers
 
 
 @pytest.fixture
 def observations(make_observations) -> Observations:
-    tones = np.ones(32, bool)
-    tones[20:24] = False
-    return make_observations(tones=tones)
+    subcarriers = np.ones(32, bool)
+    subcarriers[20:24] = False
+    return make_observations(subcarriers=subcarriers)
 
 
 @pytest.mark.parametrize("name", ["small", "mmwave"])

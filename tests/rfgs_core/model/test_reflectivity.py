@@ -20,10 +20,10 @@ def head() -> RadioHead:
 
 @pytest.fixture
 def channel(make_observations) -> Channel:
-    tones = np.ones(32, bool)
-    tones[20:24] = False
-    observations = make_observations(tones=tones)
-    return Channel.of(observations, observations.links, tones)
+    subcarriers = np.ones(32, bool)
+    subcarriers[20:24] = False
+    observations = make_observations(subcarriers=subcarriers)
+    return Channel.of(observations, observations.links, subcarriers)
 
 
 def complex_normal(*size: int, seed: int = 0) -> torch.Tensor:
@@ -32,7 +32,7 @@ def complex_normal(*size: int, seed: int = 0) -> torch.Tensor:
 
 
 def dense(channel: Channel, head: RadioHead, gaussians: Gaussians) -> np.ndarray:
-    """The channel of unit reflectivities, (link · tone, Gaussian)."""
+    """The channel of unit reflectivities, (link · subcarrier, Gaussian)."""
     columns = []
     for index in range(len(gaussians)):
         gamma = torch.zeros(len(gaussians), dtype=torch.complex64)

@@ -25,8 +25,8 @@ def test_one_gaussian_has_the_power_of_its_own_channel(
     gaussians.logit_opacities = torch.full((1,), -20.0)
     empty = make_observations()
     middle = len(empty.freq_hz) // 2
-    tones = np.arange(len(empty.freq_hz)) == middle
-    channel = Channel.of(empty, empty.layout.measured, tones)
+    subcarriers = np.arange(len(empty.freq_hz)) == middle
+    channel = Channel.of(empty, empty.layout.measured, subcarriers)
     with torch.no_grad():
         change = channel.change(head, gaussians).numpy()[:, 0]
     power = np.abs(head.gamma(gaussians.features).numpy()) ** 2

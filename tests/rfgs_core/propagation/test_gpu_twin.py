@@ -12,7 +12,7 @@ import torch
 
 pytest.importorskip("triton", reason="kernels for a GPU need triton: pip install triton")
 
-from rfgs_core.propagation import Links, Tones, gpu, scatter, shadow
+from rfgs_core.propagation import Links, Subcarriers, gpu, scatter, shadow
 
 DEVICE = torch.device("cuda" if torch.cuda.is_available() else "cpu")
 SCATTER = ("means", "quats", "scales_rf", "gamma", "normals", "visibility")
@@ -28,10 +28,12 @@ def test_scatter_is_the_plain_sum(
     monkeypatch.setattr(gpu, "LEAST_LINKS", 3)
     every = make_cloud(145, f0, knots)
     cloud = {name: every[name] for name in SCATTER}
-    links, tones = make_links(7), Tones(f0, df, 80, blocks=((0, 35), (60, 20)))
+    links, subcarriers = make_links(7), Subcarriers(f0, df, 80, blocks=((0, 35), (60, 20)))
 
     def run(values, backend):
-        return scatter(**values, links=links, tones=tones, sharpness=3.0, backend=backend)
+        return scatter(
+            **values, links=links, subcarriers=subcarriers, sharpness=3.0, backend=backend
+        )
 
     assert_twins_agree(run, cloud, "triton", DEVICE)
 
@@ -42,10 +44,12 @@ def test_what_is_left_out_weighs_nothing(
 ) -> None:
     every = make_cloud(3)
     cloud = {name: every[name] for name in SCATTER if name not in left_out}
-    links, tones = make_links(2), Tones(5.72e9, 2.5e6, 5)
+    links, subcarriers = make_links(2), Subcarriers(5.72e9, 2.5e6, 5)
 
     def run(values, backend):
-        return scatter(**values, links=links, tones=tones, sharpness=3.0, backend=backend)
+        return scatter(
+            **values, links=links, subcarriers=subcarriers, sharpness=3.0, backend=backend
+        )
 
     assert_twins_agree(run, cloud, "triton", DEVICE)
 
@@ -83,15 +87,15 @@ def test_nothing_scatters_nothing(make_cloud, make_links, make_paths) -> None:
     every = {name: value.detach().to(DEVICE) for name, value in make_cloud(0).items()}
     means = every["means"].requires_grad_(True)
     cloud = {name: every[name] for name in ("quats", "scales_rf", "gamma", "normals")}
-    tones = Tones(5e9, 1e6, 5)
-    csi = scatter(means, **cloud, links=make_links(3), tones=tones, backend="triton")
+    subcarriers = Subcarriers(5e9, 1e6, 5)
+    csi = scatter(means, **cloud, links=make_links(3), subcarriers=subcarriers, backend="triton")
     assert csi.shape == (3, 5) and not csi.any()
     csi.abs().sum().backward()
     assert means.grad is not None and means.grad.shape == (0, 3)
     none = Links(torch.zeros(0, 3), torch.zeros(0, 3))
     some = {name: value.detach().to(DEVICE) for name, value in make_cloud(2).items()}
     cloud = {name: some[name] for name in ("means", "quats", "scales_rf", "gamma")}
-    assert scatter(**cloud, links=none, tones=tones, backend="triton").shape == (0, 5)
+    assert scatter(**cloud, links=none, subcarriers=subcarriers, backend="triton").shape == (0, 5)
     screens = {name: some[name] for name in ("means", "quats", "scales", "alpha")}
     assert shadow(**screens, paths=make_paths(0, 0.05), backend="triton").shape == (0,)
 
@@ -101,10 +105,11 @@ from triton.backends.compiler import GPUTarget
 from triton.compiler import ASTSource, compile
 from rfgs_core.propagation import kernels_triton as kernels
 
-types = dict.fromkeys(("means", "ends", "tone"), "*fp64") | {"group": "*i64", "chunk": "*i32"}
+types = dict.fromkeys(("means", "ends", "subcarrier"), "*fp64") | {"group": "*i64", "chunk": "*i32"}
 counts = ("total", "links", "chunks", "columns", "rows_out", "per_split")
 types |= dict.fromkeys(counts, "i32") | {"sharpness": "fp32"}
-constants = {"FACING": True, "WEIGHED": True, "ROWS": kernels.ROWS, "TONES": kernels.TONES}
+sizes = {"ROWS": kernels.ROWS, "SUBCARRIERS": kernels.SUBCARRIERS}
+constants = {"FACING": True, "WEIGHED": True, **sizes}
 for kernel in (kernels.scatter_forward, kernels.scatter_backward):
     names = kernel.arg_names
     signature = {n: "constexpr" if n in constants else types.get(n, "*fp32") for n in names}

@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from rfgs_core.bench import PropagationBench, bench_propagation
-from rfgs_core.propagation import Links, Tones, scatter, shadow
+from rfgs_core.propagation import Links, Subcarriers, scatter, shadow
 
 SCATTER = ("means", "quats", "scales_rf", "gamma", "normals", "visibility")
 SHADOW = ("means", "quats", "scales", "alpha")
@@ -20,10 +20,12 @@ BANDS = [(5.72e9, 2.5e6, 1), (60e9, 12.5e6, 1), (3.1e9, 12.3e6, 4)]
 def test_scatter_twins_agree(make_cloud, make_links, f0, df, knots, assert_twins_agree) -> None:
     every = make_cloud(301, f0, knots)
     cloud = {name: every[name] for name in SCATTER}
-    links, tones = make_links(13), Tones(f0, df, 131, blocks=((0, 70), (90, 41)))
+    links, subcarriers = make_links(13), Subcarriers(f0, df, 131, blocks=((0, 70), (90, 41)))
 
     def run(values, backend):
-        return scatter(**values, links=links, tones=tones, sharpness=3.0, backend=backend)
+        return scatter(
+            **values, links=links, subcarriers=subcarriers, sharpness=3.0, backend=backend
+        )
 
     assert_twins_agree(run, cloud)
 
@@ -45,10 +47,10 @@ def test_any_number_of_gaussians_will_do(
     make_cloud, make_links, make_paths, count, assert_twins_agree
 ) -> None:
     every = make_cloud(count)
-    links, tones, paths = make_links(3), Tones(5.72e9, 2.5e6, 7), make_paths(3, 0.05)
+    links, subcarriers, paths = make_links(3), Subcarriers(5.72e9, 2.5e6, 7), make_paths(3, 0.05)
     assert_twins_agree(
         lambda values, backend: scatter(
-            **values, links=links, tones=tones, sharpness=1.0, backend=backend
+            **values, links=links, subcarriers=subcarriers, sharpness=1.0, backend=backend
         ),
         {name: every[name] for name in SCATTER},
     )
@@ -62,7 +64,9 @@ def test_no_gaussians_scatter_nothing_and_block_nothing(make_cloud, make_links, 
     every = make_cloud(0)
     cloud = {name: every[name] for name in SCATTER}
     for backend in ("numba", "torch"):
-        csi = scatter(**cloud, links=make_links(3), tones=Tones(5e9, 1e6, 5), backend=backend)
+        csi = scatter(
+            **cloud, links=make_links(3), subcarriers=Subcarriers(5e9, 1e6, 5), backend=backend
+        )
         assert csi.shape == (3, 5)
         assert not csi.any()
         screens = {name: every[name] for name in SHADOW}
@@ -76,11 +80,11 @@ def test_no_gaussians_scatter_nothing_and_block_nothing(make_cloud, make_links, 
 @pytest.mark.parametrize("knots", [1, 3])
 def test_scatter_gradients_pass_gradcheck(make_cloud, make_links, backend, knots) -> None:
     every = make_cloud(4, knots=knots, dtype=torch.float64)
-    links, tones = make_links(3), Tones(5.8e9, 20e6, 9, blocks=((0, 3), (4, 4)))
+    links, subcarriers = make_links(3), Subcarriers(5.8e9, 20e6, 9, blocks=((0, 3), (4, 4)))
 
     def run(*values):
         named = dict(zip(SCATTER, values, strict=True))
-        csi = scatter(**named, links=links, tones=tones, sharpness=3.0, backend=backend)
+        csi = scatter(**named, links=links, subcarriers=subcarriers, sharpness=3.0, backend=backend)
         return torch.view_as_real(csi) * 1e3
 
     values = [every[name] for name in SCATTER]
@@ -107,10 +111,12 @@ WANTED = ("means", "quats", "scales", "scales_rf", "gamma", "alpha", "normals")
 @pytest.fixture
 def channel_and_gradients(make_cloud, make_links, make_paths):
     every = make_cloud(700)
-    links, tones, paths = make_links(9), Tones(5.72e9, 2.5e6, 33), make_paths(7, 0.05)
+    links, subcarriers, paths = make_links(9), Subcarriers(5.72e9, 2.5e6, 33), make_paths(7, 0.05)
 
     def run() -> list[torch.Tensor]:
-        csi = scatter(*(every[name] for name in SCATTER[:4]), links, tones, every["normals"], 2.0)
+        csi = scatter(
+            *(every[name] for name in SCATTER[:4]), links, subcarriers, every["normals"], 2.0
+        )
         through = shadow(*(every[name] for name in SHADOW), paths)
         loss = csi.abs().sum() + through.abs().sum()
         grads = torch.autograd.grad(loss, [every[name] for name in WANTED])
@@ -147,7 +153,9 @@ def test_same_bytes_wherever_the_heap_puts_the_arrays(channel_and_gradients) -> 
 def test_memory_does_not_grow_with_links_times_gaussians(make_cloud, make_links) -> None:
     """What backward keeps is inputs and one CSI, nothing per Gaussian and link."""
     every = make_cloud(50)
-    csi = scatter(*(every[name] for name in SCATTER[:4]), make_links(200), Tones(5.72e9, 2.5e6, 64))
+    csi = scatter(
+        *(every[name] for name in SCATTER[:4]), make_links(200), Subcarriers(5.72e9, 2.5e6, 64)
+    )
     kept, nodes = 0, [csi.grad_fn]
     while nodes:
         node = nodes.pop()
@@ -161,22 +169,22 @@ def test_memory_does_not_grow_with_links_times_gaussians(make_cloud, make_links)
 
 def test_bad_input_is_named(make_cloud, make_links) -> None:
     every = make_cloud(2)
-    links, tones = make_links(4), Tones(5e9, 1e6, 4)
+    links, subcarriers = make_links(4), Subcarriers(5e9, 1e6, 4)
     cloud = {name: every[name] for name in SCATTER[:4]}
     with pytest.raises(ValueError, match=r"expected groups within 0\.\.0"):
-        scatter(**cloud, links=links, tones=tones, visibility=torch.ones(2, 1))
+        scatter(**cloud, links=links, subcarriers=subcarriers, visibility=torch.ones(2, 1))
     with pytest.raises(ValueError, match="expected backend to be one of"):
-        scatter(**cloud, links=links, tones=tones, backend="cuda")
-    with pytest.raises(ValueError, match=r"expected tone blocks within 0\.\.3"):
-        Tones(5e9, 1e6, 4, blocks=((2, 3),))
+        scatter(**cloud, links=links, subcarriers=subcarriers, backend="cuda")
+    with pytest.raises(ValueError, match=r"expected subcarrier blocks within 0\.\.3"):
+        Subcarriers(5e9, 1e6, 4, blocks=((2, 3),))
     with pytest.raises(ValueError, match="expected f0 > 0"):
-        Tones(0.0, 1e6, 4)
+        Subcarriers(0.0, 1e6, 4)
     with pytest.raises(ValueError, match="expected rx_xyz of shape"):
         Links(torch.zeros(3, 3), torch.zeros(2, 3))
 
 
 def test_the_bench_reports_a_faster_and_equal_twin() -> None:
-    size = PropagationBench(num_gaussians=1500, num_links=8, num_tones=64, repeats=2)
+    size = PropagationBench(num_gaussians=1500, num_links=8, num_subcarriers=64, repeats=2)
     result = bench_propagation(size)
     assert result["max_relative_error"] < 1e-4
     assert result["forward_ratio"] > 3

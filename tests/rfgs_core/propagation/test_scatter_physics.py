@@ -8,7 +8,7 @@ import math
 import pytest
 import torch
 
-from rfgs_core.propagation import Links, Tones, scatter
+from rfgs_core.propagation import Links, Subcarriers, scatter
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
 BACKENDS = ["numba", "torch"]
@@ -29,15 +29,15 @@ def point(xyz: torch.Tensor, gamma: torch.Tensor) -> tuple[torch.Tensor, ...]:
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_a_point_obeys_the_radar_equation(backend: str) -> None:
     links = Links(tensor([0.0, 0.0, 0.0]), tensor([4.0, 0.0, 0.0]))
-    tones = Tones(5.72e9, 2.5e6, 64)
+    subcarriers = Subcarriers(5.72e9, 2.5e6, 64)
     section_m2 = 0.3
     gamma = torch.full((1, 1), math.sqrt(section_m2), dtype=torch.complex128)
-    csi = scatter(*point(tensor([1.0, 2.0, 0.5]), gamma), links, tones, backend=backend)
+    csi = scatter(*point(tensor([1.0, 2.0, 0.5]), gamma), links, subcarriers, backend=backend)
 
     d_t, d_r = math.sqrt(1 + 4 + 0.25), math.sqrt(9 + 4 + 0.25)
-    wavelength_m = SPEED_OF_LIGHT / tones.freq_hz
+    wavelength_m = SPEED_OF_LIGHT / subcarriers.freq_hz
     power = wavelength_m**2 * section_m2 / ((4 * math.pi) ** 3 * d_t**2 * d_r**2)
-    phase = -2 * math.pi * tones.freq_hz * (d_t + d_r) / SPEED_OF_LIGHT
+    phase = -2 * math.pi * subcarriers.freq_hz * (d_t + d_r) / SPEED_OF_LIGHT
     expected = torch.polar(power.sqrt(), phase)[None]
     torch.testing.assert_close(csi, expected, rtol=1e-9, atol=0)
 
@@ -52,9 +52,9 @@ def test_a_gaussian_is_a_cloud_of_points(backend: str) -> None:
     centre = tensor([0.0, 0.0, 0.0])
     # Far away: plane waves over the cloud, the assumption of the formula.
     links = Links(tensor([-900.0, 200.0, 50.0]), tensor([-700.0, -300.0, 120.0]))
-    tones = Tones(SPEED_OF_LIGHT / wavelength_m, 50e6, 3)
+    subcarriers = Subcarriers(SPEED_OF_LIGHT / wavelength_m, 50e6, 3)
     one = torch.ones(1, 1, dtype=torch.complex128)
-    csi = scatter(centre, quat, scales, one, links, tones, backend=backend)
+    csi = scatter(centre, quat, scales, one, links, subcarriers, backend=backend)
 
     axis = torch.linspace(-5, 5, 21, dtype=torch.float64)
     grid = torch.cartesian_prod(axis, axis, axis)
@@ -66,8 +66,8 @@ def test_a_gaussian_is_a_cloud_of_points(backend: str) -> None:
     )
     points = (grid * scales) @ turn.T
     weights = torch.complex(weight, torch.zeros_like(weight))[:, None]
-    summed = scatter(*point(points, weights), links, tones, backend="torch")
-    assert abs(csi[0, 0]) < 0.9 * abs(scatter(*point(centre, one), links, tones)[0, 0])
+    summed = scatter(*point(points, weights), links, subcarriers, backend="torch")
+    assert abs(csi[0, 0]) < 0.9 * abs(scatter(*point(centre, one), links, subcarriers)[0, 0])
     torch.testing.assert_close(csi, summed, rtol=1e-4, atol=0)
 
 
@@ -80,11 +80,11 @@ def test_a_flat_gaussian_is_a_mirror(backend: str) -> None:
         tensor([-3.0, 0.0, 4.0], [-3.0, 0.0, 4.0]),
         tensor([3.0, 0.0, 4.0], [beside[0], 0.0, beside[1]]),
     )
-    tones = Tones(5.8e9, 0.0, 1)
+    subcarriers = Subcarriers(5.8e9, 0.0, 1)
     gamma = torch.ones(1, 1, dtype=torch.complex128)
     origin = tensor([0.0, 0.0, 0.0])
-    csi = scatter(origin, IDENTITY, scales, gamma, links, tones, backend=backend)
-    alone = scatter(*point(origin, gamma), links, tones, backend="torch")
+    csi = scatter(origin, IDENTITY, scales, gamma, links, subcarriers, backend=backend)
+    alone = scatter(*point(origin, gamma), links, subcarriers, backend="torch")
     assert abs(csi[0, 0] / alone[0, 0]) == pytest.approx(1.0, abs=1e-6)
     detour = 0.6 - math.sin(math.radians(20))
     lost = math.exp(-0.5 * (2 * math.pi * 5.8e9 / SPEED_OF_LIGHT * 0.1 * detour) ** 2)
@@ -95,28 +95,28 @@ def test_a_flat_gaussian_is_a_mirror(backend: str) -> None:
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_gamma_is_linear_between_knots(backend: str) -> None:
     links = Links(tensor([0.0, 0.0, 0.0]), tensor([4.0, 0.0, 0.0]))
-    tones = Tones(3.1e9, 10e6, 91)
+    subcarriers = Subcarriers(3.1e9, 10e6, 91)
     xyz = tensor([1.0, 2.0, 0.5])
     knots = torch.tensor([[1.0, 2.0 + 1.0j, 0.5j, -1.0]], dtype=torch.complex128)
     one = torch.ones(1, 1, dtype=torch.complex128)
-    csi = scatter(*point(xyz, knots), links, tones, backend=backend)
-    unit = scatter(*point(xyz, one), links, tones, backend="torch")
+    csi = scatter(*point(xyz, knots), links, subcarriers, backend=backend)
+    unit = scatter(*point(xyz, one), links, subcarriers, backend="torch")
     ratio = (csi / unit)[0]
-    # Knots stand at tones 0, 30, 60 and 90.
+    # Knots stand at subcarriers 0, 30, 60 and 90.
     torch.testing.assert_close(ratio[::30], knots[0], rtol=1e-7, atol=1e-9)
     torch.testing.assert_close(ratio[45], knots[0, 1:3].mean(), rtol=1e-7, atol=1e-9)
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
 @pytest.mark.parametrize("knots", [1, 4])
-def test_blocks_of_tones_are_cut_from_the_whole_band(make_cloud, make_links, backend, knots):
+def test_blocks_of_subcarriers_are_cut_from_the_whole_band(make_cloud, make_links, backend, knots):
     names = ("means", "quats", "scales_rf", "gamma")
     cloud = make_cloud(9, knots=knots, dtype=torch.float64)
     cloud = {name: cloud[name].detach() for name in names}
     links = make_links(4)
-    whole = scatter(**cloud, links=links, tones=Tones(5.72e9, 2e6, 90), backend=backend)
-    part = Tones(5.72e9, 2e6, 90, blocks=((70, 20), (3, 41)))
-    csi = scatter(**cloud, links=links, tones=part, backend=backend)
+    whole = scatter(**cloud, links=links, subcarriers=Subcarriers(5.72e9, 2e6, 90), backend=backend)
+    part = Subcarriers(5.72e9, 2e6, 90, blocks=((70, 20), (3, 41)))
+    csi = scatter(**cloud, links=links, subcarriers=part, backend=backend)
     expected = torch.cat([whole[:, 70:90], whole[:, 3:44]], dim=1)
     torch.testing.assert_close(csi, expected, rtol=1e-7, atol=1e-14)
 
@@ -128,20 +128,20 @@ def test_normals_and_visibility_weigh_links(backend: str) -> None:
         tensor([0.0, 1.0, 2.0], [0.0, 1.0, 2.0]),
         torch.tensor([0, 1]),
     )
-    tones = Tones(5.8e9, 1e6, 2)
+    subcarriers = Subcarriers(5.8e9, 1e6, 2)
     gaussian = point(tensor([0.0, 0.0, 0.0]), torch.ones(1, 1, dtype=torch.complex128))
-    plain = scatter(*gaussian, links, tones, backend=backend)
+    plain = scatter(*gaussian, links, subcarriers, backend=backend)
     weights = tensor([0.25, 3.0])
-    weighted = scatter(*gaussian, links, tones, visibility=weights, backend=backend)
+    weighted = scatter(*gaussian, links, subcarriers, visibility=weights, backend=backend)
     torch.testing.assert_close(weighted, plain * weights.T)
 
     up = tensor([0.0, 0.0, 1.0])
-    seen = scatter(*gaussian, links, tones, normals=up, sharpness=5.0, backend=backend)
+    seen = scatter(*gaussian, links, subcarriers, normals=up, sharpness=5.0, backend=backend)
 
     def sigmoid(x: float) -> float:
         return 1 / (1 + math.exp(-x))
 
     factor = sigmoid(5.0) * sigmoid(5.0 * 2 / math.sqrt(5))
     torch.testing.assert_close(seen, plain * factor)
-    hidden = scatter(*gaussian, links, tones, normals=-up, sharpness=5.0, backend=backend)
+    hidden = scatter(*gaussian, links, subcarriers, normals=-up, sharpness=5.0, backend=backend)
     assert abs(hidden).max() < 1e-3 * abs(plain).max()

@@ -14,7 +14,7 @@ from rfgs_core.propagation import (
     EnvironmentPaths,
     Links,
     RadioGaussians,
-    Tones,
+    Subcarriers,
     environment,
     propagate,
     shadow,
@@ -137,9 +137,9 @@ def test_a_leg_of_no_length_is_never_shadowed() -> None:
 
 def test_the_environment_is_friis_with_absolute_delay() -> None:
     paths = along_x(5.0, 0.05)
-    tones = Tones(5.9e9, 1e6, 8)
-    csi = environment(torch.ones(1, dtype=torch.complex128), paths, tones, 2)
-    phase = -2 * math.pi * tones.freq_hz * 5.0 / SPEED_OF_LIGHT
+    subcarriers = Subcarriers(5.9e9, 1e6, 8)
+    csi = environment(torch.ones(1, dtype=torch.complex128), paths, subcarriers, 2)
+    phase = -2 * math.pi * subcarriers.freq_hz * 5.0 / SPEED_OF_LIGHT
     expected = 0.05 / (4 * math.pi * 5.0) * torch.polar(torch.ones_like(phase), phase)
     torch.testing.assert_close(csi[0], expected)
     assert not csi[1].any()
@@ -149,14 +149,14 @@ def test_the_environment_is_friis_with_absolute_delay() -> None:
 def test_propagate_adds_both_sums(make_cloud, make_links, make_paths, backend: str) -> None:
     cloud = {name: value.detach() for name, value in make_cloud(5).items()}
     gaussians = RadioGaussians(**cloud, sharpness=2.0)
-    links, tones = make_links(4), Tones(5.72e9, 2.5e6, 16)
+    links, subcarriers = make_links(4), Subcarriers(5.72e9, 2.5e6, 16)
     paths = make_paths(6, 0.05, num_links=4)
-    alone = propagate(gaussians, links, tones, backend=backend)
-    full = propagate(gaussians, links, tones, paths, backend=backend)
+    alone = propagate(gaussians, links, subcarriers, backend=backend)
+    full = propagate(gaussians, links, subcarriers, paths, backend=backend)
     through = shadow(
         *(cloud["means"], cloud["quats"], cloud["scales"], cloud["alpha"], paths),
         backend=backend,
     )
-    torch.testing.assert_close(full, alone + environment(through, paths, tones, 4))
+    torch.testing.assert_close(full, alone + environment(through, paths, subcarriers, 4))
     assert full.dtype == torch.complex64
     assert isinstance(links, Links)

@@ -23,9 +23,9 @@ def test_one_path_peaks_at_its_delay_with_its_amplitude(window: Callable) -> Non
     assert mean[0, 41] == pytest.approx(0.5 * weight.sum() / 256)
 
 
-def test_hidden_tones_have_no_weight() -> None:
-    tones = np.ones(16, bool)
-    tones[5:8] = False
-    window = band_window(tones)
+def test_hidden_subcarriers_have_no_weight() -> None:
+    subcarriers = np.ones(16, bool)
+    subcarriers[5:8] = False
+    window = band_window(subcarriers)
     assert window.sum() == pytest.approx(1.0)
-    assert (window[~tones] == 0).all() and (window[tones] > 0).all()
+    assert (window[~subcarriers] == 0).all() and (window[subcarriers] > 0).all()

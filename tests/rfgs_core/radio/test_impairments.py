@@ -89,21 +89,21 @@ def test_carrier_offset_is_a_phase_ramp_in_time() -> None:
     assert np.abs(phase[:, ~APART]).max() < 1e-4
 
 
-def test_timing_offset_is_a_slope_over_tones() -> None:
+def test_timing_offset_is_a_slope_over_subcarriers() -> None:
     phase, drawn = turned(Impairments(sto_std_s=3e-9))
     late_s = drawn.sto_s[:, LAYOUT.tx_device][:, :, None] - drawn.sto_s[:, None, LAYOUT.rx_device]
-    tones = RADIO.freq_hz - RADIO.centre_hz
-    assert np.abs(wrapped(phase + 2 * np.pi * late_s[..., None] * tones)).max() < 1e-4
+    subcarriers = RADIO.freq_hz - RADIO.centre_hz
+    assert np.abs(wrapped(phase + 2 * np.pi * late_s[..., None] * subcarriers)).max() < 1e-4
     assert 2e-9 < drawn.sto_s.std() < 4e-9
     # A late transmitter looks like a longer path: the delay the slope stands for agrees.
-    slope = np.polyfit(tones, np.unwrap(phase[3, 0, -1]), 1)[0]
+    slope = np.polyfit(subcarriers, np.unwrap(phase[3, 0, -1]), 1)[0]
     assert np.isclose(-slope / (2 * np.pi), late_s[3, 0, -1], rtol=1e-3)
 
 
 def test_sampling_offset_is_a_slope_that_grows_with_time() -> None:
     phase, drawn = turned(Impairments(sfo_std_ppm=0.02))
-    tones = RADIO.freq_hz - RADIO.centre_hz
-    slopes = np.polyfit(tones, np.unwrap(phase[:, 0, -1], axis=-1).T, 1)[0]
+    subcarriers = RADIO.freq_hz - RADIO.centre_hz
+    slopes = np.polyfit(subcarriers, np.unwrap(phase[:, 0, -1], axis=-1).T, 1)[0]
     growth = np.polyfit(TIME_S, slopes, 1)[0]
     apart = 1e-6 * (drawn.sfo_ppm[0] - drawn.sfo_ppm[-1])
     assert np.isclose(growth, -2 * np.pi * apart, rtol=1e-3)

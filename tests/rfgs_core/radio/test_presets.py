@@ -32,17 +32,17 @@ def test_derived_numbers(
 
 
 @pytest.mark.parametrize("name", PRESETS)
-def test_tones_fill_the_band_evenly(name: str) -> None:
+def test_subcarriers_fill_the_band_evenly(name: str) -> None:
     radio = preset(name)
     assert radio.name == name
-    tones = radio.freq_hz
-    assert tones.shape == (radio.num_subcarriers,)
-    np.testing.assert_allclose(np.diff(tones), radio.subcarrier_spacing_hz, rtol=1e-6)
-    assert tones.mean() == pytest.approx(radio.centre_hz, rel=1e-12)
-    # Tones sit at the centres of their slices: half a spacing from the band's edges.
+    subcarriers = radio.freq_hz
+    assert subcarriers.shape == (radio.num_subcarriers,)
+    np.testing.assert_allclose(np.diff(subcarriers), radio.subcarrier_spacing_hz, rtol=1e-6)
+    assert subcarriers.mean() == pytest.approx(radio.centre_hz, rel=1e-12)
+    # Subcarriers sit at the centres of their slices: half a spacing from the band's edges.
     half = 0.5 * radio.subcarrier_spacing_hz
-    assert tones[0] - radio.freq_min_hz == pytest.approx(half, rel=1e-6)
-    assert radio.freq_max_hz - tones[-1] == pytest.approx(half, rel=1e-6)
+    assert subcarriers[0] - radio.freq_min_hz == pytest.approx(half, rel=1e-6)
+    assert radio.freq_max_hz - subcarriers[-1] == pytest.approx(half, rel=1e-6)
 
 
 def test_an_unknown_preset_lists_the_known_ones() -> None:

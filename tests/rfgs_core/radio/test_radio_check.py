@@ -42,7 +42,7 @@ def test_delays_that_alias_are_refused() -> None:
     coarse = replace(preset("wifi"), num_subcarriers=8)
     problems = check(coarse, BOUNDS_M, [])
     assert len(problems) == 1 and "15.0 m" in problems[0]
-    # 2 · |(6, 5, 2.7)| + 5 = 21.53 m; 160 MHz · 21.53 m / c = 11.5 tones.
+    # 2 · |(6, 5, 2.7)| + 5 = 21.53 m; 160 MHz · 21.53 m / c = 11.5 subcarriers.
     assert "reach 21.5 m; use wifi, " in problems[0]
     assert "`like: wifi` and `num_subcarriers: 12`" in problems[0]
     assert check(replace(coarse, num_subcarriers=12), BOUNDS_M, []) == []

@@ -115,7 +115,7 @@ def test_an_encoder_of_another_radio_is_refused_before_anything_is_written(
     save_encoder(foreign, LearnedEncoder.untrained("csi", make_observations(), 0))
     command = ["train", str(tiny_dataset), "--radio", "wifi", "--out", str(tmp_path / "run")]
     for encoder, message in (
-        (f"cnn:{foreign}", "was made for a radio of 32 tones"),
+        (f"cnn:{foreign}", "was made for a radio of 32 subcarriers"),
         ("cnn", "expected matched_filter, paths or cnn:FILE"),
         ("transformer:x", "expected matched_filter, paths or cnn:FILE"),
         (f"cnn:{tmp_path / 'absent.npz'}", "no such file"),

@@ -47,7 +47,7 @@ def test_noise_reaches_the_fit_and_lost_packets_do_not(
     lost = np.isnan(sequence.csi("wifi", frame, impaired=True)).all(axis=2)
     assert 0 < lost.sum() < lost.size
     np.testing.assert_array_equal(seen.links, clean.links & ~lost)
-    heard = seen.links[..., None] & seen.tones
+    heard = seen.links[..., None] & seen.subcarriers
     assert not np.allclose(seen.delta[heard], clean.delta[heard])
     assert np.isfinite(opened.predict(frame)).all()
 
@@ -60,7 +60,7 @@ def test_noise_reaches_the_fit_and_lost_packets_do_not(
     assert metrics["conditions"]["label"].startswith("impaired, depth 1")
     assert "loss_rate 0.4" in metrics["conditions"]["impairments"]
     # The truth is the clean channel: predicting nothing misses exactly all of it.
-    assert metrics["controls"]["zero"]["rf"]["element_snr_db"] == pytest.approx(0.0, abs=1e-6)
+    assert metrics["baselines"]["zero"]["rf"]["element_snr_db"] == pytest.approx(0.0, abs=1e-6)
 
 
 def test_a_dataset_without_impaired_channels_is_refused(

@@ -44,19 +44,19 @@ def test_the_opened_run_is_the_trained_one(trained_run: Run) -> None:
         assert torch.equal(value, getattr(everything, name))
 
 
-def test_prediction_covers_held_out_links_and_tones(trained_run: Run) -> None:
+def test_prediction_covers_held_out_links_and_subcarriers(trained_run: Run) -> None:
     seen = observe(trained_run.sequence, "wifi", 2)
     predicted = trained_run.predict(2)
     assert predicted.shape == seen.delta.shape
     assert predicted.dtype == np.complex64
-    hidden = ~(seen.links[..., None] & seen.tones)
+    hidden = ~(seen.links[..., None] & seen.subcarriers)
     assert hidden.mean() > 0.3
     assert (predicted[hidden] != 0).all()
     # Where training looked it is what training compared with the data.
-    channel = Channel.of(seen, seen.links, seen.tones)
+    channel = Channel.of(seen, seen.links, seen.subcarriers)
     with torch.no_grad():
         expected = channel.change(trained_run.head, trained_run.moving(2)).numpy()
-    got = predicted[seen.links][:, seen.tones]
+    got = predicted[seen.links][:, seen.subcarriers]
     np.testing.assert_allclose(got, expected, rtol=1e-4, atol=1e-9)
 
 
@@ -71,7 +71,7 @@ def test_training_explains_what_it_saw_and_some_of_what_it_did_not(
     seen = observe(run.sequence, "wifi", 1)
     true = run.sequence.csi("wifi", 1) - run.sequence.csi_static("wifi")
     error, power = np.abs(run.predict(1) - true) ** 2, np.abs(true) ** 2
-    visible = seen.links[..., None] & seen.tones
+    visible = seen.links[..., None] & seen.subcarriers
     assert error[visible].sum() < 0.1 * power[visible].sum()
     assert error[~visible].sum() < power[~visible].sum()
 
@@ -81,11 +81,11 @@ def test_a_refit_knows_no_more_than_what_is_left(
 ) -> None:
     """Other values at left-out entries change nothing; at the others they do."""
     seen = trained_run.observations(1)
-    links, tones = seen.links.copy(), seen.tones.copy()
+    links, subcarriers = seen.links.copy(), seen.subcarriers.copy()
     links[:, np.flatnonzero(links.any(axis=0))[::2]] = False
-    tones[: len(tones) // 4] = False
-    kept = links[..., None] & tones
-    less = trained_run.observations(1, (links, tones))
+    subcarriers[: len(subcarriers) // 4] = False
+    kept = links[..., None] & subcarriers
+    less = trained_run.observations(1, (links, subcarriers))
     first = trained_run.refitted(1, less)
     assert np.vdot(first[kept], seen.delta[kept]).real > 0
     change = trained_run.visible_change(1, less)
@@ -94,11 +94,11 @@ def test_a_refit_knows_no_more_than_what_is_left(
 
     def after(factor: np.ndarray) -> np.ndarray:
         def altered(*args: Any) -> Any:
-            elements, links, tones, csi = visible_channel(*args)
-            return elements, links, tones, (csi * factor).astype(np.complex64)
+            elements, links, subcarriers, csi = visible_channel(*args)
+            return elements, links, subcarriers, (csi * factor).astype(np.complex64)
 
         monkeypatch.setattr(observations, "visible_channel", altered)
-        return trained_run.refitted(1, trained_run.observations(1, (links, tones)))
+        return trained_run.refitted(1, trained_run.observations(1, (links, subcarriers)))
 
     np.testing.assert_array_equal(after(np.where(kept, 1.0, -3.0)), first)
     assert not np.allclose(after(np.where(kept, -1.0, 1.0)), first, rtol=0.1)

@@ -46,7 +46,7 @@ def poison_held_out(dataset: Path) -> None:
     """NaN wherever something is held out, in every channel of the tiny dataset."""
     sequence = open_dataset(dataset).sequence()
     seen = observe(sequence, "wifi", 1)
-    hidden = ~(seen.links[..., None] & seen.tones)
+    hidden = ~(seen.links[..., None] & seen.subcarriers)
     files = SequenceFiles(dataset / "tiny")
     store = files.csi("wifi")
     values = {frame: sequence.csi("wifi", frame) for frame in (1, 2)}

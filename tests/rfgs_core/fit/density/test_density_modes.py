@@ -127,7 +127,7 @@ def missing_one(make_observations, make_gaussians, head) -> tuple[Observations, 
     cloud.features *= 0.01
     strong = gaussians_at(PLACE_M, np.array([[0.0, -1.0, 0.0]]))
     strong = replace(strong, features=head.with_gamma(strong.features, torch.tensor([0.5 + 0.2j])))
-    channel = Channel.of(seen, seen.links, seen.tones)
+    channel = Channel.of(seen, seen.links, seen.subcarriers)
     delta = np.zeros_like(seen.delta)
     delta[channel.tx, channel.rx] = channel.change(head, Gaussians.join(cloud, strong)).numpy()
     return seen.with_delta(delta), cloud
@@ -135,7 +135,7 @@ def missing_one(make_observations, make_gaussians, head) -> tuple[Observations, 
 
 def test_a_gaussian_comes_where_the_residual_peaks(missing_one, head) -> None:
     seen, cloud = missing_one
-    channel, comparison = Channel.of(seen, seen.links, seen.tones), comparison_of(seen)
+    channel, comparison = Channel.of(seen, seen.links, seen.subcarriers), comparison_of(seen)
     noise = noise_per_link(seen, comparison.measured(), 0.5)
     density = ResidualDensity(
         *(ResidualRule(every=2, reach_m=2.0, least_energy=0.0), seen, channel, comparison, noise),
@@ -162,7 +162,7 @@ def test_gaussians_without_energy_go(missing_one, head) -> None:
     seen, cloud = missing_one
     silent = replace(seen.with_delta(np.zeros_like(seen.delta)))
     cloud.features[2] = 0.0
-    channel, comparison = Channel.of(seen, seen.links, seen.tones), comparison_of(silent)
+    channel, comparison = Channel.of(seen, seen.links, seen.subcarriers), comparison_of(silent)
     noise = torch.ones(len(channel.links))
     rule = ResidualRule(every=2, least_peak=1e9)
     density = ResidualDensity(

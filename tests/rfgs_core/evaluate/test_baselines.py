@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rfgs_core.bodies.body_prior import Bodies
-from rfgs_core.evaluate.baselines import CONTROLS
+from rfgs_core.evaluate.baselines import BASELINES
 from rfgs_core.evaluate.baselines.clean import separated_peaks
 from rfgs_core.evaluate.baselines.gaussian_process import krige
 from rfgs_core.evaluate.baselines.linear import linear
@@ -24,7 +24,7 @@ TWO = np.array([[1.4, 1.3, 1.0], [2.6, 2.2, 1.4]])
 
 
 def rf_of(made, name: str) -> dict:
-    result = CONTROLS[name](made.evidence)
+    result = BASELINES[name](made.evidence)
     elements = made.evidence.layout
     return rf_values(frame_rf(made.delta, result.delta, made.held_out, elements))
 
@@ -35,8 +35,8 @@ def test_held_out_entries_are_hidden(scatterers) -> None:
         np.testing.assert_array_equal(np.isnan(field), ~made.held_out.visible)
 
 
-@pytest.mark.parametrize("name", CONTROLS)
-def test_no_control_depends_on_held_out_entries(scatterers, name: str) -> None:
+@pytest.mark.parametrize("name", BASELINES)
+def test_no_baseline_depends_on_held_out_entries(scatterers, name: str) -> None:
     made = scatterers(ONE)
     evidence: Evidence = made.evidence.with_method(ONE[0])
     poison = np.where(made.held_out.visible, made.delta + made.static, np.nan)
@@ -50,7 +50,7 @@ def test_no_control_depends_on_held_out_entries(scatterers, name: str) -> None:
         evidence.grid,
         evidence.voxels,
     ).with_method(ONE[0])
-    plain, blind = CONTROLS[name](evidence), CONTROLS[name](poisoned)
+    plain, blind = BASELINES[name](evidence), BASELINES[name](poisoned)
     for key in ("score", "delta", "static"):
         first, second = getattr(plain, key), getattr(blind, key)
         assert (first is None) == (second is None)
@@ -59,10 +59,10 @@ def test_no_control_depends_on_held_out_entries(scatterers, name: str) -> None:
             np.testing.assert_array_equal(first, second)
 
 
-@pytest.mark.parametrize("name", CONTROLS)
-def test_every_control_says_why_it_leaves_something_out(scatterers, name: str) -> None:
+@pytest.mark.parametrize("name", BASELINES)
+def test_every_baseline_says_why_it_leaves_something_out(scatterers, name: str) -> None:
     made = scatterers(ONE, own_device_links="only")
-    result = CONTROLS[name](made.evidence.with_method(ONE[0]))
+    result = BASELINES[name](made.evidence.with_method(ONE[0]))
     if result.score is None or result.delta is None:
         assert result.reason
     if result.score is not None:
@@ -74,7 +74,7 @@ def test_every_control_says_why_it_leaves_something_out(scatterers, name: str) -
 @pytest.mark.parametrize("name", ["matched_filter", "matched_filter_all_sum", "clean", "omp"])
 def test_one_scatterer_is_found_where_it_is(scatterers, name: str) -> None:
     made = scatterers(ONE)
-    score = CONTROLS[name](made.evidence).score
+    score = BASELINES[name](made.evidence).score
     found = made.evidence.grid.centres(best_voxels(score, 20)).mean(axis=0)
     assert np.linalg.norm(found - ONE[0]) < 0.1
 
@@ -83,7 +83,7 @@ def test_one_scatterer_is_found_where_it_is(scatterers, name: str) -> None:
 def test_two_separated_scatterers_are_recovered(scatterers, name: str) -> None:
     # The search covers both: the matched filter's blobs are wider than the points.
     made = scatterers(TWO, voxels=2000)
-    score = CONTROLS[name](made.evidence).score
+    score = BASELINES[name](made.evidence).score
     points, power = made.evidence.grid.centres(), score.ravel()
     peaks = points[separated_peaks(points, power, 2)]
     for truth in TWO:
@@ -104,7 +104,7 @@ def test_zero_and_empty_room_are_zero_decibels(scatterers) -> None:
 def test_empty_room_predicts_hidden_static_entries(scatterers) -> None:
     # Within a device the direct path is 30 cm long and too curved for any interpolation.
     made = scatterers(ONE, own_device_links="excluded")
-    static = CONTROLS["empty_room"](made.evidence).static
+    static = BASELINES["empty_room"](made.evidence).static
     error = np.abs(static - made.static)[made.held_out.element]
     assert np.sqrt(np.mean(error**2) / np.mean(np.abs(made.static) ** 2)) < 0.2
 
@@ -112,7 +112,7 @@ def test_empty_room_predicts_hidden_static_entries(scatterers) -> None:
 def test_interpolators_keep_visible_entries_and_unmeasured_links(scatterers) -> None:
     made = scatterers(ONE, own_device_links="excluded")
     for name in ("nearest_element", "linear", "gaussian_process", "spectrum"):
-        delta = CONTROLS[name](made.evidence).delta
+        delta = BASELINES[name](made.evidence).delta
         visible = made.held_out.visible
         np.testing.assert_array_equal(delta[visible], made.evidence.delta[visible])
         assert not delta[~made.evidence.layout.measured].any()
@@ -134,7 +134,7 @@ def test_kriging_and_lines_beat_the_nearest_value_on_a_phase_ramp() -> None:
     assert error["krige"] < error["linear"] < error["nearest"]
 
 
-def test_kriging_bridges_a_gap_of_tones() -> None:
+def test_kriging_bridges_a_gap_of_subcarriers() -> None:
     x = np.arange(32.0)[:, None]
     values = ramp(x)
     seen = (x[:, 0] < 16) | (x[:, 0] >= 20)
@@ -200,7 +200,7 @@ def test_hidden_device_pair_takes_the_level_of_its_neighbours(scatterers) -> Non
 
 def test_template_stands_on_the_floor_at_the_methods_centroid(scatterers) -> None:
     made = scatterers(ONE, voxels=1500)
-    score = CONTROLS["template"](made.evidence.with_method(np.array([2.0, 1.6, 0.4]))).score
+    score = BASELINES["template"](made.evidence.with_method(np.array([2.0, 1.6, 0.4]))).score
     voxels = made.evidence.grid.centres(best_voxels(score, 1500))
     np.testing.assert_allclose(voxels.mean(axis=0), [2.0, 1.6, 0.85], atol=0.05)
     assert np.ptp(voxels[:, 2]) == pytest.approx(1.7, abs=0.1)
@@ -210,7 +210,7 @@ def test_template_stands_on_the_floor_at_the_methods_centroid(scatterers) -> Non
 def test_filled_template_stays_inside_the_ellipsoid(scatterers) -> None:
     made = scatterers(ONE, voxels=1500)
     evidence = made.evidence.with_method(np.array([2.0, 1.6, 0.4]))
-    score = CONTROLS["template_filled"](evidence).score
+    score = BASELINES["template_filled"](evidence).score
     voxels = made.evidence.grid.centres(best_voxels(score, 1500))
     radius = np.linalg.norm((voxels - [2.0, 1.6, 0.85]) / [0.25, 0.20, 0.85], axis=1)
     assert radius.max() < 0.85
@@ -222,29 +222,29 @@ def test_the_prior_alone_is_that_of_the_methods_bodies(scatterers) -> None:
     heights, widths = [], []
     for bodies in (Bodies.standing(sitting.axes_xy), sitting):
         evidence = made.evidence.with_method(None, bodies)
-        score = CONTROLS["body_prior"](evidence).score
+        score = BASELINES["body_prior"](evidence).score
         voxels = made.evidence.grid.centres(best_voxels(score, 1500))
         heights.append(np.ptp(voxels[:, 2]))
         widths.append(voxels[:, 0].max() - 2.0)
     assert heights == pytest.approx([1.65, 1.35], abs=0.1)
     # Knees and the shins before them.
     assert widths == pytest.approx([0.17, 0.5], abs=0.08)
-    assert "does not tell" in CONTROLS["body_prior"](made.evidence).reason
+    assert "does not tell" in BASELINES["body_prior"](made.evidence).reason
 
 
 def test_template_without_a_centroid_says_so(scatterers) -> None:
-    assert "centroid" in CONTROLS["template"](scatterers(ONE).evidence).reason
+    assert "centroid" in BASELINES["template"](scatterers(ONE).evidence).reason
 
 
 def test_different_device_variants_need_different_devices(scatterers) -> None:
     made = scatterers(ONE, own_device_links="only")
-    assert CONTROLS["matched_filter_different_sum"](made.evidence).score is None
-    same = CONTROLS["matched_filter"](made.evidence).score
-    np.testing.assert_array_equal(same, CONTROLS["matched_filter_all_sum"](made.evidence).score)
+    assert BASELINES["matched_filter_different_sum"](made.evidence).score is None
+    same = BASELINES["matched_filter"](made.evidence).score
+    np.testing.assert_array_equal(same, BASELINES["matched_filter_all_sum"](made.evidence).score)
 
 
 def test_a_silent_frame_gives_no_points(scatterers) -> None:
     made = scatterers(ONE)
     silent = replace(made.evidence, delta=made.evidence.delta * 0)
     for name in ("clean", "omp"):
-        assert CONTROLS[name](silent).score is None or not CONTROLS[name](silent).score.any()
+        assert BASELINES[name](silent).score is None or not BASELINES[name](silent).score.any()

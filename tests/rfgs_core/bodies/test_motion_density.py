@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from rfgs_core.bodies.pace import (
+from rfgs_core.bodies.motion_density import (
     LEAST,
     MOST,
     WALK_M_S,
     kept,
     novelty,
-    paces_m_s,
+    speeds_m_s,
     wanted_counts,
 )
 from rfgs_core.bodies.tracks import Tracks
@@ -83,8 +83,8 @@ def test_a_trembling_track_of_a_still_change_has_no_pace() -> None:
     tracks = Tracks(
         *(np.zeros((2, 2)), np.array([[0.3, 0.4], [np.nan, np.nan]]), 1.0), np.full(2, np.nan)
     )
-    assert paces_m_s(tracks, 0.0).tolist() == [0.0, WALK_M_S]
-    assert paces_m_s(tracks, 0.5).tolist() == [0.25, WALK_M_S]
+    assert speeds_m_s(tracks, 0.0).tolist() == [0.0, WALK_M_S]
+    assert speeds_m_s(tracks, 0.5).tolist() == [0.25, WALK_M_S]
 
 
 def test_those_that_reflect_least_go_first() -> None:

@@ -40,22 +40,22 @@ def _power(values: np.ndarray) -> float:
     return float(np.sum(np.abs(values).astype(np.float64) ** 2))
 
 
-def paces_m_s(tracks: Tracks, new: float) -> Float64[np.ndarray, "body"]:
+def speeds_m_s(tracks: Tracks, new: float) -> Float64[np.ndarray, "body"]:
     """Pace of each body: its speed times the novelty; that of a walk before speeds are known."""
     speed_m_s = np.linalg.norm(tracks.velocity_xy, axis=1)
     return np.where(np.isfinite(speed_m_s), speed_m_s * new, WALK_M_S)
 
 
 def wanted_counts(
-    num_gaussians: int, pace_m_s: Float[np.ndarray, "body"]
+    num_gaussians: int, speed_m_s: Float[np.ndarray, "body"]
 ) -> Int64[np.ndarray, "body"]:
     """How many Gaussians each body shall have.
 
     Linear in the pace, from `LEAST` at rest over 1 at `WALK_M_S` to at most `MOST`, times an
     equal part of `num_gaussians`; at least one.
     """
-    factor = np.clip(LEAST + (1 - LEAST) * pace_m_s / WALK_M_S, LEAST, MOST)
-    return np.maximum(1, np.round(factor * num_gaussians / len(pace_m_s))).astype(np.int64)
+    factor = np.clip(LEAST + (1 - LEAST) * speed_m_s / WALK_M_S, LEAST, MOST)
+    return np.maximum(1, np.round(factor * num_gaussians / len(speed_m_s))).astype(np.int64)
 
 
 def kept(

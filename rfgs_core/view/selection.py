@@ -14,7 +14,7 @@ GAUSSIAN_FIELDS = ("frame", "mode", "drawn_as", "min_opacity", "below_peak_db", 
 
 
 @dataclass(frozen=True)
-class Choice:
+class Selection:
     """The state of all controls at one moment."""
 
     frame: int
@@ -42,6 +42,6 @@ class Choice:
     cameras: bool = False
     """Show the dataset's cameras."""
 
-    def differs(self, other: Choice | None, *fields: str) -> bool:
+    def differs(self, other: Selection | None, *fields: str) -> bool:
         """Whether one of these fields is another one in `other`, or there is no other."""
         return other is None or any(getattr(self, f) != getattr(other, f) for f in fields)

@@ -262,7 +262,8 @@ def test_crossings_are_those_of_a_plain_test() -> None:
         found = crossings(bvh, start, end, 0.0, at_m, hit)
         way = end - start
         a, u, v = triangles[:, 0], *(triangles[:, i] - triangles[:, 0] for i in (1, 2))
-        shares = np.linalg.solve(np.stack([u, v, np.broadcast_to(-way, u.shape)], -1), start - a)
+        sides = np.stack([u, v, np.broadcast_to(-way, u.shape)], -1)
+        shares = np.linalg.solve(sides, (start - a)[..., None])[..., 0]
         p, q, t = shares[..., 0], shares[..., 1], shares[..., 2]
         inside = (p > 0) & (q > 0) & (p + q < 1) & (t > 0) & (t < 1)
         order = np.argsort(t[inside])

@@ -19,7 +19,7 @@ def test_channel_is_continuous_across_sub_bands(
     two_devices: list[DevicePose],
     coarse_capsule: tuple[np.ndarray, np.ndarray],
 ) -> None:
-    """Between fine subcarriers a smooth channel bends by (2π δf τ)²; a sub-band's jump adds itself."""
+    """Between fine subcarriers a smooth channel bends by (2π δf τ)²; a jump adds itself."""
     from dataset_factory.trace import Tracer
     from dataset_factory.trace.environment import node_frequencies
 

@@ -38,8 +38,9 @@ def run(args: AblateArgs) -> int:
     from rfgs_core.cli.calls import call
     from rfgs_core.dataset import open_dataset
     from rfgs_core.errors import RfgsError
-    from rfgs_core.files import read_json, write_text
+    from rfgs_core.files import write_text
     from rfgs_core.frames import chosen_frames
+    from rfgs_core.report.compare import read_metrics
     from rfgs_core.run import open_run
     from rfgs_core.study.ablation import VARIANTS, ablation_row, ablation_table
 
@@ -66,7 +67,7 @@ def run(args: AblateArgs) -> int:
                 call("rfgs_core.cli", "eval", str(folder))
             done = open_run(folder)
             count = len(done.moving(done.frames[0]))
-            metrics = {**read_json(folder / "metrics.json"), "train_s": done.config.train_s}
+            metrics = {**read_metrics(folder), "train_s": done.config.train_s}
             rows.append(ablation_row(variant, metrics, count))
             write_text(args.out / "ablation.md", ablation_table(rows))
     sys.stdout.write(f"{ablation_table(rows)}\n{args.out / 'ablation.md'} written\n")

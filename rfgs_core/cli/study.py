@@ -44,7 +44,8 @@ def run(args: StudyArgs) -> int:
 
     from rfgs_core.cli.calls import call
     from rfgs_core.errors import RfgsError
-    from rfgs_core.files import read_json, write_json, write_text
+    from rfgs_core.files import write_json, write_text
+    from rfgs_core.report.compare import read_metrics
     from rfgs_core.study import cases, study_table, summarise
 
     chosen = cases(args.scenes, args.conditions, args.radios, args.seeds)
@@ -61,7 +62,7 @@ def run(args: StudyArgs) -> int:
                         call(*case.generate(args.out))
                     call(*case.train(args.out))
                     call(*case.evaluate(args.out))
-                results.append((case, read_json(metrics)))
+                results.append((case, read_metrics(args.out / case.run)))
             except RfgsError as error:
                 failed[case.run.name] = str(error)
             rows = summarise(results)

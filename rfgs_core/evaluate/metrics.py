@@ -29,7 +29,7 @@ from rfgs_core.files import write_json
 from rfgs_core.measure.observations import Kept
 from rfgs_core.render.view import pictures_of
 
-SCHEMA = "rfgs-metrics/1"
+SCHEMA = "rfgs-metrics/2"
 #: Name of the evaluated method among the baselines while they are computed alike.
 METHOD = "method"
 MEDIANS = ("element_snr_median_db", "subcarrier_snr_median_db")

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataset_factory.verify.card import Plot
-from rfgs_core.report.charts import figure_uri, new_figure
+from rfgs_core.figures.style import figure_uri, new_figure
 
 #: Colours of what came out, in order; readable on light and dark pages.
 _DOTS = ("#e4572e", "#2f9d6a", "#a266c9", "#c79a2b", "#3f88c5", "#8d99a6")

@@ -34,7 +34,7 @@ class CsiArgs:
 def run(args: CsiArgs) -> int:
     """Writes the picture and prints how much is explained; exit code 0."""
     from rfgs_core.errors import RfgsError
-    from rfgs_core.report.link_chart import link_channels, write_link_chart
+    from rfgs_core.figures.links import link_channels, write_link_chart
     from rfgs_core.run import open_run
 
     if args.out is not None and args.out.suffix.lower() != ".png":

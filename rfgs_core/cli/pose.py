@@ -29,9 +29,9 @@ def run(args: PoseArgs) -> int:
     from tqdm import tqdm
 
     from rfgs_core.arrays import save_arrays
+    from rfgs_core.figures.poses import write_pose_chart
     from rfgs_core.files import write_json
     from rfgs_core.pose import estimate_poses, score_poses
-    from rfgs_core.report.pose_chart import write_pose_chart
     from rfgs_core.run import open_run
 
     trained = open_run(args.run)

@@ -134,8 +134,8 @@ def _room(trained: Run, antennas: np.ndarray, args: PredictArgs) -> RadioGaussia
 
 
 def _write(path: Path, arrays: dict[str, np.ndarray]) -> None:
+    from rfgs_core.figures.predictions import write_prediction_chart
     from rfgs_core.predict.arrays import write_prediction
-    from rfgs_core.report.prediction_chart import write_prediction_chart
 
     write_prediction_chart(path.with_suffix(".png"), arrays)
     write_prediction(path, arrays)

@@ -16,11 +16,13 @@ from rfgs_core.evaluate.pictures import (
 )
 from rfgs_core.evaluate.scene import EvaluatedRun, Scene
 from rfgs_core.evaluate.verdicts import LOST, OPEN, WON
+from rfgs_core.figures.motion import write_motion_chart
+from rfgs_core.figures.radio import channel_chart, delay_angle_chart, f10_chart
+from rfgs_core.figures.shapes import shape_chart
+from rfgs_core.figures.style import BASELINE, file_uri, picture_uri
 from rfgs_core.files import write_text
 from rfgs_core.render.view import pictures_of
-from rfgs_core.report.charts import BASELINE, file_uri, picture_uri
 from rfgs_core.report.compare import read_metrics
-from rfgs_core.report.motion_chart import write_motion_chart
 from rfgs_core.report.page import (
     Card,
     Page,
@@ -32,8 +34,6 @@ from rfgs_core.report.page import (
     render_page,
     stage_times,
 )
-from rfgs_core.report.radio_charts import channel_chart, delay_angle_chart, f10_chart
-from rfgs_core.report.shape_charts import shape_chart
 from rfgs_core.report.tables import metric_tables, show
 
 #: Pictures of the scene and rows of rendered views, at most.

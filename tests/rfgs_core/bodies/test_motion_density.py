@@ -21,7 +21,7 @@ from rfgs_core.bodies.motion_density import (
     wanted_counts,
 )
 from rfgs_core.bodies.tracks import Tracks
-from rfgs_core.report.motion_chart import write_motion_chart
+from rfgs_core.figures.motion import write_motion_chart
 from rfgs_core.run import Run
 from rfgs_core.run.motion import read_motion, speeds_between
 from tests import tiny_dataset as tiny

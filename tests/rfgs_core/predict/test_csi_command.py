@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from rfgs_core.cli import main
-from rfgs_core.report.link_chart import link_channels
+from rfgs_core.figures.links import link_channels
 from rfgs_core.run import Run
 
 

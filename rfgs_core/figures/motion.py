@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from rfgs_core.dataset import Sequence
-from rfgs_core.report.charts import INK, METHOD, TRUTH, new_figure, write_picture
+from rfgs_core.figures.style import INK, METHOD, TRUTH, new_figure, write_picture
 from rfgs_core.run.motion import Motion, read_motion, speeds_between
 
 #: Curves of fewer frames show nothing.

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from rfgs_core.figures.style import METHOD, TRUTH, new_figure
 from rfgs_core.files import replacing
 from rfgs_core.pose.estimate import PoseEstimate
-from rfgs_core.report.charts import METHOD, TRUTH, new_figure
 from rfgs_core.skeleton import PARENTS
 
 #: Frames shown as skeletons.

@@ -9,8 +9,8 @@ from jaxtyping import Float
 from rfgs_core.evaluate.baselines.matched_filter import default_score
 from rfgs_core.evaluate.geometry import best_voxels
 from rfgs_core.evaluate.scene import Scene
+from rfgs_core.figures.style import BASELINE, TRUTH, figure_uri, new_figure, power_colours
 from rfgs_core.render.view import moving_gaussians
-from rfgs_core.report.charts import BASELINE, TRUTH, figure_uri, new_figure, power_colours
 
 #: Title, horizontal and vertical axis of each side.
 SIDES = (("front", 0, 2), ("side", 1, 2), ("top", 0, 1))

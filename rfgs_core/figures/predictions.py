@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from rfgs_core.figures.style import INK, METHOD, TRUTH, new_figure, power_colours, write_picture
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.levels import amplitude_decibels, decibels
-from rfgs_core.report.charts import INK, METHOD, TRUTH, new_figure, power_colours, write_picture
 
 #: Powers this far below the strongest are not drawn [dB].
 RANGE_DB = 40.0

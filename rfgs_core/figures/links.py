@@ -10,11 +10,11 @@ import numpy as np
 from jaxtyping import Complex64
 
 from rfgs_core.errors import RfgsError
+from rfgs_core.figures.radio import PADDING, RANGE_DB, padded_profile
+from rfgs_core.figures.style import new_figure, write_picture
 from rfgs_core.radio import Radio
 from rfgs_core.radio.delay import path_lengths_m
 from rfgs_core.radio.levels import decibels
-from rfgs_core.report.charts import new_figure, write_picture
-from rfgs_core.report.radio_charts import PADDING, RANGE_DB, padded_profile
 from rfgs_core.run import Run
 
 

@@ -7,10 +7,10 @@ import numpy as np
 from jaxtyping import Complex, Float
 
 from rfgs_core.evaluate.scene import Scene
+from rfgs_core.figures.style import INK, METHOD, figure_uri, new_figure
 from rfgs_core.radio.delay import delay_profile, hann, path_lengths_m
 from rfgs_core.radio.layout import rotation
 from rfgs_core.radio.levels import decibels
-from rfgs_core.report.charts import INK, METHOD, figure_uri, new_figure
 
 #: Dynamic range of all images of power [dB].
 RANGE_DB = 30.0

@@ -117,7 +117,7 @@ class RadioFields:
         default=RADIO_DEFAULTS["tx_offset_m"],
     )
     own_device_links: _choice(
-        "own_device_links", "Own links", "Whether a device hears its own transmitter"
+        "own_device_links", "Monostatic links", "Whether a device hears its own transmitter"
     )
     isolation_db: _number(
         "isolation_db", "Isolation", "Of a device's receiver from its transmitter [dB]", min=0.0

@@ -177,7 +177,7 @@ def locate_bodies(
 ) -> Float64[np.ndarray, "count 2"]:
     """Ground positions of upright bodies.
 
-    All bodies are found together and then told apart: one after the other, the first could take
+    All bodies are found together and then separated: one after the other, the first could take
     the place of the second.
 
     Args:

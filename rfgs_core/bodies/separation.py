@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Several bodies told apart: each is sought in what the others leave of the channel.
+"""Several bodies separated: each is sought in what the others leave of the channel.
 
 The map of one body has slopes on which the next one is lost, the more so the fewer hertz there
 are. As in RELAX (Li and Stoica, IEEE Trans. Signal Process. 44(2), 1996) the echoes of all bodies
@@ -32,7 +32,7 @@ SOLVER_STEPS = 6
 ROUNDS = 2
 
 
-def tell_apart(
+def separated(
     observations: Observations,
     maps: PairMaps,
     axes_xy: Float64[np.ndarray, "body 2"],

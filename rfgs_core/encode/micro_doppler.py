@@ -50,7 +50,7 @@ def micro_doppler(
         time_s: Time of each sample [s]. Evenly spaced, or in evenly spaced runs such as bursts
             of chirps; no window crosses a gap.
         freq_hz: Subcarrier frequencies [Hz].
-        window_s: Length of a window [s], cut to the length of a run. Velocities are told apart
+        window_s: Length of a window [s], cut to the length of a run. Velocities are resolved
             by c/(2f · window_s).
         velocity_limit_m_s: Largest speed shown [m/s]; None takes the largest that is not
             aliased, c/(4f · interval).

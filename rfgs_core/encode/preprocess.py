@@ -63,7 +63,7 @@ def unwrap_phase(
 ) -> tuple[Float64[np.ndarray, "*link subcarrier"], Float64[np.ndarray, "*link"]]:
     """Continuous phase over the true subcarrier grid, gaps between sub-bands included.
 
-    The slope of the mean delay is taken out first, and what is left is unwrapped. It turns by
+    The slope of the mean delay is taken out first, and the residual is unwrapped. It turns by
     less than half a cycle from subcarrier to subcarrier, gap or not, as long as delays spread by
     less than 1/(2 · gap) around their mean; unwrapping subcarrier by subcarrier fails at a gap of
     1/(2 · delay).

@@ -55,7 +55,7 @@ def _why(metrics: dict[str, Any], key: str, other: float) -> str:
     ceiling = _baseline(metrics, "oracle_init", "geometry", key)
     if ceiling is None:
         parts.append(
-            "The ceiling oracle_init is not known, so model and optimisation cannot be told apart"
+            "The ceiling oracle_init is not known, so model and optimisation cannot be separated"
         )
     elif ceiling <= other:
         parts.append(

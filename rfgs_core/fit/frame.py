@@ -14,7 +14,7 @@ from rfgs_core.bodies.body_prior import outward_normals
 from rfgs_core.bodies.localise import PairMaps, locate_bodies, pair_maps
 from rfgs_core.bodies.motion_density import novelty, speeds_m_s, wanted_counts
 from rfgs_core.bodies.posture import tell_postures
-from rfgs_core.bodies.separation import tell_apart
+from rfgs_core.bodies.separation import separated
 from rfgs_core.bodies.start import StartCells
 from rfgs_core.bodies.tracks import Tracks
 from rfgs_core.bodies.warm_start import Moving, at_pace, carry_over
@@ -166,10 +166,10 @@ def _followed(
     bounds_m, time_s = observations.bounds_m, observations.time_s
     if before is None:
         axes_xy = locate_bodies(maps, bounds_m, config.bodies)
-        return Tracks.begun(tell_apart(observations, maps, axes_xy, config, seed), time_s)
+        return Tracks.begun(separated(observations, maps, axes_xy, config, seed), time_s)
     near, reach_m = before.tracks.expected(time_s)
     axes_xy = locate_bodies(maps, bounds_m, config.bodies, near, reach_m)
-    axes_xy = tell_apart(observations, maps, axes_xy, config, seed, near, reach_m)
+    axes_xy = separated(observations, maps, axes_xy, config, seed, near, reach_m)
     return before.tracks.moved(axes_xy, time_s)
 
 

@@ -118,7 +118,7 @@ class PowerComparison:
     def left(
         self, observations: Observations, change: Complex[Tensor, "link subcarrier"]
     ) -> Observations:
-        """The hologram of what is left."""
+        """The hologram of the residual."""
         left = self.target - self.predicted(change, np.arange(len(self.target)))
         wave = direct_wave(observations.layout, observations.freq_hz)
         wave = wave[observations.links][:, observations.subcarriers]

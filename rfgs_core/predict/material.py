@@ -10,7 +10,7 @@ frequencies
 
 a ~ N(0, LEVEL_DB²), n ~ N(0, SLOPE²), e speckle. All are normal, so the likelihood of each
 material is closed. One narrow band shows the level alone, and materials of equal |R| cannot be
-told apart: weights say so by being alike.
+separated: weights say so by being alike.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Levels:
 def levels_of(
     gaussians: RadioGaussians, layout: Layout, freq_hz: Float[np.ndarray, "subcarrier"]
 ) -> Levels:
-    """Radar cross-section of the Gaussians together, averaged over a radio's own links.
+    """Radar cross-section of the Gaussians together, averaged over a radio's monostatic links.
 
     Each device pair counts as one independent look: the elements of an array see nearly the
     same speckle.

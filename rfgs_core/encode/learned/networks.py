@@ -110,7 +110,7 @@ class CubeGates(Gates):
 class DopplerGates(Gates):
     """MmWave with several chirps per frame: the range–Doppler–angle cube of a device pair.
 
-    Whoever moves is met at Dopplers of his own, and what is left of the empty room at zero.
+    Whoever moves is met at Dopplers of his own, and the residual of the empty room at zero.
     Directions of departure share their weights: a cube of four axes has no convolution that a
     processor takes in its stride.
     """

@@ -11,7 +11,7 @@ import pytest
 from lit_bodies import lit
 
 from rfgs_core.bodies.localise import locate_bodies, pair_maps
-from rfgs_core.bodies.separation import tell_apart
+from rfgs_core.bodies.separation import separated
 from rfgs_core.measure.observations import Observations
 from rfgs_core.radio import preset
 from rfgs_core.settings import TrainConfig
@@ -38,7 +38,7 @@ def seen(make_observations: Callable[..., Observations], _cache: dict) -> Observ
 def test_a_body_on_the_slope_of_another_is_found(seen: Observations) -> None:
     maps, config = pair_maps(seen), TrainConfig(bodies=2)
     together = locate_bodies(maps, ROOM_M, 2)
-    apart = tell_apart(seen, maps, together, config, 0)
+    apart = separated(seen, maps, together, config, 0)
     errors_m = [
         np.linalg.norm(places[:, None] - np.array(BODIES), axis=2).min(axis=0)
         for places in (together, apart)
@@ -51,7 +51,7 @@ def test_bodies_keep_their_order_and_their_reach(seen: Observations) -> None:
     near, reach_m = np.add(BODIES[::-1], (0.15, -0.1)), np.array([0.5, 0.5])
     maps, config = pair_maps(seen), TrainConfig(bodies=2)
     together = locate_bodies(maps, ROOM_M, 2, near, reach_m)
-    apart = tell_apart(seen, maps, together, config, 0, near, reach_m)
+    apart = separated(seen, maps, together, config, 0, near, reach_m)
     assert np.linalg.norm(apart - np.array(BODIES)[::-1], axis=1).max() < 0.1
 
 
@@ -60,4 +60,4 @@ def test_nothing_is_sought_anew_where_nothing_can_be_told(seen: Observations, ch
     places = np.array(BODIES[:1] if change == "one body" else BODIES)
     observations = seen if change == "one body" else replace(seen, kind="power")
     maps, config = pair_maps(seen), TrainConfig(bodies=len(places))
-    assert tell_apart(observations, maps, places, config, 0) is places
+    assert separated(observations, maps, places, config, 0) is places

@@ -39,7 +39,7 @@ def picture(run: Run, camera: str, frame: int) -> Image.Image:
     fitted = to_bytes(render_view(run, camera_of(run.sequence, camera), frame).rgb)
     image = Image.fromarray(side_by_side(np.ascontiguousarray(true), fitted))
     image = image.resize((ZOOM * image.width, ZOOM * image.height), Image.Resampling.LANCZOS)
-    radio = run.config["radio"]
+    radio = run.config.radio
     draw, font = ImageDraw.Draw(image), ImageFont.load_default(10 * ZOOM)
     right = image.width - ZOOM * fitted.shape[1]
     for left, text in ((0, "true person"), (right, f"from {WORDS.get(radio, radio)}")):

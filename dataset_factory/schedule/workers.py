@@ -30,6 +30,8 @@ T = TypeVar("T")
 
 #: How long to wait for a scheduler and for a first worker [s].
 _PATIENCE_S = 30
+#: How long workers that were killed may take to be counted as gone [s].
+_GOODBYE_S = 5
 #: Share of the machine's memory that all its workers may take together.
 _MEMORY_SHARE = 0.9
 
@@ -176,13 +178,20 @@ def workers_here(count: int, memory_gb: float, scratch: Path, log: Path) -> Iter
                 )
         except RuntimeError as error:
             raise RfgsError(f"no worker process starts: {error}") from error
-        with cluster, Client(cluster) as client:
-            # A worker that dies while it starts is replaced too.
-            cluster.adapt(minimum=count, maximum=count)
-            try:
-                yield Workers(client, count, str(log), ours=True)
-            finally:
-                _kill(cluster)
+        try:
+            with Client(cluster) as client:
+                # A worker that dies while it starts is replaced too.
+                adaptive = cluster.adapt(minimum=count, maximum=count)
+                try:
+                    yield Workers(client, count, str(log), ours=True)
+                finally:
+                    adaptive.stop()
+                    _kill(cluster)
+        finally:
+            # It would wait, without end, for a replacement that was just being started.
+            with suppress(TimeoutError):
+                cluster.close(timeout=_GOODBYE_S)
+            _kill(cluster)
 
 
 def memory_bytes(workers: int, memory_gb: float) -> int:

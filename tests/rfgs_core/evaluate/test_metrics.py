@@ -124,9 +124,9 @@ def test_a_lost_comparison_says_whether_the_optimisation_is_at_fault() -> None:
 @pytest.mark.parametrize(
     ("own", "sentence"),
     [
-        (0.8, "Won: 60 % of the matched filter's error 1 − F10 is removed; the mark is a third"),
-        (0.6, "Lost: 20 % of the matched filter's error 1 − F10 is removed; the mark is a third"),
-        (0.235, "Lost: the error 1 − F10 is 53 % larger than the matched filter's; the mark is"),
+        (0.8, "Won: 60 % of the matched filter's error 1 − F10 is removed; the target is a third"),
+        (0.6, "Lost: 20 % of the matched filter's error 1 − F10 is removed; the target is a third"),
+        (0.235, "Lost: the error 1 − F10 is 53 % larger than the matched filter's; the target is"),
     ],
 )
 def test_an_error_that_grew_is_not_removed(own: float, sentence: str) -> None:

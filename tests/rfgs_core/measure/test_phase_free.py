@@ -156,7 +156,7 @@ def test_no_stage_reads_a_phase(
     assert np.linalg.norm(centre[:2] - [1.3, 1.4]) < 0.35
     metrics = evaluate_run(run, oracle=False)
     assert metrics["conditions"]["observe"] == kind
-    assert "without the phases" in metrics["reasons"]["controls.gaussian_process"]
-    assert metrics["controls"]["gaussian_process"]["rf"]["element_snr_db"] is None
-    assert metrics["controls"]["matched_filter"]["geometry"]["f10"] is not None
-    assert (metrics["controls"]["clean"]["geometry"]["f10"] is None) == (kind == "delay_power")
+    assert "without the phases" in metrics["reasons"]["baselines.gaussian_process"]
+    assert metrics["baselines"]["gaussian_process"]["rf"]["element_snr_db"] is None
+    assert metrics["baselines"]["matched_filter"]["geometry"]["f10"] is not None
+    assert (metrics["baselines"]["clean"]["geometry"]["f10"] is None) == (kind == "delay_power")

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from rfgs_core.gaussians import Gaussians
     from rfgs_core.gaussians.ply import read_ply
     from rfgs_core.run import open_run
-    from rfgs_core.run.training import TrainConfig, train_sequence
+    from rfgs_core.run.training import train_sequence
+    from rfgs_core.settings import TrainConfig
 
 __version__ = "0.1.0"
 __all__ = [
@@ -31,7 +32,7 @@ __all__ = [
 _MODULES = {
     "open_dataset": "rfgs_core.dataset",
     "FrameDataset": "rfgs_core.dataset.torch_dataset",
-    "TrainConfig": "rfgs_core.run.training",
+    "TrainConfig": "rfgs_core.settings",
     "train_sequence": "rfgs_core.run.training",
     "open_run": "rfgs_core.run",
     "Gaussians": "rfgs_core.gaussians",

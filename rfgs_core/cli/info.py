@@ -20,7 +20,8 @@ OPTIONAL = {
     "anny": "builds the people of the scenes: pip install 'rfgs[scenes]'",
     "triton": "compiles the kernels of --device cuda: pip install 'rfgs[gpu]'",
     "lpips": "the LPIPS picture metric: pip install lpips",
-    "distributed": "generation on a cluster: pip install 'rfgs[cluster]'",
+    "distributed": "workers that trace: pip install 'rfgs[factory]'",
+    "playwright": "pictures of the viewer: pip install 'rfgs[picture]'",
 }
 
 

@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import errno
+import os
+import select
 import sys
 from collections.abc import Callable
 
@@ -26,7 +28,8 @@ def run_cli(command: Callable[[], int | None]) -> int:
 
     Returns:
         Exit code: 2 for an `RfgsError`, a package of an extra that is not installed, a full disk
-        or a place that cannot be written or read, 130 after Ctrl-C.
+        or a place that cannot be written or read, 130 after Ctrl-C; 1 where whoever read the
+        output has stopped.
     """
     try:
         return command() or 0
@@ -42,6 +45,10 @@ def run_cli(command: Callable[[], int | None]) -> int:
             raise
         sys.stderr.write(f"error: {remedy}\n")
         return 2
+    except BrokenPipeError:
+        if not _nobody_reads():
+            raise
+        return 1
     except OSError as error:
         place = error.filename2 or error.filename
         if error.errno in _WRONG_PLACE and place:
@@ -56,3 +63,18 @@ def run_cli(command: Callable[[], int | None]) -> int:
             f"error: the disk is full{where}; free some space and run the same command again\n"
         )
         return 2
+
+
+def _nobody_reads() -> bool:
+    """Whether it is our output that nobody takes any more, as after `| head`; then it is closed."""
+    try:
+        output = sys.stdout.fileno()
+    except OSError:
+        return False
+    poll = select.poll()
+    poll.register(output, 0)
+    if not any(event & select.POLLERR for _, event in poll.poll(0)):
+        return False
+    # Python flushes once more at its end, and would complain.
+    os.dup2(os.open(os.devnull, os.O_WRONLY), output)
+    return True

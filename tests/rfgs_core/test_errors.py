@@ -4,7 +4,10 @@
 from __future__ import annotations
 
 import errno
+import os
 import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -12,6 +15,8 @@ import pytest
 from rfgs_core.errors import MissingToolError, RfgsError, RfgsFormatError
 from rfgs_core.files import write_text
 from rfgs_core.outcome import run_cli
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def raising(error: BaseException):
@@ -86,3 +91,24 @@ def test_a_full_disk_names_the_file_where_the_system_does(capsys) -> None:
 def test_other_errors_are_not_hidden(error: Exception) -> None:
     with pytest.raises(type(error)):
         run_cli(raising(error))
+
+
+def test_a_reader_that_stops_is_no_error() -> None:
+    """As `rfgs train --help | head` does."""
+    program = [sys.executable, "-m", "rfgs_core.cli", "train", "--help"]
+    reads, writes = os.pipe()
+    os.close(reads)
+    try:
+        done = subprocess.run(
+            program,
+            stdout=writes,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=60,
+            cwd=ROOT,
+            check=False,
+        )
+    finally:
+        os.close(writes)
+    assert done.returncode == 1
+    assert done.stderr == ""

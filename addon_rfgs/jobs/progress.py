@@ -10,8 +10,8 @@ from pathlib import Path
 #: How much of a log's end is read [bytes].
 _TAIL = 16_384
 _LINE = re.compile(r"progress ([\d.]+) ([\d.]+) (\d+) ?(.*)")
-#: Baseline sequences of terminals: nested bars move the cursor.
-_BASELINE = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
+#: Control sequences of terminals: nested bars move the cursor.
+_CONTROL = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def read_log(file: Path, count: int = 8) -> tuple[Progress | None, list[str]]:
 def split_output(text: str) -> tuple[Progress | None, list[str]]:
     """How far a program is, and the lines it wrote that are not about that."""
     progress, lines = None, []
-    for line in re.split(r"[\r\n]+", _BASELINE.sub("", text)):
+    for line in re.split(r"[\r\n]+", _CONTROL.sub("", text)):
         match = _LINE.fullmatch(line.strip())
         if match:
             done, total, left_s = (float(match[i]) for i in (1, 2, 3))

@@ -14,12 +14,10 @@ from rfgs_core.arrays import load_arrays
 from rfgs_core.dataset.mesh_ply import read_mesh
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.files import inside, read_json
+from rfgs_core.simulate.surface.edges import SHARP, SMOOTH, UNSAID
 
 SCHEMA = "rfgs-bundle/1"
 NUM_JOINTS = 17
-#: What `Topology.edges` says of a triangle's side: nothing, that the surface is smooth across
-#: it, that the surface has an edge there.
-UNSAID, SMOOTH, SHARP = -1, 0, 1
 
 _FRAME_ARRAYS = ("vertices", "joints", "segment_velocity", "person_instance", "action")
 _FIELDS: dict[str, type | tuple[type, ...]] = {

@@ -9,12 +9,14 @@ import numpy as np
 
 from dataset_factory.scene.bundle import Bundle, BundleFrame
 from dataset_factory.trace.base import BaseTracer
-from dataset_factory.trace.environment import Environment, environment_channel
-from dataset_factory.trace.people.direct import PosedPoints, direct_channel, in_sight
-from dataset_factory.trace.rays.paths import PathSet
-from dataset_factory.trace.shadow.kirchhoff import Shadow, transmission
+from dataset_factory.trace.environment import Environment
+from dataset_factory.trace.people.sight import in_sight
 from rfgs_core.radio import Radio, devices_at, layout
 from rfgs_core.radio.layout import DevicePose
+from rfgs_core.simulate.environment import environment_channel
+from rfgs_core.simulate.paths.path_set import PathSet
+from rfgs_core.simulate.shadow.kirchhoff import Shadow, transmission
+from rfgs_core.simulate.surface.direct import PosedPoints, direct_channel
 
 
 class ApertureTracer(BaseTracer):

@@ -11,16 +11,16 @@ import drjit as dr
 
 from dataset_factory.scene.bundle import Bundle
 from dataset_factory.trace.bounces.solver import DEPTHS
-from dataset_factory.trace.environment import node_frequencies
 from dataset_factory.trace.people.bodies import Bodies
 from dataset_factory.trace.rays.scene import check_materials
-from dataset_factory.trace.shadow.frequencies import fine_grid
-from dataset_factory.trace.shadow.kirchhoff import Shadow
 from rfgs_core.errors import RfgsError
 from rfgs_core.radio import Radio
 from rfgs_core.radio.check import too_deep
 from rfgs_core.radio.layout import DevicePose
 from rfgs_core.seeds import sub_seed
+from rfgs_core.simulate.environment import node_frequencies
+from rfgs_core.simulate.shadow.frequencies import fine_grid
+from rfgs_core.simulate.shadow.kirchhoff import Shadow
 
 #: Dr.Jit keeps kernels and memory of every frame; they are dropped this often [frames].
 FLUSH_EVERY = 10

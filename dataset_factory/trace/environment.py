@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -13,23 +12,21 @@ import sionna.rt as rt
 from dataset_factory.scene.bundle import Bundle
 from dataset_factory.trace.rays.fields import Fields, SceneMeshes
 from dataset_factory.trace.rays.movers import Movers
-from dataset_factory.trace.rays.paths import PathSet, joined, merged, path_set
+from dataset_factory.trace.rays.paths import path_set
 from dataset_factory.trace.rays.scene import (
     Group,
     add_antennas,
-    centres,
     environment_scene,
     move_vehicles,
-    owners,
     set_frequency,
 )
-from dataset_factory.trace.rays.steering import resampled, steer
-from dataset_factory.trace.shadow.kirchhoff import Passed
 from rfgs_core.radio import Layout, Radio
 from rfgs_core.radio.images import DIFFUSE
 from rfgs_core.radio.layout import DevicePose
 from rfgs_core.radio.levels import amplitude_of
-from rfgs_core.simulate import (
+from rfgs_core.radio.sites import centres, measured_pairs, owners
+from rfgs_core.simulate.environment import WIDE_BAND, node_frequencies
+from rfgs_core.simulate.geometry import (
     Faces,
     Sight,
     SpecularPaths,
@@ -37,6 +34,7 @@ from rfgs_core.simulate import (
     faces_of,
     specular_paths,
 )
+from rfgs_core.simulate.paths.path_set import PathSet, joined, merged
 
 #: Interactions of an environment path; a fourth would change bistatic links by −39 dB.
 MAX_DEPTH = 3
@@ -44,27 +42,8 @@ MAX_DEPTH = 3
 NUM_SAMPLES = 300_000
 #: Room for diffuse paths per transmitter.
 MAX_PATHS = 20_000
-#: Above this fractional bandwidth materials are evaluated at several frequencies.
-WIDE_BAND = 0.05
-#: Fewest frequencies of a wide band.
-WIDE_BAND_NODES = 9
-#: Largest distance of the frequencies of an ultra-wide band [Hz]: a slab of 3 cm and √ε = 2
-#: ripples every 2.5 GHz.
-NODE_SPACING_HZ = 0.125e9
 #: Receiving sites per call, which bounds memory to 1.5 GB.
 SITES_AT_ONCE = 8
-#: Frequencies of a narrow band: over 160 MHz at 5.8 GHz a slab of 12.5 mm plasterboard, half a
-#: wave thick, changes paths by −37 dB of the channel.
-NARROW_BAND_NODES = 3
-
-
-def node_frequencies(radio: Radio) -> np.ndarray:
-    """Frequencies [Hz] between which amplitudes are interpolated, both band edges included."""
-    wide = radio.bandwidth_hz / radio.centre_hz > WIDE_BAND
-    count = WIDE_BAND_NODES if wide else NARROW_BAND_NODES
-    if radio.ultra_wide:
-        count = max(count, math.ceil(radio.bandwidth_hz / NODE_SPACING_HZ) + 1)
-    return np.linspace(radio.freq_min_hz, radio.freq_max_hz, count)
 
 
 class Environment:
@@ -188,28 +167,6 @@ class Environment:
         return found.select(measured_pairs(self._layout)[found.tx, found.rx])
 
 
-def environment_channel(
-    paths: PathSet, radio: Radio, layout: Layout, passed: Passed | None = None
-) -> np.ndarray:
-    """Channel of the environment, complex128, shape (tx, rx, subcarrier).
-
-    Args:
-        paths: Paths of `Environment`.
-        radio: The radio they were traced for.
-        layout: Antenna elements.
-        passed: What bodies leave of some paths; None if there are none.
-    """
-    nodes_hz = node_frequencies(radio)
-    if passed is None:
-        channel = steer(paths, layout, radio.freq_hz, nodes_hz)
-    else:
-        free = np.setdiff1d(np.arange(len(paths)), passed.path)
-        channel = steer(paths.select(free), layout, radio.freq_hz, nodes_hz)
-        shaded = resampled(paths.select(passed.path), nodes_hz, passed.grid_hz)
-        channel += steer(shaded, layout, radio.freq_hz, passed.grid_hz, passed.factor)
-    return channel * (radio.centre_hz / radio.freq_hz)
-
-
 def groups(layout: Layout) -> list[Group]:
     """Sites to trace together, so that all measured pairs are and memory stays bounded."""
     wanted = measured_pairs(layout)
@@ -220,11 +177,3 @@ def groups(layout: Layout) -> list[Group]:
     if len(tx) == len(rx) and (wanted == np.eye(len(tx), dtype=bool)).all():
         return [(tx[i : i + SITES_AT_ONCE], rx[i : i + SITES_AT_ONCE]) for i in starts]
     return [(tx, rx[i : i + SITES_AT_ONCE]) for i in starts]
-
-
-def measured_pairs(layout: Layout) -> np.ndarray:
-    """Which pairs of a transmitting and a receiving site have a measured link, bool."""
-    wanted = np.zeros((layout.tx_site.max() + 1, layout.rx_site.max() + 1), dtype=bool)
-    links = np.argwhere(layout.measured)
-    wanted[layout.tx_site[links[:, 0]], layout.rx_site[links[:, 1]]] = True
-    return wanted

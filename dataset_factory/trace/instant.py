@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dataset_factory.trace.people.direct import PosedPoints
-from dataset_factory.trace.rays.paths import PathSet
-from dataset_factory.trace.shadow.kirchhoff import Outline
+from rfgs_core.simulate.paths.path_set import PathSet
+from rfgs_core.simulate.shadow.kirchhoff import Outline
+from rfgs_core.simulate.surface.direct import PosedPoints
 
 
 @dataclass(frozen=True)

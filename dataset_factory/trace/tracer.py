@@ -12,21 +12,20 @@ from dataset_factory.scene.motion import read_motion, read_velocity
 from dataset_factory.trace.base import BaseTracer
 from dataset_factory.trace.bounces.follow import follow
 from dataset_factory.trace.bounces.solver import Bounces, with_facets
-from dataset_factory.trace.environment import (
-    Environment,
-    environment_channel,
-)
+from dataset_factory.trace.environment import Environment
 from dataset_factory.trace.instant import Trace, mixed
-from dataset_factory.trace.people.direct import PosedPoints, direct_channel, in_sight
-from dataset_factory.trace.rays.paths import PathSet
-from dataset_factory.trace.rays.steering import steer
-from dataset_factory.trace.shadow.kirchhoff import Outline, Shadow, transmission
+from dataset_factory.trace.people.sight import in_sight
 from dataset_factory.trace.table.corners import CornerObjects
 from dataset_factory.trace.table.maker import TableMaker
 from rfgs_core.radio import Radio, frame_samples, layout, pose_span_s
 from rfgs_core.radio.layout import DevicePose
 from rfgs_core.radio.path_table import PathTable
 from rfgs_core.seeds import sub_seed
+from rfgs_core.simulate.environment import environment_channel
+from rfgs_core.simulate.paths.path_set import PathSet
+from rfgs_core.simulate.paths.steering import steer
+from rfgs_core.simulate.shadow.kirchhoff import Outline, Shadow, transmission
+from rfgs_core.simulate.surface.direct import PosedPoints, direct_channel
 
 #: Longest time between traces of a frame with several samples [s].
 TRACE_STEP_S = 0.02

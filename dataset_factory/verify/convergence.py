@@ -41,8 +41,9 @@ def verify(workshop: Workshop) -> Group:
 def _static(bundle: Bundle) -> list[Row]:
     """csi_static with other rays, and with the faces looked at three times as densely."""
     from dataset_factory.trace import Tracer
-    from dataset_factory.trace.environment import Environment, environment_channel
-    from rfgs_core.simulate import faces_of
+    from dataset_factory.trace.environment import Environment
+    from rfgs_core.simulate.environment import environment_channel
+    from rfgs_core.simulate.geometry import faces_of
 
     radio = single(preset("wifi"))
     devices = devices_of(bundle, radio)

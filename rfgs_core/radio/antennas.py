@@ -112,10 +112,14 @@ def passed_on(into: _Vectors, out_of: _Vectors, sent: _Vectors, heard: _Vectors)
 
 
 def spherical_basis(directions: _Vectors) -> tuple[_Vectors, _Vectors]:
-    """Unit vectors θ̂ and φ̂ of directions of any length, each of shape (point, 3)."""
+    """Unit vectors θ̂ and φ̂ of directions of any length, each of shape (point, 3).
+
+    Straight up and straight down the azimuth is 0, as in Sionna RT.
+    """
     x, y, z = directions.T
     length = np.maximum(np.linalg.norm(directions, axis=1), 1e-12)
-    azimuth = np.arctan2(y, x)
+    vertical = np.hypot(x, y) < 1e-7 * length
+    azimuth = np.where(vertical, 0.0, np.arctan2(y, x))
     cos_theta = np.clip(z / length, -1.0, 1.0)
     sin_theta = np.sqrt(1.0 - cos_theta**2)
     theta = np.stack([cos_theta * np.cos(azimuth), cos_theta * np.sin(azimuth), -sin_theta], axis=1)

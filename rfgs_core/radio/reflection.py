@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from jaxtyping import Complex128, Float
 
 from rfgs_core.radio.constants import SPEED_OF_LIGHT, VACUUM_PERMITTIVITY
 from rfgs_core.radio.materials import MATERIALS
-from rfgs_core.radio.tissue import normal_reflection, skin_permittivity
+from rfgs_core.radio.tissue import skin_permittivity
 
 #: ITU-R P.2040-4, table 3, the rows below 100 GHz: ε' = a f^b and σ = c f^d [S/m], f in GHz.
 _ITU_TERMS: dict[str, tuple[float, float, float, float]] = {
@@ -44,20 +46,63 @@ def material_permittivity(
     return a * freq_ghz**b - 1j * loss
 
 
+class Slab(NamedTuple):
+    """Factors on the electric field at a slab, each complex128, shape (angle, frequency)."""
+
+    reflected_te: np.ndarray
+    """Of the field across the plane of incidence, mirrored."""
+    reflected_tm: np.ndarray
+    """Of the field in that plane, mirrored."""
+    passed_te: np.ndarray
+    """Of the field across the plane of incidence, passed on."""
+    passed_tm: np.ndarray
+    """Of the field in that plane, passed on."""
+
+
+def slab(
+    name: str,
+    thickness_m: float,
+    freq_hz: Float[np.ndarray, "frequency"],
+    cosine: Float[np.ndarray, "angle"],
+) -> Slab:
+    """Reflection and transmission of a slab in air at any angle, ITU-R P.2040-4, section 2.2.2.2.
+
+    With r of the surface, R = r (1 − e^{−j2q}) / (1 − r² e^{−j2q}) and
+    T = (1 − r²) e^{−jq} / (1 − r² e^{−j2q}), q = (2πd/λ) √(η − sin²θ).
+
+    Args:
+        name: One of `materials.MATERIALS`.
+        thickness_m: Thickness d [m].
+        freq_hz: Frequencies within the material's validity [Hz].
+        cosine: Cosines of the angles of incidence, 0 to 1.
+    """
+    eta = material_permittivity(name, freq_hz)
+    cosine = np.asarray(cosine, dtype=np.float64)[:, None]
+    root = np.sqrt(eta - (1.0 - cosine**2))
+    wavenumber = 2.0 * np.pi * np.asarray(freq_hz, dtype=np.float64) / SPEED_OF_LIGHT
+    # √ of a lossy material has a negative imaginary part: the wave fades on its way.
+    once = np.exp(-1j * wavenumber * thickness_m * root)
+    factors = []
+    for surface in (
+        (cosine - root) / (cosine + root),
+        (eta * cosine - root) / (eta * cosine + root),
+    ):
+        rest = 1.0 - surface**2 * once**2
+        factors.append((surface * (1.0 - once**2) / rest, (1.0 - surface**2) * once / rest))
+    (reflected_te, passed_te), (reflected_tm, passed_tm) = factors
+    return Slab(reflected_te, reflected_tm, passed_te, passed_tm)
+
+
 def slab_reflection(
     name: str, freq_hz: Float[np.ndarray, "*shape"]
 ) -> Complex128[np.ndarray, "*shape"]:
     """Reflection of a slab of a material's usual thickness d at normal incidence.
 
-    R = Γ (1 − e^{−j2q}) / (1 − Γ² e^{−j2q}), q = 2πd√ε/λ (ITU-R P.2040-4, section 2.2.2.2).
-
     Args:
         name: One of `materials.MATERIALS`, which tells the thickness.
         freq_hz: Frequencies within the material's validity [Hz].
     """
-    permittivity = material_permittivity(name, freq_hz)
-    surface = normal_reflection(permittivity)
-    wavenumber = 2 * np.pi * np.asarray(freq_hz, dtype=np.float64) / SPEED_OF_LIGHT
-    # √ε of a lossy material has a negative imaginary part: the wave fades on its way.
-    turn = np.exp(-2j * wavenumber * MATERIALS[name].thickness_m * np.sqrt(permittivity))
-    return surface * (1 - turn) / (1 - surface**2 * turn)
+    freq_hz = np.asarray(freq_hz, dtype=np.float64)
+    thickness_m = MATERIALS[name].thickness_m
+    found = slab(name, thickness_m, freq_hz.ravel(), np.ones(1)).reflected_te[0]
+    return found.reshape(freq_hz.shape)

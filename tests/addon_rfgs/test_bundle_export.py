@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dataset_factory.scene.bundle import SHARP, SMOOTH, UNSAID, Bundle, read_bundle
+from dataset_factory.scene.bundle import Bundle, read_bundle
+from rfgs_core.simulate.surface.edges import SHARP, SMOOTH, UNSAID
 from rfgs_core.skeleton import JOINTS
 
 

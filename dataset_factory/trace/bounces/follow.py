@@ -12,8 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from dataset_factory.trace.rays.paths import PathSet
 from rfgs_core.radio.images import SCATTERING
+from rfgs_core.simulate.paths.path_set import PathSet
 
 
 def follow(paths: PathSet, places: np.ndarray) -> PathSet:

@@ -20,7 +20,7 @@ from sionna.rt.path_solvers.paths_buffer import PathsBuffer
 from sionna.rt.path_solvers.sb_deterministic import SBDeterministicCandidateGenerator
 
 from dataset_factory.trace.rays.fields import SceneMeshes
-from rfgs_core.simulate import Legs
+from rfgs_core.simulate.geometry import Legs
 
 
 class _Candidates:

@@ -22,16 +22,17 @@ from sionna.rt.rcs import ConstantCPM, ConstantRCS, RCSSolver, ScatteringModel, 
 
 from dataset_factory.trace.bounces.follow import follow
 from dataset_factory.trace.bounces.legs import LegCandidates
-from dataset_factory.trace.environment import measured_pairs
-from dataset_factory.trace.people.direct import PosedPoints
 from dataset_factory.trace.rays.fields import SceneMeshes
-from dataset_factory.trace.rays.paths import PathSet, empty, merged, path_set
-from dataset_factory.trace.rays.scene import add_antennas, centres
+from dataset_factory.trace.rays.paths import path_set
+from dataset_factory.trace.rays.scene import add_antennas
 from rfgs_core.radio import Layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.images import SCATTERING
 from rfgs_core.radio.layout import DevicePose
-from rfgs_core.simulate import Surroundings, mirror_legs
+from rfgs_core.radio.sites import centres, measured_pairs
+from rfgs_core.simulate.geometry import Surroundings, mirror_legs
+from rfgs_core.simulate.paths.path_set import PathSet, empty, merged
+from rfgs_core.simulate.surface.direct import PosedPoints
 
 #: Points per call, for memory's sake; every call compiles kernels for its own path count.
 CHUNK = 4096

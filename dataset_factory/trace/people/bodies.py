@@ -3,12 +3,12 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import sionna.rt as rt
 
 from dataset_factory.scene.bundle import Bundle
-from dataset_factory.trace.people.direct import PosedPoints
-from dataset_factory.trace.people.points import SurfacePoints, surface_points
 from dataset_factory.trace.rays.movers import split_movers
 from dataset_factory.trace.rays.scene import (
     BODY,
@@ -17,11 +17,14 @@ from dataset_factory.trace.rays.scene import (
     mesh,
     move_meshes,
     move_vehicles,
+    visible,
 )
-from dataset_factory.trace.shadow.in_view import segments_in_view
-from dataset_factory.trace.shadow.kirchhoff import Outline, coarse_mesh
 from rfgs_core.radio import Radio
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.simulate.shadow.in_view import segments_in_view
+from rfgs_core.simulate.shadow.kirchhoff import Outline, coarse_mesh
+from rfgs_core.simulate.surface.direct import PosedPoints
+from rfgs_core.simulate.surface.points import SurfacePoints, surface_points
 
 
 class Bodies:
@@ -88,10 +91,9 @@ class Bodies:
             scene: What hides people from paths, everything in it in place.
         """
         posed = self.people.posed(vertices)
+        in_sight = partial(visible, scene.mi_scene)
         return [
-            Outline(
-                posed[kept], faces, segments_in_view(scene.mi_scene, corners, posed[kept], faces)
-            )
+            Outline(posed[kept], faces, segments_in_view(in_sight, corners, posed[kept], faces))
             for kept, faces in self._outlines
         ]
 

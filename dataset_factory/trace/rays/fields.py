@@ -16,7 +16,7 @@ from sionna.rt.path_solvers.paths_buffer import PathsBuffer
 from dataset_factory.scene.bundle import Bundle
 from dataset_factory.trace.rays.movers import Movers
 from dataset_factory.trace.rays.scene import set_frequency, static_name, vehicle_meshes
-from rfgs_core.simulate import SpecularPaths
+from rfgs_core.simulate.geometry import SpecularPaths
 
 
 class SceneMeshes:

@@ -18,6 +18,7 @@ from rfgs_core.radio import Layout, Radio
 from rfgs_core.radio.check import material_problems
 from rfgs_core.radio.constants import VACUUM_PERMITTIVITY
 from rfgs_core.radio.layout import DevicePose, rotation
+from rfgs_core.radio.sites import centres, owners
 from rfgs_core.radio.tissue import normal_reflection, skin_conductivity, skin_permittivity
 
 #: Transmitting and receiving sites that are traced together.
@@ -181,26 +182,6 @@ def add_antennas(
         orientation = mi.Point3f(*euler_angles(devices[rx_owner[index]].quat_wxyz))
         position = rx_centres[index].tolist()
         scene.add(rt.Receiver(f"rx-{index}", position=position, orientation=orientation))
-
-
-def centres(layout: Layout) -> tuple[np.ndarray, np.ndarray]:
-    """Centres of the TX and RX sites [m], each of shape (site, 3)."""
-    tx = [layout.tx_xyz[layout.tx_site == i].mean(axis=0) for i in range(layout.tx_site.max() + 1)]
-    rx = [layout.rx_xyz[layout.rx_site == i].mean(axis=0) for i in range(layout.rx_site.max() + 1)]
-    return np.stack(tx), np.stack(rx)
-
-
-def owners(layout: Layout) -> tuple[np.ndarray, np.ndarray]:
-    """Device of each TX and of each RX site."""
-    _, tx = np.unique(layout.tx_site, return_index=True)
-    _, rx = np.unique(layout.rx_site, return_index=True)
-    return layout.tx_device[tx], layout.rx_device[rx]
-
-
-def ports(layout: Layout) -> list[tuple[int, int]]:
-    """Pairs of a transmitting and a receiving polarisation port, transmitting first."""
-    tx, rx = np.unique(layout.tx_port), np.unique(layout.rx_port)
-    return [(int(i), int(j)) for i in tx for j in rx]
 
 
 def euler_angles(quat_wxyz: tuple[float, float, float, float]) -> tuple[float, float, float]:

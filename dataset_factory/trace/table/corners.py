@@ -9,9 +9,9 @@ import trimesh
 
 from dataset_factory.scene.bundle import Bundle
 from dataset_factory.trace.rays.movers import Movers
-from dataset_factory.trace.rays.paths import PathSet
 from dataset_factory.trace.rays.scene import static_name, vehicle_meshes
 from rfgs_core.radio.images import SCATTERING, directions
+from rfgs_core.simulate.paths.path_set import PathSet
 
 
 class CornerObjects:

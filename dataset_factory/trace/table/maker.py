@@ -8,13 +8,8 @@ from dataclasses import fields, replace
 import numpy as np
 
 from dataset_factory.trace.bounces.solver import with_facets
-from dataset_factory.trace.environment import WIDE_BAND_NODES, node_frequencies
 from dataset_factory.trace.instant import Trace
 from dataset_factory.trace.people.bodies import Bodies
-from dataset_factory.trace.rays.paths import PathSet, empty, merged
-from dataset_factory.trace.rays.scene import centres, owners
-from dataset_factory.trace.rays.steering import resampled
-from dataset_factory.trace.shadow.kirchhoff import Outline, Shadow, transmission
 from dataset_factory.trace.table.corners import CornerObjects, doppler_hz
 from dataset_factory.trace.table.patches import (
     direct_paths,
@@ -28,6 +23,11 @@ from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.images import SCATTERING
 from rfgs_core.radio.layout import DevicePose
 from rfgs_core.radio.path_table import PathTable, ends_rad
+from rfgs_core.radio.sites import centres, owners
+from rfgs_core.simulate.environment import WIDE_BAND_NODES, node_frequencies
+from rfgs_core.simulate.paths.path_set import PathSet, empty, merged
+from rfgs_core.simulate.paths.steering import resampled
+from rfgs_core.simulate.shadow.kirchhoff import Outline, Shadow, transmission
 
 #: Decimals of a delay [s] that are kept: femtoseconds, 0.3 µm.
 DELAY_DIGITS = 15

@@ -14,14 +14,14 @@ from dataclasses import replace
 import numpy as np
 
 from dataset_factory.trace.bounces.follow import follow
-from dataset_factory.trace.people.direct import PosedPoints, site_pairs
-from dataset_factory.trace.rays.paths import PathSet
-from dataset_factory.trace.rays.scene import centres, owners, ports
 from rfgs_core.radio import Layout, Radio
 from rfgs_core.radio.antennas import field, passed_on
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.images import REFRACTION, SCATTERING, directions
 from rfgs_core.radio.layout import DevicePose, rotation
+from rfgs_core.radio.sites import centres, owners, ports, site_pairs
+from rfgs_core.simulate.paths.path_set import PathSet
+from rfgs_core.simulate.surface.direct import PosedPoints
 
 #: Largest patch [m]; keeps limbs apart and arrays in the far field of what one scatters.
 LARGEST_PATCH_M = 0.2

@@ -105,8 +105,9 @@ def test_dipoles_have_their_closed_form_in_both_terms(
 
 def _direct(tracer, points) -> np.ndarray:
     """The direct term of some points between the two devices, without the body's own shadow."""
-    from dataset_factory.trace.people.direct import direct_channel, in_sight
+    from dataset_factory.trace.people.sight import in_sight
     from dataset_factory.trace.rays.scene import environment_scene
+    from rfgs_core.simulate.surface.direct import direct_channel
 
     free = environment_scene(tracer._bundle, tracer._radio)
     gamma = tracer._bodies.gamma(tracer._radio.freq_hz)
@@ -162,10 +163,11 @@ def test_direct_term_of_any_antenna_matches_the_solver(
 ) -> None:
     from dataset_factory.trace import Tracer
     from dataset_factory.trace.bounces.solver import Bounces, with_facets
-    from dataset_factory.trace.people.direct import direct_channel, in_sight
+    from dataset_factory.trace.people.sight import in_sight
     from dataset_factory.trace.rays.paths import path_set
-    from dataset_factory.trace.rays.scene import centres
-    from dataset_factory.trace.rays.steering import steer
+    from rfgs_core.radio.sites import centres
+    from rfgs_core.simulate.paths.steering import steer
+    from rfgs_core.simulate.surface.direct import direct_channel
 
     radio, devices = pair(replace(small_radio, pattern=pattern, polarization=polarization), 0.4)
     devices = [replace(devices[0], quat_wxyz=(0.95, 0.2, 0.1, 0.2)), devices[1]]

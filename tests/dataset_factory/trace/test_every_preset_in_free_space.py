@@ -23,7 +23,7 @@ STEEP = 0.999
 def test_free_space_is_friis_in_amplitude_and_phase(make_bundle: MakeBundle, name: str) -> None:
     """H = λ/(4πd) e^{−jkd} for every measured link and subcarrier."""
     from dataset_factory.trace import Tracer
-    from dataset_factory.trace.rays.scene import centres
+    from rfgs_core.radio.sites import centres
 
     radio = replace(PRESETS[name], num_devices=2)
     devices = place_devices(radio, BOUNDS_M)

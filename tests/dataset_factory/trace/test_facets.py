@@ -6,10 +6,10 @@ import pytest
 import trimesh
 from scipy.spatial import KDTree
 
-from dataset_factory.trace.people.facets import facet_sum
-from dataset_factory.trace.people.lloyd import Cells
-from dataset_factory.trace.people.points import surface_points
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.simulate.surface.facets import facet_sum
+from rfgs_core.simulate.surface.lloyd import Cells
+from rfgs_core.simulate.surface.points import surface_points
 
 FREQ_HZ = np.array([5.8e9])
 WAVELENGTH_M = SPEED_OF_LIGHT / 5.8e9

@@ -14,11 +14,11 @@ _DIGESTS = """
 import hashlib, os, sys
 os.environ["NUMBA_CACHE_DIR"] = sys.argv[1]
 import numpy as np, torch
-from dataset_factory.trace.shadow import silhouette
-from dataset_factory.trace.people.facets import facet_sum
-from dataset_factory.trace.shadow.frequencies import nodes_for
-from dataset_factory.trace.shadow.kirchhoff import _shade
-from dataset_factory.trace.rays.steering import _steer
+from rfgs_core.simulate.shadow import silhouette
+from rfgs_core.simulate.surface.facets import facet_sum
+from rfgs_core.simulate.shadow.frequencies import nodes_for
+from rfgs_core.simulate.shadow.kirchhoff import _shade
+from rfgs_core.simulate.paths.steering import _steer
 from rfgs_core.propagation import EnvironmentPaths, Links, Subcarriers, scatter, shadow
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 

@@ -12,15 +12,16 @@ import pytest
 import trimesh
 from box_meshes import mesh_of
 
-from dataset_factory.scene.bundle import SHARP, SMOOTH, UNSAID, Bundle, read_bundle
-from dataset_factory.trace.people.facets import facet_sum
-from dataset_factory.trace.people.points import SurfacePoints, surface_points, triangle_areas
+from dataset_factory.scene.bundle import Bundle, read_bundle
 from dataset_factory.verify.physical_optics import Cuboid as Box
 from dataset_factory.verify.physical_optics import cuboid as box
 from dataset_factory.verify.physical_optics import in_sight, scattered
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.radio import DevicePose, Radio, layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.simulate.surface.edges import SHARP, SMOOTH, UNSAID
+from rfgs_core.simulate.surface.facets import facet_sum
+from rfgs_core.simulate.surface.points import SurfacePoints, surface_points, triangle_areas
 
 MakeBundle = Callable[..., Bundle]
 WIFI_HZ, WIFI24_HZ = np.linspace(5.72e9, 5.88e9, 5), np.linspace(2.417e9, 2.457e9, 5)

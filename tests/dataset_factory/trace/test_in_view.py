@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -56,19 +57,21 @@ def test_a_body_half_behind_a_table_is_beside(
 ) -> None:
     """Segments on both sides of a wall tell which side a body is on; low walls hide a part."""
     from dataset_factory.trace import Tracer
-    from dataset_factory.trace.shadow.in_view import segments_in_view
+    from dataset_factory.trace.rays.scene import visible
+    from rfgs_core.simulate.shadow.in_view import segments_in_view
 
     low = make_sheet((1.3, 0, 0), (0, 4, 0), (0, 0, 0.8))
     bundle = make_bundle(static=[low], mover=coarse_capsule, material="metal")
     tracer = Tracer(bundle, small_radio, two_devices, depth=1)
     before, after = [[0.3, 0.4, 0.3], [0.3, 3.6, 0.3]], [[1.5, 0.4, 0.3], [1.5, 3.6, 0.3]]
     vertices, faces = bundle.frame(1).vertices, coarse_capsule[1]
-    scene, lines = tracer._environment.scene.mi_scene, np.array([before, after])
-    half_hidden = segments_in_view(scene, lines, vertices, faces)
+    free = partial(visible, tracer._environment.scene.mi_scene)
+    lines = np.array([before, after])
+    half_hidden = segments_in_view(free, lines, vertices, faces)
     np.testing.assert_array_equal(half_hidden, [[True], [True]])
     legs = faces[(vertices[faces][:, :, 2] < 0.7).all(axis=1)]
-    np.testing.assert_array_equal(segments_in_view(scene, lines, vertices, legs), [[False], [True]])
-    assert segments_in_view(scene, np.zeros((0, 2, 3)), vertices, faces).shape == (0, 1)
+    np.testing.assert_array_equal(segments_in_view(free, lines, vertices, legs), [[False], [True]])
+    assert segments_in_view(free, np.zeros((0, 2, 3)), vertices, faces).shape == (0, 1)
 
 
 def test_a_box_whose_corners_stick_in_floor_and_ceiling_is_in_sight(
@@ -78,13 +81,15 @@ def test_a_box_whose_corners_stick_in_floor_and_ceiling_is_in_sight(
     make_sheet: Callable[..., Mesh],
 ) -> None:
     from dataset_factory.trace import Tracer
-    from dataset_factory.trace.shadow.in_view import segments_in_view
+    from dataset_factory.trace.rays.scene import visible
+    from rfgs_core.simulate.shadow.in_view import segments_in_view
 
     slabs = [make_sheet((0, 0, z), (4, 0, 0), (0, 4, 0)) for z in (0.0, 2.6)]
     tracer = Tracer(make_bundle(static=slabs), small_radio, two_devices, depth=1)
     box = trimesh.creation.box(bounds=[[1.5, 1.5, -0.01], [2.5, 2.5, 2.61]])
-    scene, line = tracer._environment.scene.mi_scene, np.array([[[0.3, 2.0, 1.0], [3.7, 2.0, 1.0]]])
-    assert segments_in_view(scene, line, np.array(box.vertices), np.array(box.faces)).all()
+    free = partial(visible, tracer._environment.scene.mi_scene)
+    line = np.array([[[0.3, 2.0, 1.0], [3.7, 2.0, 1.0]]])
+    assert segments_in_view(free, line, np.array(box.vertices), np.array(box.faces)).all()
 
 
 @pytest.mark.parametrize("driven_x_m", [1.25, 3.0])

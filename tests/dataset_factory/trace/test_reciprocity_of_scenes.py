@@ -16,7 +16,7 @@ from dataset_factory.scene.bundle import Bundle, read_bundle
 from dataset_factory.trace.setup import prepare
 from rfgs_core.radio import DevicePose, Layout, layout, place_devices, preset
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
-from rfgs_core.simulate import Faces, faces_of
+from rfgs_core.simulate.geometry import Faces, faces_of
 
 prepare()
 

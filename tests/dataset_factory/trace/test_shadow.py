@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from dataset_factory.trace.rays.paths import PathSet
-from dataset_factory.trace.shadow.kirchhoff import Outline, coarse_mesh, transmission
 from rfgs_core.radio import Layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.simulate.paths.path_set import PathSet
+from rfgs_core.simulate.shadow.kirchhoff import Outline, coarse_mesh, transmission
 
 FREQ_HZ = np.array([5.8e9])
 D_1, D_2 = 2.5, 3.5

@@ -10,14 +10,14 @@ import pytest
 import trimesh
 from PIL import Image, ImageDraw
 
-from dataset_factory.trace.environment import environment_channel, node_frequencies
-from dataset_factory.trace.rays.paths import PathSet
-from dataset_factory.trace.shadow.frequencies import COUNTS, fine_grid, nodes_for
-from dataset_factory.trace.shadow.kirchhoff import Outline, transmission
-from dataset_factory.trace.shadow.silhouette import WINDOW
 from dataset_factory.verify.closed_forms import fresnel_integral
 from rfgs_core.radio import PRESETS, Layout, Radio, preset
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.simulate.environment import environment_channel, node_frequencies
+from rfgs_core.simulate.paths.path_set import PathSet
+from rfgs_core.simulate.shadow.frequencies import COUNTS, fine_grid, nodes_for
+from rfgs_core.simulate.shadow.kirchhoff import Outline, transmission
+from rfgs_core.simulate.shadow.silhouette import WINDOW
 
 D_1, D_2 = 2.5, 3.5
 #: Rectangles in Fresnel coordinates at the top of the band: x from and to, y from and to. A

@@ -39,7 +39,7 @@ def straight_paths(tracer, points, elements, devices):
     """Sionna's own paths to points outside the skin and on, no wall involved."""
     from dataset_factory.trace.bounces.solver import Bounces
     from dataset_factory.trace.rays.paths import path_set
-    from dataset_factory.trace.rays.scene import centres
+    from rfgs_core.radio.sites import centres
 
     scene, meshes = tracer._bodies.scene, tracer._environment.meshes
     bounces = Bounces(scene, meshes, elements, devices, depth=2, seed=1)
@@ -57,8 +57,9 @@ def test_direct_term_matches_the_solver(
     quat: tuple[float, float, float, float],
 ) -> None:
     from dataset_factory.trace.bounces.solver import with_facets
-    from dataset_factory.trace.people.direct import direct_channel, in_sight
-    from dataset_factory.trace.rays.steering import steer
+    from dataset_factory.trace.people.sight import in_sight
+    from rfgs_core.simulate.paths.steering import steer
+    from rfgs_core.simulate.surface.direct import direct_channel
 
     radio = replace(small_radio, rx_rows=1, rx_cols=1, num_subcarriers=4)
     devices = [replace(device, quat_wxyz=quat) for device in two_devices]
@@ -98,8 +99,8 @@ def test_bounces_match_those_of_many_rays(
     from dataset_factory.trace.bounces.follow import follow
     from dataset_factory.trace.bounces.solver import with_facets
     from dataset_factory.trace.rays.paths import path_set
-    from dataset_factory.trace.rays.scene import centres
-    from dataset_factory.trace.rays.steering import steer
+    from rfgs_core.radio.sites import centres
+    from rfgs_core.simulate.paths.steering import steer
 
     tracer, points = posed_body(person_bundle, small_radio, two_devices)
     fields = ("positions", "normals", "areas", "material")

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from rfgs_core.simulate import Sight, faces_of, surroundings
-from rfgs_core.simulate.faces import Faces
+from rfgs_core.simulate.geometry import Sight, faces_of, surroundings
+from rfgs_core.simulate.geometry.faces import Faces
 
 ANTENNAS = np.array([[0.51, 0.83, 1.23], [3.27, 4.11, 2.07], [0.4, 4.4, 0.9]])
 TURN = trimesh.transformations.rotation_matrix(0.3, [0.1, 0.3, 1.0])

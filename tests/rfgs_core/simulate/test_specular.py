@@ -10,8 +10,14 @@ import pytest
 import trimesh
 
 from rfgs_core.radio.images import REFRACTION, SPECULAR
-from rfgs_core.simulate import SpecularPaths, faces_of, mirror_legs, specular_paths, surroundings
-from rfgs_core.simulate.bvh import build_bvh, crossings
+from rfgs_core.simulate.geometry import (
+    SpecularPaths,
+    faces_of,
+    mirror_legs,
+    specular_paths,
+    surroundings,
+)
+from rfgs_core.simulate.geometry.bvh import build_bvh, crossings
 
 ROOM_M = np.array([4.0, 5.0, 2.6])
 TX = np.array([0.51, 0.83, 1.23])

@@ -15,12 +15,12 @@ from dataclasses import replace
 import numba
 import numpy as np
 
-from dataset_factory.trace.rays.paths import PathSet
-from dataset_factory.trace.rays.plain_sum import summed
-from dataset_factory.trace.rays.scene import ports
 from rfgs_core.radio import Layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.images import images
+from rfgs_core.radio.sites import ports
+from rfgs_core.simulate.paths.path_set import PathSet
+from rfgs_core.simulate.paths.plain_sum import summed
 
 _BLOCK = 128
 

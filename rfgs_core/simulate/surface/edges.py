@@ -13,8 +13,9 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from dataset_factory.scene.bundle import SHARP, SMOOTH
-
+#: What a mesh says of a triangle's side: nothing, that the surface is smooth across it, that it
+#: has an edge there.
+UNSAID, SMOOTH, SHARP = -1, 0, 1
 #: Triangles that meet at a larger angle have an edge between them, unless the mesh says
 #: otherwise [deg]: less than the 45° of a bevelled edge, more than the 36° between the sides of
 #: a limb of ten.

@@ -10,8 +10,8 @@ import numba
 import numpy as np
 from jaxtyping import Bool, Float64
 
-from rfgs_core.simulate.bvh import SAME_M, Bvh, build_bvh, crossings
-from rfgs_core.simulate.faces import Faces, height
+from rfgs_core.simulate.geometry.bvh import SAME_M, Bvh, build_bvh, crossings
+from rfgs_core.simulate.geometry.faces import Faces, height
 
 #: Surfaces in front of a face are counted up to this many.
 MOST_HIDDEN = 2

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dataset_factory.trace.rays.paths import PathSet
+from rfgs_core.simulate.paths.path_set import PathSet
 
 
 def unfold(paths: PathSet) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dataset_factory.trace.shadow.silhouette import WINDOW
+from rfgs_core.simulate.shadow.silhouette import WINDOW
 
 #: Error of a straight line between neighbours on the grid, relative to the path.
 GRID_ERROR = 1e-3

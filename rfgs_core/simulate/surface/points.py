@@ -14,9 +14,8 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from dataset_factory.scene.bundle import UNSAID
-from dataset_factory.trace.people.edges import corner_normals, smooth_patches, smooth_sides
-from dataset_factory.trace.people.lloyd import spread, triangle_areas
+from rfgs_core.simulate.surface.edges import UNSAID, corner_normals, smooth_patches, smooth_sides
+from rfgs_core.simulate.surface.lloyd import spread, triangle_areas
 
 #: Spacing of points as a share of the shortest wavelength; 0.4 is the coarsest that works.
 SPACING_WAVELENGTHS = 0.385

@@ -18,10 +18,10 @@ import numpy as np
 from jaxtyping import Bool
 
 from rfgs_core.radio.images import REFRACTION, SPECULAR
-from rfgs_core.simulate.beams import Beams, beams, onward
-from rfgs_core.simulate.bvh import SAME_M, crossings, triangle_at
-from rfgs_core.simulate.faces import Faces, height, holds, mirrored
-from rfgs_core.simulate.surroundings import Surroundings
+from rfgs_core.simulate.geometry.beams import Beams, beams, onward
+from rfgs_core.simulate.geometry.bvh import SAME_M, crossings, triangle_at
+from rfgs_core.simulate.geometry.faces import Faces, height, holds, mirrored
+from rfgs_core.simulate.geometry.surroundings import Surroundings
 
 #: Interactions of a path at most.
 MAX_DEPTH = 3

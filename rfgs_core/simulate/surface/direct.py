@@ -5,16 +5,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
 
 import numpy as np
 
-from dataset_factory.trace.people.facets import facet_sum
-from dataset_factory.trace.people.points import LIFT_M
-from dataset_factory.trace.rays.scene import centres, owners, ports, visible
 from rfgs_core.radio import Layout, Radio
 from rfgs_core.radio.antennas import field, passed_on
 from rfgs_core.radio.layout import DevicePose, rotation
+from rfgs_core.radio.sites import centres, owners, ports, site_pairs
+from rfgs_core.simulate.surface.facets import facet_sum
+from rfgs_core.simulate.surface.points import LIFT_M
 
 
 @dataclass(frozen=True)
@@ -37,22 +36,6 @@ class PosedPoints:
         For visibility alone: a wave scattered there would be half a turn early at 75 GHz.
         """
         return self.positions + LIFT_M * self.normals
-
-
-def in_sight(mi_scene: Any, points: PosedPoints, layout: Layout) -> np.ndarray:
-    """Which points every pair of sites sees from both ends.
-
-    Sionna's own ray test from each point to the centre of each site, in the scene with
-    everything that moves in place.
-
-    Returns:
-        1 where nothing stands between, else 0, shape (tx site, rx site, point).
-    """
-    lifted = points.lifted
-    tx_centres, rx_centres = centres(layout)
-    sees_tx = np.stack([visible(mi_scene, lifted, centre) for centre in tx_centres])
-    sees_rx = np.stack([visible(mi_scene, lifted, centre) for centre in rx_centres])
-    return (sees_tx[:, None] & sees_rx[None]).astype(np.float64)
 
 
 def direct_channel(
@@ -108,10 +91,3 @@ def direct_channel(
             )
             out[np.ix_(tx, rx)] += part * coefficient
     return out
-
-
-def site_pairs(layout: Layout) -> list[tuple[int, int]]:
-    """Pairs of a transmitting and a receiving site that have a measured link."""
-    links = np.argwhere(layout.measured)
-    pairs = np.stack([layout.tx_site[links[:, 0]], layout.rx_site[links[:, 1]]], axis=1)
-    return [(int(a), int(b)) for a, b in np.unique(pairs, axis=0)]

@@ -16,12 +16,12 @@ from typing import Literal
 import numba
 import numpy as np
 
-from dataset_factory.trace.rays.paths import PathSet
-from dataset_factory.trace.shadow import silhouette
-from dataset_factory.trace.shadow.frequencies import Nodes, nodes_for
-from dataset_factory.trace.shadow.unfold import unfold
 from rfgs_core.radio import Layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.simulate.paths.path_set import PathSet
+from rfgs_core.simulate.shadow import silhouette
+from rfgs_core.simulate.shadow.frequencies import Nodes, nodes_for
+from rfgs_core.simulate.shadow.unfold import unfold
 
 Shadow = Literal["kirchhoff", "hard"]
 

@@ -9,7 +9,7 @@ import numba
 import numpy as np
 from jaxtyping import Float, Integer
 
-from rfgs_core.simulate.bvh import Bvh, build_bvh
+from rfgs_core.simulate.geometry.bvh import Bvh, build_bvh
 
 #: Most faces that are searched exhaustively, the largest ones; time grows with their square.
 MAX_FACES = 10_000

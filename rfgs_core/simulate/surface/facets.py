@@ -22,8 +22,8 @@ import math
 import numba
 import numpy as np
 
-from dataset_factory.trace.rays.plain_sum import summed
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.simulate.paths.plain_sum import summed
 
 _BLOCK = 64
 #: Facets damped by more than e^-30 are below −260 dB and are left out.

@@ -10,9 +10,9 @@ import numba
 import numpy as np
 from jaxtyping import Float64
 
-from rfgs_core.simulate.bvh import triangle_at
-from rfgs_core.simulate.faces import Faces, mirrored
-from rfgs_core.simulate.surroundings import Surroundings
+from rfgs_core.simulate.geometry.bvh import triangle_at
+from rfgs_core.simulate.geometry.faces import Faces, mirrored
+from rfgs_core.simulate.geometry.surroundings import Surroundings
 
 
 class Legs(NamedTuple):

@@ -8,11 +8,9 @@ that go through the wall themselves are segments on either side, and are shaded 
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
-
-from dataset_factory.trace.rays.scene import visible
 
 #: Places on a body, at most, any of which may be in sight.
 PLACES = 24
@@ -21,12 +19,16 @@ _MARGIN_M = 0.01
 
 
 def segments_in_view(
-    mi_scene: Any, corners: np.ndarray, vertices: np.ndarray, faces: np.ndarray
+    visible: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    corners: np.ndarray,
+    vertices: np.ndarray,
+    faces: np.ndarray,
 ) -> np.ndarray:
     """Whether any of a body is in sight from where segments of paths pass it.
 
     Args:
-        mi_scene: Mitsuba scene of everything that hides, without the body.
+        visible: Tells whether nothing but the body stands between places and places [m], both of
+            shape (point, 3).
         corners: Corners of paths [m], shape (path, corner, 3).
         vertices: Vertices of the body [m], shape (V, 3).
         faces: Its triangles, shape (T, 3).
@@ -43,5 +45,5 @@ def segments_in_view(
     foot = (start + share[..., None] * way).reshape(-1, 3)
     # Not vertices: those of a simple mesh are its corners, which may stick in floor and ceiling.
     places = vertices[faces[:: -(-len(faces) // PLACES)]].mean(axis=1)
-    seen = visible(mi_scene, np.repeat(foot, len(places), axis=0), np.tile(places, (len(foot), 1)))
+    seen = visible(np.repeat(foot, len(places), axis=0), np.tile(places, (len(foot), 1)))
     return seen.reshape(*share.shape, len(places)).any(axis=2)

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from rfgs_core.simulate.bvh import SAME_M
-from rfgs_core.simulate.faces import Faces, height, mirrored
+from rfgs_core.simulate.geometry.bvh import SAME_M
+from rfgs_core.simulate.geometry.faces import Faces, height, mirrored
 
 #: Footprints narrower than this share of the face they fall on are searched in order of place.
 _NARROW = 0.1

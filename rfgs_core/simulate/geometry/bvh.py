@@ -44,6 +44,31 @@ def build_bvh(triangles: Float64[np.ndarray, "triangle 3 3"]) -> Bvh:
     return Bvh(triangles[order], order, low, high, first, count)
 
 
+@numba.njit(cache=True, nogil=True)
+def refit(bvh: Bvh, triangles: np.ndarray) -> Bvh:
+    """The same hierarchy over triangles that have moved a little, its boxes drawn anew.
+
+    Args:
+        bvh: The hierarchy.
+        triangles: Corners in the order that it was built from [m], shape (triangle, 3, 3).
+    """
+    corners = triangles[bvh.triangle]
+    low, high = np.full_like(bvh.low, np.inf), np.full_like(bvh.high, -np.inf)
+    for node in range(len(bvh.first) - 1, -1, -1):
+        if bvh.count[node] == 0 and len(bvh.first) > 1:
+            for child in range(bvh.first[node], bvh.first[node] + 2):
+                for axis in range(3):
+                    low[node, axis] = min(low[node, axis], low[child, axis])
+                    high[node, axis] = max(high[node, axis], high[child, axis])
+            continue
+        for i in range(bvh.first[node], bvh.first[node] + bvh.count[node]):
+            for corner in range(3):
+                for axis in range(3):
+                    low[node, axis] = min(low[node, axis], corners[i, corner, axis])
+                    high[node, axis] = max(high[node, axis], corners[i, corner, axis])
+    return Bvh(corners, bvh.triangle, low, high, bvh.first, bvh.count)
+
+
 @numba.njit(cache=True)
 def _built(
     triangles: np.ndarray,
@@ -141,6 +166,40 @@ def crossings(
             if found > len(at_m):
                 return found
     return found
+
+
+@numba.njit(cache=True, nogil=True)
+def nearest(bvh: Bvh, start: np.ndarray, way: np.ndarray, rim_m: float) -> float:
+    """Distance of the first triangle that a ray meets, infinite if it meets none [m].
+
+    Args:
+        bvh: The triangles.
+        start: Where it starts [m], shape (3,).
+        way: Where to, a unit vector, shape (3,).
+        rim_m: What is nearer than this does not count [m].
+    """
+    x, y, z, wx, wy, wz = start[0], start[1], start[2], way[0], way[1], way[2]
+    inverse_x, inverse_y, inverse_z = _inverse(wx), _inverse(wy), _inverse(wz)
+    low, high, first, count, corners = bvh.low, bvh.high, bvh.first, bvh.count, bvh.corners
+    stack = np.zeros(_STACK, dtype=np.int64)
+    size, best = 1, np.inf
+    while size:
+        size -= 1
+        node = stack[size]
+        near, far = _within(low[node, 0], high[node, 0], x, inverse_x, 0.0, best)
+        near, far = _within(low[node, 1], high[node, 1], y, inverse_y, near, far)
+        near, far = _within(low[node, 2], high[node, 2], z, inverse_z, near, far)
+        if near > far:
+            continue
+        if count[node] == 0 and len(first) > 1:
+            stack[size], stack[size + 1] = first[node] + 1, first[node]
+            size += 2
+            continue
+        for i in range(first[node], first[node] + count[node]):
+            at = _hit(corners, i, x, y, z, wx, wy, wz)
+            if rim_m < at < best:
+                best = at
+    return best
 
 
 @numba.njit(cache=True, nogil=True, inline="always")

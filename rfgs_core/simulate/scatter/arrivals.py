@@ -12,6 +12,7 @@ import numpy as np
 from rfgs_core.simulate.geometry.bvh import SAME_M, Bvh, crossings
 from rfgs_core.simulate.geometry.faces import Faces
 from rfgs_core.simulate.scatter.antenna import Antenna, sent_towards
+from rfgs_core.simulate.scatter.kernel import seen_from_centres
 from rfgs_core.simulate.sight.bodies import Picture, hides
 from rfgs_core.simulate.sight.mirrors import Mirror, mirrored_at
 from rfgs_core.simulate.sight.panorama import Panorama, sees
@@ -70,6 +71,7 @@ def straight(
     faces: Faces,
     antenna: Antenna,
     slabs: Slabs,
+    wanted: np.ndarray,
     clear: np.ndarray,
     through: np.ndarray,
 ) -> tuple[int, int]:
@@ -82,8 +84,9 @@ def straight(
         faces: The same as faces.
         antenna: The site's antenna.
         slabs: What the faces are made of.
+        wanted: Facets that matter, int64.
         clear: Filled with θ and φ of the field where nothing is in the way, complex64, shape
-            (facet, 2, node); zero elsewhere.
+            (facet, 2, node).
         through: Filled with those behind one surface; empty if they do not matter.
 
     Returns:
@@ -92,13 +95,8 @@ def straight(
     wave = np.zeros((clear.shape[2], 3), dtype=np.complex64)
     at_m, hit = np.zeros(1), np.zeros(1, dtype=np.int64)
     n_clear, n_through = 0, 0
-    for p in range(len(facets.points)):
-        clear[p] = 0.0
-        if len(through):
-            through[p] = 0.0
+    for p in wanted:
         lifted = facets.lifted[p]
-        if not _faces(facets, p, around.place, antenna.reach_m):
-            continue
         free = sees(around, faces.bvh, lifted)
         if not (free or len(through)):
             continue
@@ -122,7 +120,7 @@ def straight(
 @numba.njit(cache=True, nogil=True)
 def by_mirror(
     facets: Facets,
-    body: tuple[int, int],
+    wanted: np.ndarray,
     from_image: Picture,
     pictures: Pictures,
     around: Panorama,
@@ -136,7 +134,7 @@ def by_mirror(
 
     Args:
         facets: The facets.
-        body: First facet of the body and one past its last.
+        wanted: Facets of the body that matter, int64.
         from_image: Everything that moves as seen from the image of the site towards the body.
         pictures: The same as seen from the site.
         around: What stands around the site.
@@ -144,8 +142,8 @@ def by_mirror(
         view: The face.
         antenna: The site's antenna.
         slabs: What the faces are made of.
-        out: Filled with θ and φ of the field, complex64, shape (facet, 2, node); zero where
-            something is in the way.
+        out: Filled with θ and φ of the field where nothing is in the way, complex64, shape
+            (facet, 2, node).
 
     Returns:
         How many facets it reaches.
@@ -153,10 +151,7 @@ def by_mirror(
     wave = np.zeros((out.shape[2], 3), dtype=np.complex64)
     at, count = np.zeros(3), 0
     factors = slabs.mirrored[slabs.of_face[view.face]]
-    for p in range(body[0], body[1]):
-        out[p] = 0.0
-        if not _faces(facets, p, view.image, antenna.reach_m):
-            continue
+    for p in wanted:
         if not mirrored_at(faces, view, around, facets.lifted[p], at):
             continue
         hidden = hides(from_image, facets.bvh, facets.triangles, facets.lifted[p])
@@ -175,12 +170,41 @@ def by_mirror(
 
 
 @numba.njit(cache=True, nogil=True)
-def _faces(facets: Facets, p: int, place: np.ndarray, reach_m: float) -> bool:
-    """Whether a facet is turned to a place; elements beside it may see what it just misses."""
-    facing = 0.0
-    for axis in range(3):
-        facing += facets.normals[p, axis] * (place[axis] - facets.lifted[p, axis])
-    return facing > -reach_m
+def wanted_facets(
+    facets: Facets,
+    body: tuple[int, int],
+    place: np.ndarray,
+    partners: np.ndarray,
+    lowest_k: float,
+    size_m: float,
+) -> np.ndarray:
+    """Facets of a body that a place and any of its partners may see together, int64.
+
+    Args:
+        facets: The facets.
+        body: First facet of the body and one past its last.
+        place: Centre of an array, or of its image [m], shape (3,).
+        partners: Centres of the arrays at the other end, and of their images [m], (partner, 3).
+        lowest_k: Lowest wavenumber [rad/m].
+        size_m: Size of both arrays together [m].
+    """
+    found = np.zeros(body[1] - body[0], dtype=np.int64)
+    count = 0
+    for p in range(body[0], body[1]):
+        n = facets.normals[p]
+        to = place - facets.points[p]
+        d = math.sqrt((to * to).sum())
+        if (to * n).sum() < -size_m:
+            continue
+        for partner in partners:
+            other = partner - facets.points[p]
+            d_other = math.sqrt((other * other).sum())
+            damping, spread = lowest_k**2 * facets.areas[p] / 24.0, size_m / min(d, d_other)
+            if seen_from_centres(to / d, other / d_other, n, damping, spread):
+                found[count] = p
+                count += 1
+                break
+    return found[:count]
 
 
 @numba.njit(cache=True, nogil=True)

@@ -62,7 +62,9 @@ def delay_grid(radio: Radio, layout: Layout) -> DelayGrid:
     step = (k[-1] - k[0]) / max(count - 1, 1)
     cells = scipy.fft.next_fast_len(max(2 * count, 4 * WIDTH))
     half = max(0.5 * (k[-1] - k[0]), 1e-9)
-    reach_m = _reach(layout.tx_xyz, layout.tx_site) + _reach(layout.rx_xyz, layout.rx_site)
+    reach_m = array_reach(layout.tx_xyz, layout.tx_site) + array_reach(
+        layout.rx_xyz, layout.rx_site
+    )
     nodes = _enough(half * reach_m, half / k.mean()) if count > 1 else 1
     node_k = np.linspace(k[0], k[-1], nodes) if nodes > 1 else k[middle : middle + 1]
     share = _lagrange(node_k, k)
@@ -110,8 +112,13 @@ def to_subcarriers(grid: DelayGrid, spread: np.ndarray) -> np.ndarray:
     return out
 
 
-def _reach(xyz: np.ndarray, site: np.ndarray) -> float:
-    """Largest distance of an element from the centre of its site [m]."""
+def array_reach(xyz: np.ndarray, site: np.ndarray) -> float:
+    """Largest distance of an element from the centre of its site [m].
+
+    Args:
+        xyz: Elements [m], shape (element, 3).
+        site: Site of each, shape (element,).
+    """
     return max(
         float(np.linalg.norm(xyz[site == s] - xyz[site == s].mean(axis=0), axis=1).max())
         for s in np.unique(site)

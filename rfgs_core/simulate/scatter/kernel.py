@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Spreads facets over the delay grid of every link between two arrays.
+"""Spreads facets over the delay grids of all links to one array.
 
-The facet is that of `rfgs_core.simulate.surface.facets`, exact for every pair of elements; only
-its polarisation, its walls and what hides it are taken at the centres of the arrays, and come as
-weights. Lengths are in double precision up to the whole turns of the phase, the rest in single:
-links lie side by side, so that the inner loops become vector code.
+The facet is that of `rfgs_core.simulate.surface.facets`. Polarisation, walls and what hides a
+facet are taken at the centres of the arrays and come as fields; phases are exact for every
+element. So are amplitudes where the way is straight at both ends; by way of a wall they are those
+of the centres. Links lie side by side in single precision, so that the inner loops become vector
+code; what single precision could not tell, the whole way between the centres, is kept in double.
 """
 
 from __future__ import annotations
@@ -14,137 +15,120 @@ import math
 import numba
 import numpy as np
 
-from rfgs_core.simulate.scatter.grid import WIDTH
+from rfgs_core.simulate.scatter.grid import BETA, WIDTH
 
 #: Facets damped by more than e^-12 are 100 dB weaker than they could be and are left out.
 _MOST_DAMPED = 12.0
-#: Adding and taking away this rounds a double to whole numbers.
-_ROUND = 6755399441055744.0
+#: Adding and taking away this rounds a single to whole numbers.
+_ROUND = np.float32(12582912.0)
+_HALF, _ONE, _TWO = np.float32(0.5), np.float32(1.0), np.float32(2.0)
+_PI = np.float32(math.pi)
+#: sin and cos of ±π/2 by their series, Taylor's with the last term fitted: errors below 1e-6.
+_S3, _S5, _S7, _S9 = (np.float32(v) for v in (-1 / 6, 1 / 120, -1.9841e-4, 2.72e-6))
+_C2, _C4, _C6, _C8 = (np.float32(v) for v in (-0.5, 1 / 24, -1.38887e-3, 2.46e-5))
+_E3, _E4, _E5 = (np.float32(1.0 / v) for v in (6.0, 24.0, 120.0))
+_SIXTEENTH = np.float32(-1.0 / 16.0)
+_FAST = {"contract", "nsz", "ninf", "nnan"}
 
 
-@numba.njit(cache=True, nogil=True, fastmath={"contract", "nsz", "ninf", "nnan"})
+@numba.njit(cache=True, nogil=True, fastmath=_FAST)
 def _elements(
-    p: np.ndarray,
+    way: np.ndarray,
     n: np.ndarray,
-    xyz: np.ndarray,
-    centre_m: float,
+    offsets: np.ndarray,
     turns: np.ndarray,
-    ways: np.ndarray,
+    seen: np.ndarray,
     phasor: np.ndarray,
 ) -> None:
-    """What one facet sees of an array.
+    """What one facet sees of an array, beyond its centre.
 
     Args:
-        p: Facet [m], shape (3,).
+        way: From the facet to the centre [m], shape (3,).
         n: Its normal, shape (3,).
-        xyz: Elements [m], shape (3, element).
-        centre_m: Distance of the facet from the centre of the array [m].
+        offsets: Elements from the centre [m], and their squared distance from it [m²], float32,
+            shape (4, element).
         turns: Turns per metre at the middle subcarrier, and at each node beyond that, (1 + node,).
-        ways: Filled with unit vectors to the elements, their part along the normal and one over
+        seen: Filled with unit vectors to the elements, their part along the normal and one over
             the distances, float32, shape (5, element).
-        phasor: Filled with e^{−jkd}, the centre's turns beyond the middle subcarrier left to the
-            grid, real and imaginary, float32, shape (node, 2, element).
+        phasor: Filled with e^{−jkδ}, δ what each element is farther away than the centre, real
+            and imaginary, float32, shape (node, 2, element).
     """
-    x, y, z = p[0], p[1], p[2]
-    nx, ny, nz = n[0], n[1], n[2]
-    xs, ys, zs = xyz[0], xyz[1], xyz[2]
-    w0, w1, w2, w3, w4 = ways[0], ways[1], ways[2], ways[3], ways[4]
-    for e in range(len(xs)):
-        dx, dy, dz = xs[e] - x, ys[e] - y, zs[e] - z
-        d = math.sqrt(dx * dx + dy * dy + dz * dz)
-        inverse = 1.0 / d
-        w0[e], w1[e], w2[e] = dx * inverse, dy * inverse, dz * inverse
-        w3[e] = (dx * nx + dy * ny + dz * nz) * inverse
-        w4[e] = inverse
+    x, y, z = np.float32(way[0]), np.float32(way[1]), np.float32(way[2])
+    nx, ny, nz = np.float32(n[0]), np.float32(n[1]), np.float32(n[2])
+    centre_2 = x * x + y * y + z * z
+    centre = np.float32(math.sqrt(centre_2))
+    along = x * nx + y * ny + z * nz
+    ox, oy, oz, o2 = offsets[0], offsets[1], offsets[2], offsets[3]
+    s0, s1, s2, s3, s4 = seen[0], seen[1], seen[2], seen[3], seen[4]
+    re, im = phasor[0, 0], phasor[0, 1]
+    per_m = np.float32(turns[0])
+    for e in range(len(ox)):
+        farther_2 = _TWO * (x * ox[e] + y * oy[e] + z * oz[e]) + o2[e]
+        d = np.sqrt(centre_2 + farther_2)
+        inverse = _ONE / d
+        s0[e], s1[e], s2[e] = (x + ox[e]) * inverse, (y + oy[e]) * inverse, (z + oz[e]) * inverse
+        s3[e] = (along + nx * ox[e] + ny * oy[e] + nz * oz[e]) * inverse
+        s4[e] = inverse
+        # The difference of two roots, without losing its digits.
+        delta = farther_2 / (d + centre)
+        phasor[len(phasor) - 1, 1, e] = delta
+    deltas = phasor[len(phasor) - 1, 1].copy()
+    for e in range(len(ox)):
+        turn = per_m * deltas[e]
+        a = _PI * (turn - ((turn + _ROUND) - _ROUND))
+        b = a * a
+        s = a * (_ONE + b * (_S3 + b * (_S5 + b * (_S7 + b * _S9))))
+        c = _ONE + b * (_C2 + b * (_C4 + b * (_C6 + b * _C8)))
+        # sin and cos of 2a: at a = ±π/2 both series are at their worst, their product is not.
+        re[e] = _ONE - _TWO * s * s
+        im[e] = -_TWO * s * c
+    base_re, base_im = phasor[0, 0].copy(), phasor[0, 1].copy()
     for m in range(len(phasor)):
-        re, im = phasor[m, 0], phasor[m, 1]
-        per_m, beyond = turns[0] + turns[1 + m], turns[1 + m] * centre_m
-        for e in range(len(xs)):
-            dx, dy, dz = xs[e] - x, ys[e] - y, zs[e] - z
-            d = math.sqrt(dx * dx + dy * dy + dz * dz)
-            turn = per_m * d - beyond
-            whole = (turn + _ROUND) - _ROUND
-            f = np.float32(turn - whole)
-            # sin and cos of 2πf for −½ ≤ f ≤ ½, from those of πf: errors below 4e-6.
-            a = np.float32(3.14159265) * f
+        more = np.float32(2.0 * math.pi * turns[1 + m])
+        row_re, row_im = phasor[m, 0], phasor[m, 1]
+        for e in range(len(ox)):
+            a = more * deltas[e]
             b = a * a
-            s = a * (
-                np.float32(0.9999999995)
-                + b
-                * (
-                    np.float32(-0.16666666)
-                    + b
-                    * (
-                        np.float32(8.3333310e-3)
-                        + b * (np.float32(-1.9840874e-4) + b * np.float32(2.7525562e-6))
-                    )
-                )
-            )
-            c = np.float32(1.0) + b * (
-                np.float32(-0.5)
-                + b
-                * (
-                    np.float32(4.1666638e-2)
-                    + b
-                    * (
-                        np.float32(-1.3888378e-3)
-                        + b * (np.float32(2.4760495e-5) + b * np.float32(-2.6051615e-7))
-                    )
-                )
-            )
-            re[e] = np.float32(1.0) - np.float32(2.0) * s * s
-            im[e] = np.float32(-2.0) * s * c
+            s = a * (_ONE + b * (_S3 + b * _S5))
+            c = _ONE + b * (_C2 + b * (_C4 + b * _C6))
+            row_re[e] = base_re[e] * c + base_im[e] * s
+            row_im[e] = base_im[e] * c - base_re[e] * s
 
 
-@numba.njit(cache=True, nogil=True, fastmath={"contract", "nsz", "ninf", "nnan"})
-def _amplitudes(
-    tx: np.ndarray, t: int, rx: np.ndarray, damping: np.ndarray, out: np.ndarray
-) -> None:
-    """Real amplitude of one facet between an element and all of an array, per node.
+@numba.njit(cache=True, nogil=True, fastmath=_FAST)
+def _amplitudes(tx: np.ndarray, t: int, rx: np.ndarray, damping: float, out: np.ndarray) -> None:
+    """Real amplitude of one facet between an element and all of an array.
 
     Args:
-        tx: Ways to the transmitting elements, see `_elements`.
+        tx: What the facet sees of the transmitting elements, see `_elements`.
         t: Which of them.
-        rx: Ways to the receiving elements.
-        damping: k² A / 24 at each node, float32, shape (node,).
-        out: Filled, float32, shape (node, rx).
+        rx: What it sees of the receiving elements.
+        damping: k² A / 24.
+        out: Filled, float32, shape (rx,).
     """
     x, y, z, along, near = tx[0, t], tx[1, t], tx[2, t], tx[3, t], tx[4, t]
     r0, r1, r2, r3, r4 = rx[0], rx[1], rx[2], rx[3], rx[4]
-    for m in range(len(damping)):
-        row, factor = out[m], damping[m]
-        for r in range(len(r0)):
-            c = along + r3[r]
-            q_t2 = np.float32(2.0) + np.float32(2.0) * (x * r0[r] + y * r1[r] + z * r2[r]) - c * c
-            e = factor * max(q_t2, np.float32(0.0))
-            lit = (r3[r] > np.float32(0.0)) & (e < np.float32(_MOST_DAMPED))
-            # e^−e = (e^−e/16)^16, the inner one by its series.
-            y_ = min(e, np.float32(_MOST_DAMPED)) * np.float32(-1.0 / 16.0)
-            s = np.float32(1.0) + y_ * (
-                np.float32(1.0)
-                + y_
-                * (
-                    np.float32(0.5)
-                    + y_
-                    * (
-                        np.float32(1.0 / 6.0)
-                        + y_ * (np.float32(1.0 / 24.0) + y_ * np.float32(1.0 / 120.0))
-                    )
-                )
-            )
-            s = s * s
-            s = s * s
-            s = s * s
-            s = s * s
-            value = c * near * r4[r] * s
-            row[r] = value if lit else np.float32(0.0)
+    factor, most, none = np.float32(damping), np.float32(_MOST_DAMPED), np.float32(0.0)
+    for r in range(len(r0)):
+        c = along + r3[r]
+        q_t2 = _TWO + _TWO * (x * r0[r] + y * r1[r] + z * r2[r]) - c * c
+        e = factor * max(q_t2, none)
+        lit = (r3[r] > none) & (e < most)
+        # e^−e = (e^−e/16)^16, the inner one by its series.
+        a = min(e, most) * _SIXTEENTH
+        s = _ONE + a * (_ONE + a * (_HALF + a * (_E3 + a * (_E4 + a * _E5))))
+        s = s * s
+        s = s * s
+        s = s * s
+        s = s * s
+        value = c * near * r4[r] * s
+        out[r] = value if lit else none
 
 
-@numba.njit(cache=True, nogil=True, fastmath={"contract", "nsz", "ninf", "nnan"})
+@numba.njit(cache=True, nogil=True, fastmath=_FAST)
 def _add(
     amplitude: np.ndarray,
-    sent_re: float,
-    sent_im: float,
+    sent: complex,
     heard: np.ndarray,
     kernel: np.ndarray,
     first: int,
@@ -155,8 +139,7 @@ def _add(
 
     Args:
         amplitude: Real amplitude per receiving element, shape (rx,).
-        sent_re: Real part of weight times phasor of the transmitting element.
-        sent_im: Imaginary part.
+        sent: Weight of the facet times the phasor of the transmitting element.
         heard: Phasors of the receiving elements, shape (2, rx).
         kernel: The window over the cells, shape (`WIDTH`,).
         first: First cell.
@@ -164,39 +147,47 @@ def _add(
         out: The grid of a node, float32, shape (2, cell, link).
     """
     h_re, h_im = heard[0], heard[1]
+    s_re, s_im = np.float32(sent.real), np.float32(sent.imag)
+    k_0, k_1, k_2, k_3 = kernel[0], kernel[1], kernel[2], kernel[3]
+    end = lanes + len(h_re)
     cells = out.shape[1]
-    re = np.zeros(len(h_re), dtype=np.float32)
-    im = np.zeros(len(h_re), dtype=np.float32)
+    c_0, c_1, c_2, c_3 = (
+        first % cells,
+        (first + 1) % cells,
+        (first + 2) % cells,
+        (first + 3) % cells,
+    )
+    re_0, re_1, re_2, re_3 = (
+        out[0, c_0, lanes:end],
+        out[0, c_1, lanes:end],
+        out[0, c_2, lanes:end],
+        out[0, c_3, lanes:end],
+    )
+    im_0, im_1, im_2, im_3 = (
+        out[1, c_0, lanes:end],
+        out[1, c_1, lanes:end],
+        out[1, c_2, lanes:end],
+        out[1, c_3, lanes:end],
+    )
     for r in range(len(h_re)):
-        re[r] = amplitude[r] * (sent_re * h_re[r] - sent_im * h_im[r])
-        im[r] = amplitude[r] * (sent_re * h_im[r] + sent_im * h_re[r])
-    for w in range(WIDTH):
-        cell = (first + w) % cells
-        row_re, row_im, k = out[0, cell], out[1, cell], kernel[w]
-        for r in range(len(h_re)):
-            row_re[lanes + r] += k * re[r]
-            row_im[lanes + r] += k * im[r]
+        re = amplitude[r] * (s_re * h_re[r] - s_im * h_im[r])
+        re_0[r] += k_0 * re
+        re_1[r] += k_1 * re
+        re_2[r] += k_2 * re
+        re_3[r] += k_3 * re
+    for r in range(len(h_re)):
+        im = amplitude[r] * (s_re * h_im[r] + s_im * h_re[r])
+        im_0[r] += k_0 * im
+        im_1[r] += k_1 * im
+        im_2[r] += k_2 * im
+        im_3[r] += k_3 * im
 
 
 @numba.njit(cache=True, nogil=True)
-def _norm(v: np.ndarray) -> float:
-    return math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
-
-
-@numba.njit(cache=True, nogil=True)
-def _size(xyz: np.ndarray, centre: np.ndarray) -> float:
-    """Largest distance of elements, shape (3, element), from the centre of their array [m]."""
-    largest = 0.0
-    for e in range(xyz.shape[1]):
-        largest = max(largest, _norm(xyz[:, e] - centre))
-    return largest
-
-
-@numba.njit(cache=True, nogil=True)
-def _misses(
+def seen_from_centres(
     to_tx: np.ndarray, to_rx: np.ndarray, n: np.ndarray, damping: float, spread: float
 ) -> bool:
-    """Whether no pair of elements sees a facet, judged from the centres of their arrays.
+    """Whether any pair of elements of two arrays may see a facet, judged from their centres.
 
     Args:
         to_tx: Unit vector to the centre of the transmitting array.
@@ -208,11 +199,13 @@ def _misses(
     c_t = to_tx[0] * n[0] + to_tx[1] * n[1] + to_tx[2] * n[2]
     c_r = to_rx[0] * n[0] + to_rx[1] * n[1] + to_rx[2] * n[2]
     if c_t < -spread or c_r < -spread:
-        return True
+        return False
     qx, qy, qz = to_tx[0] + to_rx[0], to_tx[1] + to_rx[1], to_tx[2] + to_rx[2]
     q_t2 = qx * qx + qy * qy + qz * qz - (c_t + c_r) ** 2
+    if damping * q_t2 < _MOST_DAMPED:
+        return True
     q_t = max(math.sqrt(max(q_t2, 0.0)) - 2.0 * spread, 0.0)
-    return damping * q_t * q_t > _MOST_DAMPED
+    return damping * q_t * q_t < _MOST_DAMPED
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
@@ -220,76 +213,96 @@ def spread_facets(
     points: np.ndarray,
     normals: np.ndarray,
     areas: np.ndarray,
-    fields: tuple[np.ndarray, np.ndarray],
     gamma: np.ndarray,
     material: np.ndarray,
+    used: np.ndarray,
+    from_rx: np.ndarray,
+    from_tx: tuple[np.ndarray, np.ndarray],
     ends: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
-    grid: tuple[float, float, np.ndarray],
-    beta: float,
+    grid: tuple[float, float, np.ndarray, float],
+    exact: np.ndarray,
+    onto: np.ndarray,
     out: np.ndarray,
 ) -> None:
-    """Adds facets between two arrays to the grid of their links.
+    """Adds facets between one array and several others to the grids of their links.
 
     Args:
         points: Positions [m], shape (facet, 3).
         normals: Unit normals, shape (facet, 3).
         areas: Areas [m²], shape (facet,).
-        fields: θ and φ of what reaches each facet from both ends, 0 where it is hidden, each
-            complex64, shape (facet, 2, node).
         gamma: Reflection coefficient of each material, complex64, shape (material, node).
         material: Material of each facet, shape (facet,).
-        ends: Transmitting and receiving elements [m], each of shape (3, element), then the
-            centres of both, each of shape (3,).
-        grid: Path length of a cell [m], middle wavenumber and those of the nodes [rad/m].
-        beta: Shape of the window.
+        used: Facets that the receiving array hears, int64.
+        from_rx: θ and φ of what reaches each facet from it, complex64, shape (facet, 2, node).
+        from_tx: The same of all transmitting arrays, 0 where a facet is hidden, shape
+            (way, facet, 2, node), and which of them to take.
+        ends: Centres [m] and offsets of the transmitting arrays, shapes (way, 3) and
+            (way, 4, element), as `_elements` takes them; centre and offsets of the receiving one.
+        grid: Path length of a cell [m], middle wavenumber, those of the nodes [rad/m], and the
+            size of both arrays together [m].
+        exact: Whether amplitudes of a way are those of each pair of elements, shape (way,).
+        onto: Grid that each transmitting array adds to, shape (way,).
         out: Real and imaginary part at each node, cell and link, float32, shape
-            (node, 2, cell, tx · rx).
+            (grid, node, 2, cell, tx · rx).
     """
-    tx_xyz, rx_xyz, tx_centre, rx_centre = ends
-    cell_m, centre_k, node_k = grid
-    nodes, n_tx, n_rx = len(node_k), tx_xyz.shape[1], rx_xyz.shape[1]
+    tx_fields, ways = from_tx
+    tx_centre, tx_offset, rx_centre, rx_offset = ends
+    cell_m, centre_k, node_k, size_m = grid
+    nodes, n_tx, n_rx = len(node_k), tx_offset.shape[2], rx_offset.shape[1]
     turns = np.zeros(1 + nodes)
     turns[0] = centre_k / (2.0 * math.pi)
     for m in range(nodes):
         turns[1 + m] = (node_k[m] - centre_k) / (2.0 * math.pi)
-    tx_ways = np.zeros((5, n_tx), dtype=np.float32)
-    rx_ways = np.zeros((5, n_rx), dtype=np.float32)
+    tx_seen = np.zeros((5, n_tx), dtype=np.float32)
+    rx_seen = np.zeros((5, n_rx), dtype=np.float32)
     sent = np.zeros((nodes, 2, n_tx), dtype=np.float32)
     heard = np.zeros((nodes, 2, n_rx), dtype=np.float32)
-    amplitude = np.zeros((nodes, n_rx), dtype=np.float32)
-    damping = np.zeros(nodes, dtype=np.float32)
+    amplitude = np.zeros(n_rx, dtype=np.float32)
     kernel = np.zeros(WIDTH, dtype=np.float32)
-    size = _size(tx_xyz, tx_centre) + _size(rx_xyz, rx_centre)
-    from_tx, from_rx = fields
-    for i in range(len(points)):
-        a, b = from_tx[i], from_rx[i]
-        if (a[0, 0] == 0.0 and a[1, 0] == 0.0) or (b[0, 0] == 0.0 and b[1, 0] == 0.0):
-            continue
-        p, n, area = points[i], normals[i], areas[i]
-        to_tx, to_rx = tx_centre - p, rx_centre - p
-        d_t, d_r = _norm(to_tx), _norm(to_rx)
-        if _misses(to_tx / d_t, to_rx / d_r, n, area * node_k[0] ** 2 / 24.0, size / min(d_t, d_r)):
-            continue
-        _elements(p, n, tx_xyz, d_t, turns, tx_ways, sent)
-        _elements(p, n, rx_xyz, d_r, turns, rx_ways, heard)
-        for m in range(nodes):
-            damping[m] = node_k[m] * node_k[m] * area / 24.0
-        place = (d_t + d_r) / cell_m
-        first = math.ceil(place - 0.5 * WIDTH)
-        for w in range(WIDTH):
-            x = (first + w - place) / (0.5 * WIDTH)
-            kernel[w] = math.exp(beta * (math.sqrt(max(1.0 - x * x, 0.0)) - 1.0))
-        scale = area / (8.0 * math.pi)
-        for t in range(n_tx):
-            if tx_ways[3, t] <= 0.0:
+    weight = np.zeros(nodes, dtype=np.complex128)
+    for i in used:
+        p, n, area, b = points[i], normals[i], areas[i], from_rx[i]
+        to_rx = rx_centre - p
+        d_r = math.sqrt((to_rx * to_rx).sum())
+        unit_rx, ready = to_rx / d_r, False
+        damping = area / 24.0
+        for w in ways:
+            a = tx_fields[w, i]
+            if a[0, 0] == 0.0 and a[1, 0] == 0.0:
                 continue
-            _amplitudes(tx_ways, t, rx_ways, damping, amplitude)
+            to_tx = tx_centre[w] - p
+            d_t = math.sqrt((to_tx * to_tx).sum())
+            unit_tx, spread = to_tx / d_t, size_m / min(d_t, d_r)
+            if not seen_from_centres(unit_tx, unit_rx, n, damping * node_k[0] ** 2, spread):
+                continue
+            if not ready:
+                _elements(to_rx, n, rx_offset, turns, rx_seen, heard)
+                ready = True
+            _elements(to_tx, n, tx_offset[w], turns, tx_seen, sent)
+            place = (d_t + d_r) / cell_m
+            first = math.ceil(place - 0.5 * WIDTH)
+            for c in range(WIDTH):
+                x = (first + c - place) / (0.5 * WIDTH)
+                kernel[c] = math.exp(BETA * (math.sqrt(max(1.0 - x * x, 0.0)) - 1.0))
+            angle = -centre_k * (d_t + d_r)
+            # Facets hand θ and φ on; seen from the other end φ points the other way. Kirchhoff's
+            # phase is a quarter turn.
+            common = complex(math.cos(angle), math.sin(angle)) * 1j * (area / (8.0 * math.pi))
             for m in range(nodes):
-                # Facets hand θ and φ on; seen from the other end φ points the other way.
-                # Kirchhoff's phase is a quarter turn.
-                weight = a[0, m] * b[0, m] - a[1, m] * b[1, m]
-                weight *= gamma[material[i], m] * np.complex64(1j)
-                w_re, w_im = weight.real * scale, weight.imag * scale
-                s_re = np.float32(w_re * sent[m, 0, t] - w_im * sent[m, 1, t])
-                s_im = np.float32(w_re * sent[m, 1, t] + w_im * sent[m, 0, t])
-                _add(amplitude[m], s_re, s_im, heard[m], kernel, first, t * n_rx, out[m])
+                passed_on = a[0, m] * b[0, m] - a[1, m] * b[1, m]
+                weight[m] = common * passed_on * gamma[material[i], m]
+            if not exact[w]:
+                c = (unit_tx * n).sum() + (unit_rx * n).sum()
+                q = unit_tx + unit_rx
+                q_t2 = max((q * q).sum() - c * c, 0.0)
+                for m in range(nodes):
+                    weight[m] *= c / d_t * math.exp(-damping * q_t2 * node_k[m] ** 2)
+            for t in range(n_tx):
+                if exact[w] and tx_seen[3, t] <= 0.0:
+                    continue
+                for m in range(nodes):
+                    if exact[w]:
+                        _amplitudes(tx_seen, t, rx_seen, damping * node_k[m] ** 2, amplitude)
+                    part = weight[m] * complex(sent[m, 0, t], sent[m, 1, t])
+                    row = amplitude if exact[w] else rx_seen[4]
+                    _add(row, part, heard[m], kernel, first, t * n_rx, out[onto[w], m])

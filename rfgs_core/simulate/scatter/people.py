@@ -10,17 +10,25 @@ import numpy as np
 from rfgs_core.radio import Layout, Radio
 from rfgs_core.radio.layout import DevicePose, rotation
 from rfgs_core.radio.reflection import slab
-from rfgs_core.radio.sites import centres, owners, ports, site_pairs
+from rfgs_core.radio.sites import centres, measured_pairs, owners, ports
 from rfgs_core.simulate.geometry import Faces
 from rfgs_core.simulate.geometry.surroundings import Surroundings
 from rfgs_core.simulate.room import Room
 from rfgs_core.simulate.scatter.antenna import CODES, Antenna
-from rfgs_core.simulate.scatter.arrivals import Facets, Pictures, Slabs, by_mirror, straight
-from rfgs_core.simulate.scatter.grid import BETA, delay_grid, to_subcarriers
+from rfgs_core.simulate.scatter.arrivals import (
+    Facets,
+    Pictures,
+    Slabs,
+    by_mirror,
+    straight,
+    wanted_facets,
+)
+from rfgs_core.simulate.scatter.grid import array_reach, delay_grid, to_subcarriers
 from rfgs_core.simulate.scatter.kernel import spread_facets
 from rfgs_core.simulate.sight.bodies import SIZE, picture
 from rfgs_core.simulate.sight.mirrors import Mirror, meets_ball, mirror
-from rfgs_core.simulate.sight.panorama import ROWS, Panorama, panorama
+from rfgs_core.simulate.sight.panorama import SIZE as AROUND
+from rfgs_core.simulate.sight.panorama import Panorama, panorama
 
 #: Faces smaller than this do not mirror people [m²].
 SMALLEST_MIRROR_M2 = 0.02
@@ -43,17 +51,19 @@ class Site(NamedTuple):
     """Faces that it sees people by way of."""
 
 
-class Way(NamedTuple):
-    """What reaches the facets from a port of a site by one way."""
+class Ways(NamedTuple):
+    """What reaches the facets from one port of some sites, way by way."""
 
-    walls: int
-    """Walls it meets."""
-    elements: np.ndarray
-    """Elements, or their mirror images [m], shape (3, element)."""
+    site: np.ndarray
+    """Site of each way, int64, shape (way,)."""
+    walls: np.ndarray
+    """Walls that it meets, int64, shape (way,)."""
     centre: np.ndarray
-    """Their centre [m], shape (3,)."""
+    """Centre of the array or of its mirror image [m], shape (way, 3)."""
+    offset: np.ndarray
+    """Elements from there, and their squared distances [m, m²], float32, (way, 4, element)."""
     field: np.ndarray
-    """θ and φ of the field on each facet, complex64, shape (facet, 2, node)."""
+    """θ and φ of the field, 0 where it does not reach, complex64, shape (way, facet, 2, node)."""
 
 
 class PeopleChannel:
@@ -80,6 +90,9 @@ class PeopleChannel:
         """
         self._room, self._layout, self._depth = room, layout, depth
         self._grid = delay_grid(radio, layout)
+        self._pairs = measured_pairs(layout)
+        self._size_m = array_reach(layout.tx_xyz, layout.tx_site)
+        self._size_m += array_reach(layout.rx_xyz, layout.rx_site)
         self._slabs = self._tabled()
         tx, rx = centres(layout)
         tx_owner, rx_owner = owners(layout)
@@ -117,100 +130,147 @@ class PeopleChannel:
         out = np.zeros(shape, dtype=np.complex64)
         gamma = np.ascontiguousarray(gamma, dtype=np.complex64)
         balls = _balls(facets)
-        sent = [self._ways(site, facets, balls) for site in self._tx]
-        heard = [self._ways(site, facets, balls) for site in self._rx]
-        for a, b in site_pairs(layout):
-            for i, j in ports(layout):
-                tx = np.flatnonzero((layout.tx_site == a) & (layout.tx_port == i))
-                rx = np.flatnonzero((layout.rx_site == b) & (layout.rx_port == j))
-                links = self._between(facets, gamma, sent[a][i], heard[b][j], (len(tx), len(rx)))
-                out[np.ix_(tx, rx)] = links
+        tx_seen, rx_seen = (
+            [_pictures(facets, site.around.place, balls) for site in sites]
+            for sites in (self._tx, self._rx)
+        )
+        for i, j in ports(layout):
+            sent = self._ways(self._tx, self._rx, i, facets, tx_seen, balls)
+            heard = self._ways(self._rx, self._tx, j, facets, rx_seen, balls)
+            for b in np.unique(heard.site):
+                self._add(facets, gamma, (sent, heard), int(b), (i, j), out)
         out[~layout.measured] = 0.0
         return out
 
-    def _between(
+    def _add(
         self,
         facets: Facets,
         gamma: np.ndarray,
-        sent: list[Way],
-        heard: list[Way],
-        size: tuple[int, int],
-    ) -> np.ndarray:
-        """Channel between two ports, complex64, shape (tx, rx, subcarrier)."""
-        grid = self._grid
-        cells = np.zeros((len(grid.node_k), 2, grid.cells, size[0] * size[1]), dtype=np.float32)
-        for a in sent:
-            for b in heard:
-                if a.walls + b.walls < self._depth:
-                    spread_facets(
-                        facets.points,
-                        facets.normals,
-                        facets.areas,
-                        (a.field, b.field),
-                        gamma,
-                        facets.material,
-                        (a.elements, b.elements, a.centre, b.centre),
-                        (grid.cell_m, grid.centre_k, grid.node_k),
-                        BETA,
-                        cells,
-                    )
-        channel = to_subcarriers(grid, cells[:, 0] + 1j * cells[:, 1])
-        return channel.T.reshape(*size, -1)
-
-    def _ways(self, site: Site, facets: Facets, balls: list) -> list[list[Way]]:
-        """What reaches the facets from each port of a site."""
-        pictures = _pictures(facets, site.around.place, balls)
-        faces, shape = self._room.faces, (len(facets.points), 2, len(self._grid.node_k))
-        every = []
-        for elements, antenna in zip(site.elements, site.antennas, strict=True):
-            clear = np.zeros(shape, dtype=np.complex64)
-            through = np.zeros(shape if self._depth > 1 else (0, 2, 1), dtype=np.complex64)
-            n_clear, n_through = straight(
-                facets, pictures, site.around, faces, antenna, self._slabs, clear, through
+        ways: tuple[Ways, Ways],
+        b: int,
+        port: tuple[int, int],
+        out: np.ndarray,
+    ) -> None:
+        """Adds the channels of all transmitting sites to one receiving site."""
+        layout, grid, (sent, heard) = self._layout, self._grid, ways
+        senders = np.flatnonzero(self._pairs[:, b])
+        onto = np.zeros(len(self._tx), dtype=np.int64)
+        onto[senders] = np.arange(len(senders))
+        size = sent.offset.shape[2], heard.offset.shape[2]
+        shape = (len(senders), len(grid.node_k), 2, grid.cells, size[0] * size[1])
+        cells = np.zeros(shape, dtype=np.float32)
+        for way in np.flatnonzero(heard.site == b):
+            fits = sent.walls + heard.walls[way] < self._depth
+            take = np.flatnonzero(self._pairs[sent.site, b] & fits)
+            spread_facets(
+                facets.points,
+                facets.normals,
+                facets.areas,
+                gamma,
+                facets.material,
+                np.flatnonzero(np.abs(heard.field[way, :, :, 0]).any(axis=1)),
+                heard.field[way],
+                (sent.field, take),
+                (sent.centre, sent.offset, heard.centre[way], heard.offset[way]),
+                (grid.cell_m, grid.centre_k, grid.node_k, self._size_m),
+                (sent.walls + heard.walls[way]) == 0,
+                onto[sent.site],
+                cells,
             )
-            ways = [Way(0, elements, site.around.place, clear)] if n_clear else []
-            if n_through:
-                ways.append(Way(1, elements, site.around.place, through))
-            if self._depth > 1:
-                ways += self._mirrored(site, elements, antenna, facets, pictures, balls)
-            every.append(ways)
-        return every
+        for a, part in zip(senders, cells, strict=True):
+            links = to_subcarriers(grid, part[:, 0] + 1j * part[:, 1]).T.reshape(*size, -1)
+            tx = np.flatnonzero((layout.tx_site == a) & (layout.tx_port == port[0]))
+            rx = np.flatnonzero((layout.rx_site == b) & (layout.rx_port == port[1]))
+            out[np.ix_(tx, rx)] = links
 
-    def _mirrored(
+    def _ways(
+        self,
+        sites: list[Site],
+        others: list[Site],
+        port: int,
+        facets: Facets,
+        pictures: list[Pictures],
+        balls: list,
+    ) -> Ways:
+        """What reaches the facets from a port of sites."""
+        faces = self._room.faces
+        most = sum(2 + len(site.mirrors) for site in sites)
+        shape = (most, len(facets.points), 2, len(self._grid.node_k))
+        field = np.zeros(shape, dtype=np.complex64)
+        rows: list[tuple[int, int, np.ndarray, np.ndarray]] = []
+        for s, (site, seen) in enumerate(zip(sites, pictures, strict=True)):
+            pairs = self._pairs[s] if sites is self._tx else self._pairs[:, s]
+            partners = [others[i] for i in np.flatnonzero(pairs)]
+            ends = np.array([other.around.place for other in partners]).reshape(-1, 3)
+            images = [view.image for other in partners for view in other.mirrors]
+            every = np.concatenate([ends, np.array(images).reshape(-1, 3)])
+            elements, antenna = site.elements[port], site.antennas[port]
+            clear, through = field[len(rows)], field[len(rows) + 1]
+            wanted = self._wanted(facets, balls, site.around.place, every)
+            count = straight(
+                facets,
+                seen,
+                site.around,
+                faces,
+                antenna,
+                self._slabs,
+                wanted,
+                clear,
+                through if self._depth > 1 else through[:0],
+            )
+            rows.append((s, 0, site.around.place, elements))
+            if count[1]:
+                rows.append((s, 1, site.around.place, elements))
+            for view in site.mirrors:
+                reached = self._by_mirror(
+                    site, view, antenna, facets, seen, balls, ends, field[len(rows)]
+                )
+                if reached:
+                    rows.append((s, 1, view.image, _images(faces, view.face, elements)))
+        offsets = [_offsets(xyz, centre) for _, _, centre, xyz in rows]
+        return Ways(
+            np.array([row[0] for row in rows]),
+            np.array([row[1] for row in rows]),
+            np.stack([row[2] for row in rows]),
+            np.stack(offsets),
+            field[: len(rows)],
+        )
+
+    def _wanted(
+        self, facets: Facets, balls: list, place: np.ndarray, partners: np.ndarray
+    ) -> np.ndarray:
+        """Facets of all bodies that a place and any partner may see together."""
+        lowest_k, size_m = float(self._grid.node_k[0]), self._size_m
+        parts = [
+            wanted_facets(facets, ball[:2], place, partners, lowest_k, size_m) for ball in balls
+        ]
+        return np.concatenate(parts)
+
+    def _by_mirror(
         self,
         site: Site,
-        elements: np.ndarray,
+        view: Mirror,
         antenna: Antenna,
         facets: Facets,
-        pictures: Pictures,
+        seen: Pictures,
         balls: list,
-    ) -> list[Way]:
-        """What reaches the facets by way of each mirror."""
-        faces, ways = self._room.faces, []
-        shape = (len(facets.points), 2, len(self._grid.node_k))
-        for view in site.mirrors:
-            field, count = None, 0
-            for first, end, centre, radius in balls:
-                if not meets_ball(faces, view.face, view.image, centre, radius):
-                    continue
-                if field is None:
-                    field = np.zeros(shape, dtype=np.complex64)
-                drawn = picture(facets.triangles, view.image, centre, radius, MIRRORED_SIZE)
-                count += by_mirror(
-                    facets,
-                    (first, end),
-                    drawn,
-                    pictures,
-                    site.around,
-                    faces,
-                    view,
-                    antenna,
-                    self._slabs,
-                    field,
-                )
-            if field is not None and count:
-                ways.append(Way(1, _images(faces, view.face, elements), view.image, field))
-        return ways
+        partners: np.ndarray,
+        field: np.ndarray,
+    ) -> int:
+        """Fills in what reaches the facets by way of a mirror; returns how many it reaches."""
+        faces, count = self._room.faces, 0
+        for ball in balls:
+            centre, radius = ball[2:]
+            if not meets_ball(faces, view.face, view.image, centre, radius):
+                continue
+            wanted = self._wanted(facets, [ball], view.image, partners)
+            if not len(wanted):
+                continue
+            drawn = picture(facets.triangles, view.image, centre, radius, MIRRORED_SIZE)
+            count += by_mirror(
+                facets, wanted, drawn, seen, site.around, faces, view, antenna, self._slabs, field
+            )
+        return count
 
     def _site(
         self,
@@ -238,7 +298,7 @@ class PeopleChannel:
         return Site(
             tuple(np.ascontiguousarray(xyz.T) for xyz in elements),
             tuple(antennas),
-            panorama(faces.bvh, centre, ROWS),
+            panorama(faces.bvh, centre, AROUND),
             tuple(mirrors),
         )
 
@@ -262,6 +322,12 @@ def _images(faces: Faces, face: int, elements: np.ndarray) -> np.ndarray:
     """Mirror images of elements, shape (3, element)."""
     normal, offset = faces.normal[face], faces.offset[face]
     return elements - 2.0 * normal[:, None] * (normal @ elements - offset)
+
+
+def _offsets(elements: np.ndarray, centre: np.ndarray) -> np.ndarray:
+    """Elements from their centre and squared distances from it, float32, shape (4, element)."""
+    offset = elements - centre[:, None]
+    return np.concatenate([offset, (offset**2).sum(axis=0, keepdims=True)]).astype(np.float32)
 
 
 def _balls(facets: Facets) -> list[tuple[int, int, np.ndarray, float]]:

@@ -15,53 +15,50 @@ import numpy as np
 
 from rfgs_core.simulate.geometry.bvh import SAME_M, Bvh, crossings, nearest
 
-#: Directions from pole to pole; things narrower than half a degree may be overlooked.
-ROWS = 360
+#: Directions along a side of each of six pictures; things narrower than 0.4° may be overlooked.
+SIZE = 256
 #: Distances that agree this well are those of one surface [m].
 _SAME_SURFACE_M = 0.02
 
 
 class Panorama(NamedTuple):
-    """Distances from one place."""
+    """Distances from one place, as six pictures: ahead and behind along x, y and z."""
 
     place: np.ndarray
     """Where [m], shape (3,)."""
     nearest: np.ndarray
-    """Distance of the nearest surface by zenith angle and azimuth, infinite where there is none
-    [m], float32, shape (row, column); the first and last column stand for each other's other
-    side."""
+    """Distance of the nearest surface among neighbours, infinite where there is none [m],
+    float32, shape (picture, row, column)."""
     farthest: np.ndarray
-    """Farthest among neighbours, of the same shape [m]."""
+    """That of the farthest [m], of the same shape."""
 
 
 @numba.njit(cache=True, nogil=True)
-def panorama(bvh: Bvh, place: np.ndarray, rows: int) -> Panorama:
+def panorama(bvh: Bvh, place: np.ndarray, size: int) -> Panorama:
     """Looks around from a place.
 
     Args:
         bvh: What stands around.
         place: Where [m], shape (3,).
-        rows: Directions from pole to pole; twice as many around.
+        size: Directions along a side of each picture.
     """
-    seen = np.zeros((rows, 2 * rows), dtype=np.float32)
+    near = np.zeros((6, size, size), dtype=np.float32)
+    far = np.zeros_like(near)
+    # One more direction on each side, so that neighbours are known everywhere.
+    seen = np.zeros((size + 2, size + 2), dtype=np.float32)
     way = np.zeros(3)
-    for i in range(rows):
-        zenith = math.pi * (i + 0.5) / rows
-        for j in range(2 * rows):
-            azimuth = math.pi * (j + 0.5) / rows
-            way[0] = math.sin(zenith) * math.cos(azimuth)
-            way[1] = math.sin(zenith) * math.sin(azimuth)
-            way[2] = math.cos(zenith)
-            seen[i, j] = nearest(bvh, place, way, SAME_M)
-    near, far = np.zeros_like(seen), np.zeros_like(seen)
-    for i in range(rows):
-        for j in range(2 * rows):
-            low, high = np.float32(np.inf), np.float32(0.0)
-            for di in range(-1, 2):
-                for dj in range(-1, 2):
-                    value = seen[min(max(i + di, 0), rows - 1), (j + dj) % (2 * rows)]
-                    low, high = min(low, value), max(high, value)
-            near[i, j], far[i, j] = low, high
+    for side in range(6):
+        axis = side // 2
+        for i in range(size + 2):
+            for j in range(size + 2):
+                way[axis] = 1.0 - 2.0 * (side % 2)
+                way[(axis + 1) % 3] = (2.0 * i - 1.0) / size - 1.0
+                way[(axis + 2) % 3] = (2.0 * j - 1.0) / size - 1.0
+                seen[i, j] = nearest(bvh, place, way / math.sqrt((way * way).sum()), SAME_M)
+        for i in range(size):
+            for j in range(size):
+                some = seen[i : i + 3, j : j + 3]
+                near[side, i, j], far[side, i, j] = some.min(), some.max()
     return Panorama(place, near, far)
 
 
@@ -82,17 +79,23 @@ def in_sight(around: Panorama, bvh: Bvh, points: np.ndarray, out: np.ndarray) ->
 @numba.njit(cache=True, nogil=True)
 def sees(around: Panorama, bvh: Bvh, point: np.ndarray) -> bool:
     """Whether nothing that stands still is between a place and a point."""
-    rows = len(around.nearest)
-    place = around.place
+    place, size = around.place, around.nearest.shape[1]
     x, y, z = point[0] - place[0], point[1] - place[1], point[2] - place[2]
     d = math.sqrt(x * x + y * y + z * z)
     if d < SAME_M:
         return True
-    i = min(int(math.acos(min(max(z / d, -1.0), 1.0)) * (rows / math.pi)), rows - 1)
-    j = int((math.atan2(y, x) % (2.0 * math.pi)) * (rows / math.pi)) % (2 * rows)
-    if d < around.nearest[i, j] - _SAME_SURFACE_M:
+    a_x, a_y, a_z = abs(x), abs(y), abs(z)
+    if a_x >= a_y and a_x >= a_z:
+        side, u, v = (0 if x > 0.0 else 1), y / a_x, z / a_x
+    elif a_y >= a_z:
+        side, u, v = (2 if y > 0.0 else 3), z / a_y, x / a_y
+    else:
+        side, u, v = (4 if z > 0.0 else 5), x / a_z, y / a_z
+    i = min(int(0.5 * (u + 1.0) * size), size - 1)
+    j = min(int(0.5 * (v + 1.0) * size), size - 1)
+    if d < around.nearest[side, i, j] - _SAME_SURFACE_M:
         return True
-    if d > around.farthest[i, j] + _SAME_SURFACE_M:
+    if d > around.farthest[side, i, j] + _SAME_SURFACE_M:
         return False
     at_m, triangle = np.zeros(1), np.zeros(1, dtype=np.int64)
     return crossings(bvh, place, point, 2.0 * SAME_M, at_m, triangle) == 0

@@ -45,6 +45,45 @@ def build_bvh(triangles: Float64[np.ndarray, "triangle 3 3"]) -> Bvh:
 
 
 @numba.njit(cache=True, nogil=True)
+def blocked(bvh: Bvh, start: np.ndarray, end: np.ndarray, rim_m: float) -> bool:
+    """Whether a segment crosses any triangle, as `crossings` tells, looking no further.
+
+    Args:
+        bvh: The triangles.
+        start: Where it starts [m], shape (3,).
+        end: Where it leads to [m], shape (3,).
+        rim_m: What is nearer to either end does not count [m].
+    """
+    x, y, z = start[0], start[1], start[2]
+    wx, wy, wz = end[0] - x, end[1] - y, end[2] - z
+    length = math.sqrt(wx * wx + wy * wy + wz * wz)
+    if length <= 2.0 * rim_m:
+        return False
+    wx, wy, wz = wx / length, wy / length, wz / length
+    inverse_x, inverse_y, inverse_z = _inverse(wx), _inverse(wy), _inverse(wz)
+    reach = length - rim_m
+    low, high, first, count, corners = bvh.low, bvh.high, bvh.first, bvh.count, bvh.corners
+    stack = np.zeros(_STACK, dtype=np.int64)
+    size = 1
+    while size:
+        size -= 1
+        node = stack[size]
+        near, far = _within(low[node, 0], high[node, 0], x, inverse_x, 0.0, reach)
+        near, far = _within(low[node, 1], high[node, 1], y, inverse_y, near, far)
+        near, far = _within(low[node, 2], high[node, 2], z, inverse_z, near, far)
+        if near > far:
+            continue
+        if count[node] == 0 and len(first) > 1:
+            stack[size], stack[size + 1] = first[node] + 1, first[node]
+            size += 2
+            continue
+        for i in range(first[node], first[node] + count[node]):
+            if rim_m < _hit(corners, i, x, y, z, wx, wy, wz) < reach:
+                return True
+    return False
+
+
+@numba.njit(cache=True, nogil=True)
 def refit(bvh: Bvh, triangles: np.ndarray) -> Bvh:
     """The same hierarchy over triangles that have moved a little, its boxes drawn anew.
 
@@ -169,8 +208,8 @@ def crossings(
 
 
 @numba.njit(cache=True, nogil=True)
-def nearest(bvh: Bvh, start: np.ndarray, way: np.ndarray, rim_m: float) -> float:
-    """Distance of the first triangle that a ray meets, infinite if it meets none [m].
+def nearest(bvh: Bvh, start: np.ndarray, way: np.ndarray, rim_m: float) -> tuple[float, int]:
+    """Distance of the first triangle that a ray meets [m], and which; infinite and −1 for none.
 
     Args:
         bvh: The triangles.
@@ -182,7 +221,7 @@ def nearest(bvh: Bvh, start: np.ndarray, way: np.ndarray, rim_m: float) -> float
     inverse_x, inverse_y, inverse_z = _inverse(wx), _inverse(wy), _inverse(wz)
     low, high, first, count, corners = bvh.low, bvh.high, bvh.first, bvh.count, bvh.corners
     stack = np.zeros(_STACK, dtype=np.int64)
-    size, best = 1, np.inf
+    size, best, found = 1, np.inf, -1
     while size:
         size -= 1
         node = stack[size]
@@ -198,8 +237,8 @@ def nearest(bvh: Bvh, start: np.ndarray, way: np.ndarray, rim_m: float) -> float
         for i in range(first[node], first[node] + count[node]):
             at = _hit(corners, i, x, y, z, wx, wy, wz)
             if rim_m < at < best:
-                best = at
-    return best
+                best, found = at, bvh.triangle[i]
+    return best, found
 
 
 @numba.njit(cache=True, nogil=True, inline="always")

@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from rfgs_core.simulate.geometry.bvh import SAME_M, Bvh, crossings
+from rfgs_core.simulate.geometry.bvh import SAME_M, Bvh, blocked, crossings
 from rfgs_core.simulate.geometry.faces import Faces
 from rfgs_core.simulate.scatter.antenna import Antenna, sent_towards
 from rfgs_core.simulate.scatter.kernel import seen_from_centres
-from rfgs_core.simulate.sight.bodies import Picture, hides
-from rfgs_core.simulate.sight.mirrors import Mirror, mirrored_at
+from rfgs_core.simulate.sight.bodies import HIDDEN, UNSURE, Picture, hides
+from rfgs_core.simulate.sight.mirrors import Mirror, free_by_mirror, on_mirror
 from rfgs_core.simulate.sight.panorama import Panorama, sees
 
 
@@ -33,6 +33,10 @@ class Facets(NamedTuple):
     """Material of each, int64, shape (facet,)."""
     body: np.ndarray
     """Body of each, ascending, int64, shape (facet,)."""
+    vertices: np.ndarray
+    """Vertices of everything that moves [m], shape (V, 3)."""
+    corners: np.ndarray
+    """Vertices of each triangle, int64, shape (triangle, 3)."""
     triangles: np.ndarray
     """Triangles of everything that moves [m], shape (triangle, 3, 3)."""
     bvh: Bvh
@@ -94,16 +98,20 @@ def straight(
     """
     wave = np.zeros((clear.shape[2], 3), dtype=np.complex64)
     at_m, hit = np.zeros(1), np.zeros(1, dtype=np.int64)
-    n_clear, n_through = 0, 0
+    way, n_clear, n_through = np.zeros(3), 0, 0
     for p in wanted:
         lifted = facets.lifted[p]
         free = sees(around, faces.bvh, lifted)
         if not (free or len(through)):
             continue
         drawn = _picture(pictures, around.place, facets.body[p])
-        if hides(drawn, facets.bvh, facets.triangles, lifted):
+        hidden = hides(drawn, facets.triangles, lifted)
+        if hidden == UNSURE and blocked(facets.bvh, around.place, lifted, 2.0 * SAME_M):
+            hidden = HIDDEN
+        if hidden == HIDDEN:
             continue
-        way = facets.points[p] - around.place
+        for axis in range(3):
+            way[axis] = facets.points[p, axis] - around.place[axis]
         _send(antenna, way, wave)
         if free:
             _components(wave, way, clear[p])
@@ -118,9 +126,34 @@ def straight(
 
 
 @numba.njit(cache=True, nogil=True)
+def free_facets(
+    facets: Facets, wanted: np.ndarray, around: Panorama, faces: Faces, view: Mirror
+) -> tuple[np.ndarray, np.ndarray]:
+    """Facets that nothing that stands still hides on their way by a mirror.
+
+    Args:
+        facets: The facets.
+        wanted: Those that matter, int64.
+        around: What stands around the site.
+        faces: The same as faces.
+        view: The face that mirrors.
+
+    Returns:
+        Which facets, and where they are mirrored [m], shape (found, 3).
+    """
+    met, at = on_mirror(faces, view.face, view.image, facets.lifted, wanted)
+    count = 0
+    for k in range(len(met)):
+        if free_by_mirror(faces, view, around, facets.lifted[met[k]], at[k]):
+            met[count], at[count] = met[k], at[k]
+            count += 1
+    return met[:count], at[:count]
+
+
+@numba.njit(cache=True, nogil=True)
 def by_mirror(
     facets: Facets,
-    wanted: np.ndarray,
+    met: tuple[np.ndarray, np.ndarray],
     from_image: Picture,
     pictures: Pictures,
     around: Panorama,
@@ -130,41 +163,51 @@ def by_mirror(
     slabs: Slabs,
     out: np.ndarray,
 ) -> int:
-    """Fields from a site by way of one face, on the facets of one body.
+    """Fields from a site by way of one face.
 
     Args:
         facets: The facets.
-        wanted: Facets of the body that matter, int64.
-        from_image: Everything that moves as seen from the image of the site towards the body.
+        met: Those that may be met and where they are mirrored, from `free_facets`.
+        from_image: Everything that moves as seen from the image of the site towards them.
         pictures: The same as seen from the site.
         around: What stands around the site.
         faces: The same as faces.
-        view: The face.
+        view: The face that mirrors.
         antenna: The site's antenna.
         slabs: What the faces are made of.
-        out: Filled with θ and φ of the field where nothing is in the way, complex64, shape
-            (facet, 2, node).
+        out: Filled with θ and φ of the field where nothing that moves is in the way, complex64,
+            shape (facet, 2, node).
 
     Returns:
         How many facets it reaches.
     """
     wave = np.zeros((out.shape[2], 3), dtype=np.complex64)
-    at, count = np.zeros(3), 0
+    into, count = np.zeros(3), 0
     factors = slabs.mirrored[slabs.of_face[view.face]]
-    for p in wanted:
-        if not mirrored_at(faces, view, around, facets.lifted[p], at):
+    normal = faces.normal[view.face]
+    for k in range(len(met[0])):
+        p, at = met[0][k], met[1][k]
+        hidden = hides(from_image, facets.triangles, facets.lifted[p])
+        if hidden == UNSURE and blocked(facets.bvh, at, facets.lifted[p], 2.0 * SAME_M):
+            hidden = HIDDEN
+        if hidden == HIDDEN:
             continue
-        hidden = hides(from_image, facets.bvh, facets.triangles, facets.lifted[p])
         for other in range(len(pictures.per_pixel)):
             # What moves may also stand before the mirror.
             drawn = _picture(pictures, around.place, other)
-            hidden = hidden or hides(drawn, facets.bvh, facets.triangles, at)
-        if hidden:
+            before = hides(drawn, facets.triangles, at)
+            if before == UNSURE and blocked(facets.bvh, around.place, at, 2.0 * SAME_M):
+                before = HIDDEN
+            hidden = max(hidden, before) if before == HIDDEN else hidden
+        if hidden == HIDDEN:
             continue
-        into = at - around.place
+        for axis in range(3):
+            into[axis] = at[axis] - around.place[axis]
         _send(antenna, into, wave)
-        past(wave, into, faces.normal[view.face], True, factors)
-        _components(wave, facets.points[p] - view.image, out[p])
+        past(wave, into, normal, True, factors)
+        for axis in range(3):
+            into[axis] = facets.points[p, axis] - view.image[axis]
+        _components(wave, into, out[p])
         count += 1
     return count
 
@@ -190,24 +233,31 @@ def wanted_facets(
     """
     found = np.zeros(body[1] - body[0], dtype=np.int64)
     count = 0
+    points, normals = facets.points, facets.normals
     for p in range(body[0], body[1]):
-        n = facets.normals[p]
-        to = place - facets.points[p]
-        d = math.sqrt((to * to).sum())
-        if (to * n).sum() < -size_m:
+        n = normals[p, 0], normals[p, 1], normals[p, 2]
+        x, y, z = place[0] - points[p, 0], place[1] - points[p, 1], place[2] - points[p, 2]
+        if x * n[0] + y * n[1] + z * n[2] < -size_m:
             continue
-        for partner in partners:
-            other = partner - facets.points[p]
-            d_other = math.sqrt((other * other).sum())
-            damping, spread = lowest_k**2 * facets.areas[p] / 24.0, size_m / min(d, d_other)
-            if seen_from_centres(to / d, other / d_other, n, damping, spread):
+        d = math.sqrt(x * x + y * y + z * z)
+        to = x / d, y / d, z / d
+        damping = lowest_k * lowest_k * facets.areas[p] / 24.0
+        for q in range(len(partners)):
+            x, y, z = (
+                partners[q, 0] - points[p, 0],
+                partners[q, 1] - points[p, 1],
+                partners[q, 2] - points[p, 2],
+            )
+            d_other = math.sqrt(x * x + y * y + z * z)
+            other = x / d_other, y / d_other, z / d_other
+            if seen_from_centres(to, other, n, damping, size_m / min(d, d_other)):
                 found[count] = p
                 count += 1
                 break
     return found[:count]
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, inline="always")
 def _send(antenna: Antenna, way: np.ndarray, wave: np.ndarray) -> None:
     """Fills in what an antenna sends in a direction, the same at each node."""
     x, y, z = sent_towards(antenna, way)
@@ -215,7 +265,7 @@ def _send(antenna: Antenna, way: np.ndarray, wave: np.ndarray) -> None:
         wave[m, 0], wave[m, 1], wave[m, 2] = x, y, z
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, inline="always")
 def _picture(pictures: Pictures, place: np.ndarray, body: int) -> Picture:
     """One of several pictures from a place."""
     nearest, depth = pictures.nearest[body], pictures.depth[body]
@@ -235,18 +285,20 @@ def past(
         mirrors: Whether the wave is mirrored, else it passes.
         factors: TE and TM factors over cosines, shape (cosine, 2, node).
     """
-    k = into / math.sqrt((into * into).sum())
-    along = (k * normal).sum()
-    across = np.cross(k, normal)
-    size = math.sqrt((across * across).sum())
+    d = math.sqrt(into[0] * into[0] + into[1] * into[1] + into[2] * into[2])
+    k = into[0] / d, into[1] / d, into[2] / d
+    n = normal[0], normal[1], normal[2]
+    along = k[0] * n[0] + k[1] * n[1] + k[2] * n[2]
+    across = _cross(k, n)
+    size = math.sqrt(across[0] ** 2 + across[1] ** 2 + across[2] ** 2)
     if size < 1e-9:
-        other = np.zeros(3)
-        other[np.argmin(np.abs(normal))] = 1.0
-        across = np.cross(normal, other)
-        size = math.sqrt((across * across).sum())
-    across = across / size
-    out = k - 2.0 * along * normal if mirrors else k
-    before, after = np.cross(across, k), np.cross(across, out)
+        # At normal incidence any direction in the wall is across.
+        across = _cross(n, (1.0, 0.0, 0.0) if abs(n[0]) < 0.6 else (0.0, 1.0, 0.0))
+        size = math.sqrt(across[0] ** 2 + across[1] ** 2 + across[2] ** 2)
+    across = across[0] / size, across[1] / size, across[2] / size
+    bend = 2.0 * along if mirrors else 0.0
+    before = _cross(across, k)
+    after = _cross(across, (k[0] - bend * n[0], k[1] - bend * n[1], k[2] - bend * n[2]))
     place = min(abs(along), 1.0) * (len(factors) - 1)
     low = min(int(place), len(factors) - 2)
     share = np.float32(place - low)
@@ -259,7 +311,19 @@ def past(
             wave[m, axis] = te * across[axis] + tm * after[axis]
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, inline="always")
+def _cross(
+    a: tuple[float, float, float], b: tuple[float, float, float]
+) -> tuple[float, float, float]:
+    """Cross product."""
+    return (
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    )
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
 def _components(wave: np.ndarray, way: np.ndarray, out: np.ndarray) -> None:
     """Fills in θ and φ of a wave at each node, complex64, shape (2, node)."""
     flat = math.hypot(way[0], way[1])

@@ -33,8 +33,9 @@ _FAST = {"contract", "nsz", "ninf", "nnan"}
 
 @numba.njit(cache=True, nogil=True, fastmath=_FAST)
 def _elements(
-    way: np.ndarray,
-    n: np.ndarray,
+    to: tuple[float, float, float],
+    centre_m: float,
+    n: tuple[float, float, float],
     offsets: np.ndarray,
     turns: np.ndarray,
     seen: np.ndarray,
@@ -43,24 +44,25 @@ def _elements(
     """What one facet sees of an array, beyond its centre.
 
     Args:
-        way: From the facet to the centre [m], shape (3,).
-        n: Its normal, shape (3,).
+        to: Unit vector from the facet to the centre.
+        centre_m: Distance of the centre [m].
+        n: Its normal.
         offsets: Elements from the centre [m], and their squared distance from it [m²], float32,
             shape (4, element).
         turns: Turns per metre at the middle subcarrier, and at each node beyond that, (1 + node,).
-        seen: Filled with unit vectors to the elements, their part along the normal and one over
-            the distances, float32, shape (5, element).
+        seen: Filled with unit vectors to the elements, their part along the normal, one over the
+            distances, δ, and the phasor at the middle subcarrier, float32, shape (8, element).
         phasor: Filled with e^{−jkδ}, δ what each element is farther away than the centre, real
             and imaginary, float32, shape (node, 2, element).
     """
-    x, y, z = np.float32(way[0]), np.float32(way[1]), np.float32(way[2])
+    centre = np.float32(centre_m)
+    x, y, z = np.float32(to[0]) * centre, np.float32(to[1]) * centre, np.float32(to[2]) * centre
     nx, ny, nz = np.float32(n[0]), np.float32(n[1]), np.float32(n[2])
-    centre_2 = x * x + y * y + z * z
-    centre = np.float32(math.sqrt(centre_2))
+    centre_2 = centre * centre
     along = x * nx + y * ny + z * nz
     ox, oy, oz, o2 = offsets[0], offsets[1], offsets[2], offsets[3]
     s0, s1, s2, s3, s4 = seen[0], seen[1], seen[2], seen[3], seen[4]
-    re, im = phasor[0, 0], phasor[0, 1]
+    deltas, re, im = seen[5], seen[6], seen[7]
     per_m = np.float32(turns[0])
     for e in range(len(ox)):
         farther_2 = _TWO * (x * ox[e] + y * oy[e] + z * oz[e]) + o2[e]
@@ -70,9 +72,7 @@ def _elements(
         s3[e] = (along + nx * ox[e] + ny * oy[e] + nz * oz[e]) * inverse
         s4[e] = inverse
         # The difference of two roots, without losing its digits.
-        delta = farther_2 / (d + centre)
-        phasor[len(phasor) - 1, 1, e] = delta
-    deltas = phasor[len(phasor) - 1, 1].copy()
+        deltas[e] = farther_2 / (d + centre)
     for e in range(len(ox)):
         turn = per_m * deltas[e]
         a = _PI * (turn - ((turn + _ROUND) - _ROUND))
@@ -82,7 +82,6 @@ def _elements(
         # sin and cos of 2a: at a = ±π/2 both series are at their worst, their product is not.
         re[e] = _ONE - _TWO * s * s
         im[e] = -_TWO * s * c
-    base_re, base_im = phasor[0, 0].copy(), phasor[0, 1].copy()
     for m in range(len(phasor)):
         more = np.float32(2.0 * math.pi * turns[1 + m])
         row_re, row_im = phasor[m, 0], phasor[m, 1]
@@ -91,101 +90,105 @@ def _elements(
             b = a * a
             s = a * (_ONE + b * (_S3 + b * _S5))
             c = _ONE + b * (_C2 + b * (_C4 + b * _C6))
-            row_re[e] = base_re[e] * c + base_im[e] * s
-            row_im[e] = base_im[e] * c - base_re[e] * s
+            row_re[e] = re[e] * c + im[e] * s
+            row_im[e] = im[e] * c - re[e] * s
 
 
 @numba.njit(cache=True, nogil=True, fastmath=_FAST)
-def _amplitudes(tx: np.ndarray, t: int, rx: np.ndarray, damping: float, out: np.ndarray) -> None:
-    """Real amplitude of one facet between an element and all of an array.
+def _exact(
+    tx: np.ndarray,
+    rx: np.ndarray,
+    sent: np.ndarray,
+    heard: np.ndarray,
+    weight: complex,
+    damping: float,
+    out: np.ndarray,
+) -> None:
+    """Channel of one facet at one node between all pairs of elements.
 
     Args:
         tx: What the facet sees of the transmitting elements, see `_elements`.
-        t: Which of them.
-        rx: What it sees of the receiving elements.
+        rx: What it sees of the receiving ones.
+        sent: Phasors of the transmitting elements, shape (2, tx).
+        heard: Those of the receiving ones, shape (2, rx).
+        weight: What all links have in common.
         damping: k² A / 24.
-        out: Filled, float32, shape (rx,).
+        out: Filled, real and imaginary, float32, shape (2, tx · rx).
     """
-    x, y, z, along, near = tx[0, t], tx[1, t], tx[2, t], tx[3, t], tx[4, t]
     r0, r1, r2, r3, r4 = rx[0], rx[1], rx[2], rx[3], rx[4]
+    h_re, h_im = heard[0], heard[1]
     factor, most, none = np.float32(damping), np.float32(_MOST_DAMPED), np.float32(0.0)
-    for r in range(len(r0)):
-        c = along + r3[r]
-        q_t2 = _TWO + _TWO * (x * r0[r] + y * r1[r] + z * r2[r]) - c * c
-        e = factor * max(q_t2, none)
-        lit = (r3[r] > none) & (e < most)
-        # e^−e = (e^−e/16)^16, the inner one by its series.
-        a = min(e, most) * _SIXTEENTH
-        s = _ONE + a * (_ONE + a * (_HALF + a * (_E3 + a * (_E4 + a * _E5))))
-        s = s * s
-        s = s * s
-        s = s * s
-        s = s * s
-        value = c * near * r4[r] * s
-        out[r] = value if lit else none
+    count = len(r0)
+    for t in range(tx.shape[1]):
+        x, y, z, along = tx[0, t], tx[1, t], tx[2, t], tx[3, t]
+        near = tx[4, t] if along > none else none
+        part = weight * complex(sent[0, t], sent[1, t])
+        s_re, s_im = np.float32(part.real) * near, np.float32(part.imag) * near
+        re, im = out[0, t * count : (t + 1) * count], out[1, t * count : (t + 1) * count]
+        for r in range(count):
+            c = along + r3[r]
+            q_t2 = _TWO + _TWO * (x * r0[r] + y * r1[r] + z * r2[r]) - c * c
+            e = factor * max(q_t2, none)
+            lit = (r3[r] > none) & (e < most)
+            # e^−e = (e^−e/16)^16, the inner one by its series.
+            a = min(e, most) * _SIXTEENTH
+            s = _ONE + a * (_ONE + a * (_HALF + a * (_E3 + a * (_E4 + a * _E5))))
+            s = s * s
+            s = s * s
+            s = s * s
+            s = s * s
+            value = c * r4[r] * s if lit else none
+            re[r] = value * (s_re * h_re[r] - s_im * h_im[r])
+            im[r] = value * (s_re * h_im[r] + s_im * h_re[r])
 
 
 @numba.njit(cache=True, nogil=True, fastmath=_FAST)
-def _add(
-    amplitude: np.ndarray,
-    sent: complex,
-    heard: np.ndarray,
-    kernel: np.ndarray,
-    first: int,
-    lanes: int,
-    out: np.ndarray,
+def _of_centres(
+    rx: np.ndarray, sent: np.ndarray, heard: np.ndarray, weight: complex, out: np.ndarray
 ) -> None:
-    """Adds one facet, element and node to the cells of its delay.
+    """The same with the amplitude of the centres, which is part of the weight."""
+    near, h_re, h_im = rx[4], heard[0], heard[1]
+    count = len(near)
+    for t in range(sent.shape[1]):
+        part = weight * complex(sent[0, t], sent[1, t])
+        s_re, s_im = np.float32(part.real), np.float32(part.imag)
+        re, im = out[0, t * count : (t + 1) * count], out[1, t * count : (t + 1) * count]
+        for r in range(count):
+            re[r] = near[r] * (s_re * h_re[r] - s_im * h_im[r])
+            im[r] = near[r] * (s_re * h_im[r] + s_im * h_re[r])
+
+
+@numba.njit(cache=True, nogil=True, fastmath=_FAST)
+def _spread(values: np.ndarray, kernel: np.ndarray, first: int, out: np.ndarray) -> None:
+    """Adds the values of all links to the cells around a delay.
 
     Args:
-        amplitude: Real amplitude per receiving element, shape (rx,).
-        sent: Weight of the facet times the phasor of the transmitting element.
-        heard: Phasors of the receiving elements, shape (2, rx).
+        values: Real and imaginary, float32, shape (2, link).
         kernel: The window over the cells, shape (`WIDTH`,).
-        first: First cell.
-        lanes: First of the links.
+        first: First cell, which may lie beyond the grid.
         out: The grid of a node, float32, shape (2, cell, link).
     """
-    h_re, h_im = heard[0], heard[1]
-    s_re, s_im = np.float32(sent.real), np.float32(sent.imag)
-    k_0, k_1, k_2, k_3 = kernel[0], kernel[1], kernel[2], kernel[3]
-    end = lanes + len(h_re)
     cells = out.shape[1]
-    c_0, c_1, c_2, c_3 = (
-        first % cells,
-        (first + 1) % cells,
-        (first + 2) % cells,
-        (first + 3) % cells,
-    )
-    re_0, re_1, re_2, re_3 = (
-        out[0, c_0, lanes:end],
-        out[0, c_1, lanes:end],
-        out[0, c_2, lanes:end],
-        out[0, c_3, lanes:end],
-    )
-    im_0, im_1, im_2, im_3 = (
-        out[1, c_0, lanes:end],
-        out[1, c_1, lanes:end],
-        out[1, c_2, lanes:end],
-        out[1, c_3, lanes:end],
-    )
-    for r in range(len(h_re)):
-        re = amplitude[r] * (s_re * h_re[r] - s_im * h_im[r])
-        re_0[r] += k_0 * re
-        re_1[r] += k_1 * re
-        re_2[r] += k_2 * re
-        re_3[r] += k_3 * re
-    for r in range(len(h_re)):
-        im = amplitude[r] * (s_re * h_im[r] + s_im * h_re[r])
-        im_0[r] += k_0 * im
-        im_1[r] += k_1 * im
-        im_2[r] += k_2 * im
-        im_3[r] += k_3 * im
+    a, b, c, d = first % cells, (first + 1) % cells, (first + 2) % cells, (first + 3) % cells
+    k_a, k_b, k_c, k_d = kernel[0], kernel[1], kernel[2], kernel[3]
+    for part in range(2):
+        row = values[part]
+        at_a, at_b, at_c, at_d = out[part, a], out[part, b], out[part, c], out[part, d]
+        for link in range(len(row)):
+            value = row[link]
+            at_a[link] += k_a * value
+            at_b[link] += k_b * value
+            at_c[link] += k_c * value
+            at_d[link] += k_d * value
 
 
 @numba.njit(cache=True, nogil=True)
 def seen_from_centres(
-    to_tx: np.ndarray, to_rx: np.ndarray, n: np.ndarray, damping: float, spread: float
+    to_tx: tuple[float, float, float],
+    to_rx: tuple[float, float, float],
+    n: tuple[float, float, float],
+    damping: float,
+    spread: float,
 ) -> bool:
     """Whether any pair of elements of two arrays may see a facet, judged from their centres.
 
@@ -206,6 +209,72 @@ def seen_from_centres(
         return True
     q_t = max(math.sqrt(max(q_t2, 0.0)) - 2.0 * spread, 0.0)
     return damping * q_t * q_t < _MOST_DAMPED
+
+
+@numba.njit(cache=True, nogil=True)
+def _window(place: float, kernel: np.ndarray) -> int:
+    """Fills in the window around a place among the cells; returns the first of them."""
+    first = math.ceil(place - 0.5 * WIDTH)
+    for c in range(WIDTH):
+        x = (first + c - place) / (0.5 * WIDTH)
+        kernel[c] = math.exp(BETA * (math.sqrt(max(1.0 - x * x, 0.0)) - 1.0))
+    return first
+
+
+@numba.njit(cache=True, nogil=True)
+def _weights(
+    a: np.ndarray,
+    b: np.ndarray,
+    gamma: np.ndarray,
+    length_m: float,
+    centre_k: float,
+    area: float,
+    out: np.ndarray,
+) -> None:
+    """Fills in what all links of a facet have in common at each node, complex128, (node,).
+
+    Args:
+        a: θ and φ of what reaches it from the transmitter, shape (2, node).
+        b: The same from the receiver.
+        gamma: Its reflection coefficient, shape (node,).
+        length_m: Length of the way between the centres of the arrays [m].
+        centre_k: Middle wavenumber [rad/m].
+        area: Its area [m²].
+        out: Filled.
+    """
+    angle = -centre_k * length_m
+    # Kirchhoff's phase is a quarter turn.
+    common = complex(-math.sin(angle), math.cos(angle)) * (area / (8.0 * math.pi))
+    for m in range(len(out)):
+        # Facets hand θ and φ on; seen from the other end φ points the other way.
+        out[m] = common * gamma[m] * (a[0, m] * b[0, m] - a[1, m] * b[1, m])
+
+
+@numba.njit(cache=True, nogil=True)
+def _damp(
+    to_tx: tuple[float, float, float],
+    to_rx: tuple[float, float, float],
+    n: tuple[float, float, float],
+    scale: float,
+    node_k: np.ndarray,
+    weight: np.ndarray,
+) -> None:
+    """Multiplies weights by the amplitude at the centres, but for the way to the receiver.
+
+    Args:
+        to_tx: Unit vector to the centre of the transmitting array.
+        to_rx: That to the receiving one.
+        n: Normal.
+        scale: Area / 24 [m²].
+        node_k: Wavenumbers of the nodes [rad/m].
+        weight: Changed, shape (node,).
+    """
+    c = to_tx[0] * n[0] + to_tx[1] * n[1] + to_tx[2] * n[2]
+    c += to_rx[0] * n[0] + to_rx[1] * n[1] + to_rx[2] * n[2]
+    qx, qy, qz = to_tx[0] + to_rx[0], to_tx[1] + to_rx[1], to_tx[2] + to_rx[2]
+    q_t2 = max(qx * qx + qy * qy + qz * qz - c * c, 0.0)
+    for m in range(len(weight)):
+        weight[m] *= c * math.exp(-scale * q_t2 * node_k[m] * node_k[m])
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
@@ -251,58 +320,48 @@ def spread_facets(
     nodes, n_tx, n_rx = len(node_k), tx_offset.shape[2], rx_offset.shape[1]
     turns = np.zeros(1 + nodes)
     turns[0] = centre_k / (2.0 * math.pi)
-    for m in range(nodes):
-        turns[1 + m] = (node_k[m] - centre_k) / (2.0 * math.pi)
-    tx_seen = np.zeros((5, n_tx), dtype=np.float32)
-    rx_seen = np.zeros((5, n_rx), dtype=np.float32)
+    turns[1:] = (node_k - centre_k) / (2.0 * math.pi)
+    tx_seen = np.zeros((8, n_tx), dtype=np.float32)
+    rx_seen = np.zeros((8, n_rx), dtype=np.float32)
     sent = np.zeros((nodes, 2, n_tx), dtype=np.float32)
     heard = np.zeros((nodes, 2, n_rx), dtype=np.float32)
-    amplitude = np.zeros(n_rx, dtype=np.float32)
-    kernel = np.zeros(WIDTH, dtype=np.float32)
-    weight = np.zeros(nodes, dtype=np.complex128)
+    values = np.zeros((2, n_tx * n_rx), dtype=np.float32)
+    kernel, weight = np.zeros(WIDTH, dtype=np.float32), np.zeros(nodes, dtype=np.complex128)
     for i in used:
-        p, n, area, b = points[i], normals[i], areas[i], from_rx[i]
-        to_rx = rx_centre - p
-        d_r = math.sqrt((to_rx * to_rx).sum())
-        unit_rx, ready = to_rx / d_r, False
-        damping = area / 24.0
+        b, scale = from_rx[i], areas[i] / 24.0
+        n = normals[i, 0], normals[i, 1], normals[i, 2]
+        to_rx, d_r = _towards(points[i], rx_centre)
+        ready = False
         for w in ways:
             a = tx_fields[w, i]
             if a[0, 0] == 0.0 and a[1, 0] == 0.0:
                 continue
-            to_tx = tx_centre[w] - p
-            d_t = math.sqrt((to_tx * to_tx).sum())
-            unit_tx, spread = to_tx / d_t, size_m / min(d_t, d_r)
-            if not seen_from_centres(unit_tx, unit_rx, n, damping * node_k[0] ** 2, spread):
+            to_tx, d_t = _towards(points[i], tx_centre[w])
+            if not seen_from_centres(
+                to_tx, to_rx, n, scale * node_k[0] ** 2, size_m / min(d_t, d_r)
+            ):
                 continue
             if not ready:
-                _elements(to_rx, n, rx_offset, turns, rx_seen, heard)
+                _elements(to_rx, d_r, n, rx_offset, turns, rx_seen, heard)
                 ready = True
-            _elements(to_tx, n, tx_offset[w], turns, tx_seen, sent)
-            place = (d_t + d_r) / cell_m
-            first = math.ceil(place - 0.5 * WIDTH)
-            for c in range(WIDTH):
-                x = (first + c - place) / (0.5 * WIDTH)
-                kernel[c] = math.exp(BETA * (math.sqrt(max(1.0 - x * x, 0.0)) - 1.0))
-            angle = -centre_k * (d_t + d_r)
-            # Facets hand θ and φ on; seen from the other end φ points the other way. Kirchhoff's
-            # phase is a quarter turn.
-            common = complex(math.cos(angle), math.sin(angle)) * 1j * (area / (8.0 * math.pi))
-            for m in range(nodes):
-                passed_on = a[0, m] * b[0, m] - a[1, m] * b[1, m]
-                weight[m] = common * passed_on * gamma[material[i], m]
+            _elements(to_tx, d_t, n, tx_offset[w], turns, tx_seen, sent)
+            first = _window((d_t + d_r) / cell_m, kernel)
+            _weights(a, b, gamma[material[i]], d_t + d_r, centre_k, areas[i], weight)
             if not exact[w]:
-                c = (unit_tx * n).sum() + (unit_rx * n).sum()
-                q = unit_tx + unit_rx
-                q_t2 = max((q * q).sum() - c * c, 0.0)
-                for m in range(nodes):
-                    weight[m] *= c / d_t * math.exp(-damping * q_t2 * node_k[m] ** 2)
-            for t in range(n_tx):
-                if exact[w] and tx_seen[3, t] <= 0.0:
-                    continue
-                for m in range(nodes):
-                    if exact[w]:
-                        _amplitudes(tx_seen, t, rx_seen, damping * node_k[m] ** 2, amplitude)
-                    part = weight[m] * complex(sent[m, 0, t], sent[m, 1, t])
-                    row = amplitude if exact[w] else rx_seen[4]
-                    _add(row, part, heard[m], kernel, first, t * n_rx, out[onto[w], m])
+                _damp(to_tx, to_rx, n, scale, node_k, weight)
+                weight /= d_t
+            for m in range(nodes):
+                if exact[w]:
+                    damping = scale * node_k[m] ** 2
+                    _exact(tx_seen, rx_seen, sent[m], heard[m], weight[m], damping, values)
+                else:
+                    _of_centres(rx_seen, sent[m], heard[m], weight[m], values)
+                _spread(values, kernel, first, out[onto[w], m])
+
+
+@numba.njit(cache=True, nogil=True)
+def _towards(p: np.ndarray, place: np.ndarray) -> tuple[tuple[float, float, float], float]:
+    """Unit vector from a point to a place, and their distance [m]."""
+    x, y, z = place[0] - p[0], place[1] - p[1], place[2] - p[2]
+    d = math.sqrt(x * x + y * y + z * z)
+    return (x / d, y / d, z / d), d

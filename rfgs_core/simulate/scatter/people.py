@@ -20,20 +20,21 @@ from rfgs_core.simulate.scatter.arrivals import (
     Pictures,
     Slabs,
     by_mirror,
+    free_facets,
     straight,
     wanted_facets,
 )
 from rfgs_core.simulate.scatter.grid import array_reach, delay_grid, to_subcarriers
 from rfgs_core.simulate.scatter.kernel import spread_facets
 from rfgs_core.simulate.sight.bodies import SIZE, picture
-from rfgs_core.simulate.sight.mirrors import Mirror, meets_ball, mirror
+from rfgs_core.simulate.sight.mirrors import Mirror, meeting_ball, mirror
 from rfgs_core.simulate.sight.panorama import SIZE as AROUND
 from rfgs_core.simulate.sight.panorama import Panorama, panorama
 
 #: Faces smaller than this do not mirror people [m²].
-SMALLEST_MIRROR_M2 = 0.02
+SMALLEST_MIRROR_M2 = 0.1
 #: Pixels of what moves as seen by way of a mirror, along a side.
-MIRRORED_SIZE = 96
+MIRRORED_SIZE = 128
 #: Angles at which slabs are tabled.
 _COSINES = 513
 
@@ -221,11 +222,9 @@ class PeopleChannel:
             rows.append((s, 0, site.around.place, elements))
             if count[1]:
                 rows.append((s, 1, site.around.place, elements))
-            for view in site.mirrors:
-                reached = self._by_mirror(
-                    site, view, antenna, facets, seen, balls, ends, field[len(rows)]
-                )
-                if reached:
+            for view, some in _views(faces, site, balls):
+                onto = field[len(rows)]
+                if self._by_mirror(site, view, antenna, facets, seen, some, ends, onto):
                     rows.append((s, 1, view.image, _images(faces, view.face, elements)))
         offsets = [_offsets(xyz, centre) for _, _, centre, xyz in rows]
         return Ways(
@@ -261,14 +260,17 @@ class PeopleChannel:
         faces, count = self._room.faces, 0
         for ball in balls:
             centre, radius = ball[2:]
-            if not meets_ball(faces, view.face, view.image, centre, radius):
-                continue
             wanted = self._wanted(facets, [ball], view.image, partners)
             if not len(wanted):
                 continue
-            drawn = picture(facets.triangles, view.image, centre, radius, MIRRORED_SIZE)
+            met = free_facets(facets, wanted, site.around, faces, view)
+            if not len(met[0]):
+                continue
+            drawn = picture(
+                facets.vertices, facets.corners, view.image, centre, radius, MIRRORED_SIZE
+            )
             count += by_mirror(
-                facets, wanted, drawn, seen, site.around, faces, view, antenna, self._slabs, field
+                facets, met, drawn, seen, site.around, faces, view, antenna, self._slabs, field
             )
         return count
 
@@ -298,7 +300,7 @@ class PeopleChannel:
         return Site(
             tuple(np.ascontiguousarray(xyz.T) for xyz in elements),
             tuple(antennas),
-            panorama(faces.bvh, centre, AROUND),
+            panorama(faces, centre, AROUND),
             tuple(mirrors),
         )
 
@@ -324,6 +326,17 @@ def _images(faces: Faces, face: int, elements: np.ndarray) -> np.ndarray:
     return elements - 2.0 * normal[:, None] * (normal @ elements - offset)
 
 
+def _views(faces: Faces, site: Site, balls: list) -> list[tuple[Mirror, list]]:
+    """Mirrors by way of which a site may see any of the bodies, and which of these."""
+    face = np.array([view.face for view in site.mirrors], dtype=np.int64)
+    image = np.array([view.image for view in site.mirrors]).reshape(-1, 3)
+    met: dict[int, list] = {}
+    for ball in balls:
+        for index in meeting_ball(faces, face, image, *ball[2:]):
+            met.setdefault(int(index), []).append(ball)
+    return [(site.mirrors[index], met[index]) for index in sorted(met)]
+
+
 def _offsets(elements: np.ndarray, centre: np.ndarray) -> np.ndarray:
     """Elements from their centre and squared distances from it, float32, shape (4, element)."""
     offset = elements - centre[:, None]
@@ -344,7 +357,9 @@ def _balls(facets: Facets) -> list[tuple[int, int, np.ndarray, float]]:
 
 def _pictures(facets: Facets, place: np.ndarray, balls: list) -> Pictures:
     """What moves as seen from a site, towards each body."""
-    drawn = [picture(facets.triangles, place, ball[2], ball[3], SIZE) for ball in balls]
+    drawn = [
+        picture(facets.vertices, facets.corners, place, ball[2], ball[3], SIZE) for ball in balls
+    ]
     return Pictures(
         np.stack([row.axes for row in drawn]),
         np.array([row.per_pixel for row in drawn]),

@@ -57,18 +57,21 @@ DETAIL_M = 0.015
 NEGLIGIBLE = 1e-3
 
 
-def coarse_mesh(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Thins out a mesh for its silhouette by joining vertices within cells of `DETAIL_M`.
+def coarse_mesh(
+    vertices: np.ndarray, faces: np.ndarray, detail_m: float = DETAIL_M
+) -> tuple[np.ndarray, np.ndarray]:
+    """Thins out a mesh for its silhouette by joining vertices within cells.
 
     Args:
         vertices: Rest pose [m], shape (V, 3).
         faces: Triangles, shape (T, 3).
+        detail_m: Size of the cells [m].
 
     Returns:
         Indices of the vertices that are kept and triangles over them.
     """
     used = np.unique(faces)
-    cells = np.floor(vertices[used].astype(np.float64) / DETAIL_M).astype(np.int64)
+    cells = np.floor(vertices[used].astype(np.float64) / detail_m).astype(np.int64)
     _, cell = np.unique(cells, axis=0, return_inverse=True)
     cell = cell.ravel()
     size = np.bincount(cell)

@@ -3,7 +3,7 @@
 
 A picture alone would be as coarse as its pixels. Here every triangle fills all pixels it touches,
 so that a point is surely in sight where nothing drawn is nearer. Where something is, the nearest
-triangle is met exactly, and a ray through all of them decides what is left.
+triangle is met exactly, and a ray through all of them may decide what is left.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from rfgs_core.simulate.geometry.bvh import SAME_M, Bvh, crossings
-
+#: What a picture tells of a point.
+SEEN, HIDDEN, UNSURE = 0, 1, 2
 #: Pixels along a side.
 SIZE = 192
 #: What is drawn nearer than a point by less than this is the point's own surface [m].
@@ -43,12 +43,18 @@ class Picture(NamedTuple):
 
 @numba.njit(cache=True, nogil=True)
 def picture(
-    triangles: np.ndarray, place: np.ndarray, centre: np.ndarray, radius: float, size: int
+    vertices: np.ndarray,
+    corners: np.ndarray,
+    place: np.ndarray,
+    centre: np.ndarray,
+    radius: float,
+    size: int,
 ) -> Picture:
     """Draws triangles from a place, looking at a ball.
 
     Args:
-        triangles: Corners [m], shape (triangle, 3, 3).
+        vertices: Vertices [m], shape (V, 3).
+        corners: Vertices of each triangle, shape (triangle, 3).
         place: Where from [m], shape (3,).
         centre: Middle of the ball [m], shape (3,).
         radius: Its radius [m].
@@ -58,27 +64,25 @@ def picture(
     d = math.sqrt(((centre - place) ** 2).sum())
     reach = radius / math.sqrt(d * d - radius * radius) if d > 1.03 * radius else _WIDEST
     per_pixel = 2.0 * min(1.02 * reach, _WIDEST) / size
+    seen = np.zeros((3, len(vertices)), dtype=np.float32)
+    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = (
+        (axes[0, 0], axes[0, 1], axes[0, 2]),
+        (axes[1, 0], axes[1, 1], axes[1, 2]),
+        (axes[2, 0], axes[2, 1], axes[2, 2]),
+    )
+    for v in range(len(vertices)):
+        x, y, z = vertices[v, 0] - place[0], vertices[v, 1] - place[1], vertices[v, 2] - place[2]
+        forward = cx * x + cy * y + cz * z
+        scale = 1.0 / (max(forward, 1e-9) * per_pixel)
+        seen[0, v] = (ax * x + ay * y + az * z) * scale + 0.5 * size
+        seen[1, v] = (bx * x + by * y + bz * z) * scale + 0.5 * size
+        seen[2, v] = 1.0 / forward if forward > _NEAREST_M else 0.0
     nearest = np.full((size, size), -1, dtype=np.int32)
     depth = np.zeros((size, size), dtype=np.float32)
-    seen = np.zeros((3, 3))
-    for t in range(len(triangles)):
-        ahead = True
-        for c in range(3):
-            x, y, z = (
-                triangles[t, c, 0] - place[0],
-                triangles[t, c, 1] - place[1],
-                triangles[t, c, 2] - place[2],
-            )
-            forward = axes[2, 0] * x + axes[2, 1] * y + axes[2, 2] * z
-            if forward < _NEAREST_M:
-                ahead = False
-                break
-            scale = 1.0 / (forward * per_pixel)
-            seen[c, 0] = (axes[0, 0] * x + axes[0, 1] * y + axes[0, 2] * z) * scale + 0.5 * size
-            seen[c, 1] = (axes[1, 0] * x + axes[1, 1] * y + axes[1, 2] * z) * scale + 0.5 * size
-            seen[c, 2] = 1.0 / forward
-        if ahead:
-            _draw(seen, t, nearest, depth)
+    for t in range(len(corners)):
+        i, j, k = corners[t, 0], corners[t, 1], corners[t, 2]
+        if seen[2, i] > 0.0 and seen[2, j] > 0.0 and seen[2, k] > 0.0:
+            _draw(seen, i, j, k, t, nearest, depth)
     return Picture(place, axes, per_pixel, nearest, depth)
 
 
@@ -96,10 +100,19 @@ def _facing(way: np.ndarray) -> np.ndarray:
 
 
 @numba.njit(cache=True, nogil=True)
-def _draw(seen: np.ndarray, triangle: int, nearest: np.ndarray, depth: np.ndarray) -> None:
-    """Draws a triangle, its corners given in pixels and one over their distance."""
+def _draw(
+    seen: np.ndarray,
+    a: int,
+    b: int,
+    c: int,
+    triangle: int,
+    nearest: np.ndarray,
+    depth: np.ndarray,
+) -> None:
+    """Draws the triangle of vertices a, b and c, given in pixels and one over their distance."""
     size = len(nearest)
-    x0, y0, x1, y1, x2, y2 = seen[0, 0], seen[0, 1], seen[1, 0], seen[1, 1], seen[2, 0], seen[2, 1]
+    x0, y0, x1, y1, x2, y2 = seen[0, a], seen[1, a], seen[0, b], seen[1, b], seen[0, c], seen[1, c]
+    z0, z1, z2 = seen[2, a], seen[2, b], seen[2, c]
     low_x, high_x = min(x0, x1, x2), max(x0, x1, x2)
     low_y, high_y = min(y0, y1, y2), max(y0, y1, y2)
     if high_x < 0.0 or high_y < 0.0 or low_x >= size or low_y >= size:
@@ -121,40 +134,42 @@ def _draw(seen: np.ndarray, triangle: int, nearest: np.ndarray, depth: np.ndarra
             if u < -slack_u or v < -slack_v or u + v > 1.0 + slack:
                 continue
             u, v = min(max(u, 0.0), 1.0), min(max(v, 0.0), 1.0)
-            near = seen[0, 2] + u * (seen[1, 2] - seen[0, 2]) + v * (seen[2, 2] - seen[0, 2])
+            near = z0 + u * (z1 - z0) + v * (z2 - z0)
             if near > depth[j, i]:
                 depth[j, i] = near
                 nearest[j, i] = triangle
 
 
-@numba.njit(cache=True, nogil=True)
-def hides(drawn: Picture, bodies: Bvh, triangles: np.ndarray, point: np.ndarray) -> bool:
+@numba.njit(cache=True, nogil=True, inline="always")
+def hides(drawn: Picture, triangles: np.ndarray, point: np.ndarray) -> int:
     """Whether a triangle stands between the place of a picture and a point.
 
     Args:
         drawn: The picture.
-        bodies: What was drawn, for rays.
-        triangles: The same as drawn [m], shape (triangle, 3, 3).
+        triangles: What was drawn [m], shape (triangle, 3, 3).
         point: The point [m], shape (3,).
+
+    Returns:
+        `SEEN`, `HIDDEN`, or `UNSURE` where something nearer is drawn, which only a ray can tell
+        from what stands beside.
     """
-    size = len(drawn.nearest)
+    size, axes = len(drawn.nearest), drawn.axes
     x, y, z = point[0] - drawn.place[0], point[1] - drawn.place[1], point[2] - drawn.place[2]
-    axes = drawn.axes
     forward = axes[2, 0] * x + axes[2, 1] * y + axes[2, 2] * z
-    if forward >= _NEAREST_M:
-        scale = 1.0 / (forward * drawn.per_pixel)
-        i = math.floor((axes[0, 0] * x + axes[0, 1] * y + axes[0, 2] * z) * scale + 0.5 * size)
-        j = math.floor((axes[1, 0] * x + axes[1, 1] * y + axes[1, 2] * z) * scale + 0.5 * size)
-        if 0 <= i < size and 0 <= j < size:
-            if drawn.depth[j, i] * (forward - _OWN_M) <= 1.0:
-                return False
-            if _meets(triangles, drawn.nearest[j, i], drawn.place, x, y, z):
-                return True
-    at_m, hit = np.zeros(0), np.zeros(0, dtype=np.int64)
-    return crossings(bodies, drawn.place, point, 2.0 * SAME_M, at_m, hit) > 0
+    if forward < _NEAREST_M:
+        return UNSURE
+    scale = 1.0 / (forward * drawn.per_pixel)
+    i = math.floor((axes[0, 0] * x + axes[0, 1] * y + axes[0, 2] * z) * scale + 0.5 * size)
+    j = math.floor((axes[1, 0] * x + axes[1, 1] * y + axes[1, 2] * z) * scale + 0.5 * size)
+    if not (0 <= i < size and 0 <= j < size):
+        # Beside the body that the picture is of, unless that is too near to be drawn as a whole.
+        return SEEN if drawn.per_pixel * size < 2.0 * _WIDEST else UNSURE
+    if drawn.depth[j, i] * (forward - _OWN_M) <= 1.0:
+        return SEEN
+    return HIDDEN if _meets(triangles, drawn.nearest[j, i], drawn.place, x, y, z) else UNSURE
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, inline="always")
 def _meets(corners: np.ndarray, i: int, place: np.ndarray, wx: float, wy: float, wz: float) -> bool:
     """Whether the way from a place meets triangle i before its end (Möller and Trumbore 1997)."""
     ax, ay, az = corners[i, 0, 0], corners[i, 0, 1], corners[i, 0, 2]

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from rfgs_core.simulate.geometry.bvh import SAME_M, crossings, nearest, triangle_at
+from rfgs_core.simulate.geometry.bvh import SAME_M, blocked, nearest, triangle_at
 from rfgs_core.simulate.geometry.faces import Faces, height, mirrored
-from rfgs_core.simulate.sight.panorama import Panorama, sees
+from rfgs_core.simulate.sight.panorama import Panorama, sees_face
 
 #: Step of the places on a mirror that are looked by way of [m], and most of them along a side.
 STEP_M, MOST = 0.05, 256
@@ -72,7 +72,7 @@ def _looked(
             place = place + u * faces.axes[face, 0] + w * faces.axes[face, 1]
             way = place - image
             way = way / math.sqrt((way * way).sum())
-            seen[i, j] = nearest(faces.bvh, place, way, 2.0 * SAME_M)
+            seen[i, j] = nearest(faces.bvh, place, way, 2.0 * SAME_M)[0]
     near, far = np.zeros_like(seen), np.zeros_like(seen)
     for i in range(n_u):
         for j in range(n_w):
@@ -82,66 +82,109 @@ def _looked(
 
 
 @numba.njit(cache=True, nogil=True)
-def meets_ball(faces: Faces, face: int, image: np.ndarray, centre: np.ndarray, r: float) -> bool:
-    """Whether any of a ball may be seen from an image through its face; errs towards yes."""
-    h = -height(faces, face, image)
-    over = height(faces, face, centre)
-    if h < 0.0:
-        h, over = -h, -over
-    if over < -r:
-        return False
-    near = max(over - r, 0.0)
-    for axis in range(2):
-        a = faces.axes[face, axis]
-        i = (a * image).sum()
-        c = (a * centre).sum()
-        low, high = np.inf, -np.inf
-        for side in (-r, r):
-            for depth in (near, over + r):
-                at = i + (c + side - i) * h / (h + depth)
-                low, high = min(low, at), max(high, at)
-        if low > faces.high[face, axis] or high < faces.low[face, axis]:
-            return False
-    return True
+def meeting_ball(
+    faces: Faces, face: np.ndarray, image: np.ndarray, centre: np.ndarray, r: float
+) -> np.ndarray:
+    """Which images may see any of a ball through their faces, int64; errs towards more.
+
+    Args:
+        faces: The faces.
+        face: Face of each image, shape (image,).
+        image: The images [m], shape (image, 3).
+        centre: Centre of the ball [m], shape (3,).
+        r: Its radius [m].
+    """
+    found, count = np.zeros(len(face), dtype=np.int64), 0
+    for k in range(len(face)):
+        f = face[k]
+        h, over, meets = -height(faces, f, image[k]), height(faces, f, centre), True
+        if h < 0.0:
+            h, over = -h, -over
+        near = max(over - r, 0.0)
+        for axis in range(2):
+            i, c = 0.0, 0.0
+            for x in range(3):
+                i += faces.axes[f, axis, x] * image[k, x]
+                c += faces.axes[f, axis, x] * centre[x]
+            low, high = np.inf, -np.inf
+            for side in (-r, r):
+                for depth in (near, over + r):
+                    at = i + (c + side - i) * h / (h + depth)
+                    low, high = min(low, at), max(high, at)
+            meets &= low <= faces.high[f, axis] and high >= faces.low[f, axis]
+        if meets and over > -r:
+            found[count] = k
+            count += 1
+    return found[:count]
 
 
 @numba.njit(cache=True, nogil=True)
-def mirrored_at(
+def on_mirror(
+    faces: Faces, face: int, image: np.ndarray, points: np.ndarray, some: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Which points may be seen by way of a mirror, by its rectangle alone, and where.
+
+    Args:
+        faces: The faces.
+        face: The mirror.
+        image: Image of the place in it [m], shape (3,).
+        points: The points [m], shape (point, 3).
+        some: Which of them to look at, int64.
+
+    Returns:
+        Those that meet the rectangle, and the places where [m], shape (met, 3).
+    """
+    n, u, w = faces.normal[face], faces.axes[face, 0], faces.axes[face, 1]
+    nx, ny, nz, offset = n[0], n[1], n[2], faces.offset[face]
+    ux, uy, uz, wx, wy, wz = u[0], u[1], u[2], w[0], w[1], w[2]
+    low_u, low_w = faces.low[face, 0], faces.low[face, 1]
+    high_u, high_w = faces.high[face, 0], faces.high[face, 1]
+    ix, iy, iz = image[0], image[1], image[2]
+    h = offset - (nx * ix + ny * iy + nz * iz)
+    met, at = np.zeros(len(some), dtype=np.int64), np.zeros((len(some), 3))
+    count = 0
+    for p in some:
+        x, y, z = points[p, 0], points[p, 1], points[p, 2]
+        over = nx * x + ny * y + nz * z - offset
+        if h * over <= 0.0:
+            continue
+        share = h / (h + over)
+        x, y, z = ix + share * (x - ix), iy + share * (y - iy), iz + share * (z - iz)
+        a, b = ux * x + uy * y + uz * z, wx * x + wy * y + wz * z
+        if a < low_u or a > high_u or b < low_w or b > high_w:
+            continue
+        met[count], at[count, 0], at[count, 1], at[count, 2] = p, x, y, z
+        count += 1
+    return met[:count], at[:count]
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def free_by_mirror(
     faces: Faces, view: Mirror, around: Panorama, point: np.ndarray, at: np.ndarray
 ) -> bool:
-    """Whether a point is seen by way of a mirror, nothing that stands still between, and where.
+    """Whether nothing that stands still is on the way to a point by a mirror.
 
     Args:
         faces: The faces.
         view: The mirror.
         around: What is seen from the place itself.
         point: The point [m], shape (3,).
-        at: Filled with the place on the mirror [m], shape (3,).
+        at: Where the way meets the mirror [m], shape (3,).
     """
-    h, over = -height(faces, view.face, view.image), height(faces, view.face, point)
-    if h * over <= 0.0:
-        return False
-    share = h / (h + over)
-    u, w = 0.0, 0.0
-    for axis in range(3):
-        at[axis] = view.image[axis] + share * (point[axis] - view.image[axis])
-        u += faces.axes[view.face, 0, axis] * at[axis]
-        w += faces.axes[view.face, 1, axis] * at[axis]
-    low, high = faces.low[view.face], faces.high[view.face]
-    if u < low[0] or u > high[0] or w < low[1] or w > high[1]:
-        return False
-    if not view.whole and triangle_at(faces.bvh, faces.of_triangle, view.face, at) < 0:
-        return False
     n_u, n_w = view.nearest.shape
+    low, high, axes = faces.low[view.face], faces.high[view.face], faces.axes[view.face]
+    u = axes[0, 0] * at[0] + axes[0, 1] * at[1] + axes[0, 2] * at[2]
+    w = axes[1, 0] * at[0] + axes[1, 1] * at[1] + axes[1, 2] * at[2]
     i = min(int((u - low[0]) / (high[0] - low[0]) * n_u), n_u - 1)
     j = min(int((w - low[1]) / (high[1] - low[1]) * n_w), n_w - 1)
     x, y, z = point[0] - at[0], point[1] - at[1], point[2] - at[2]
     d = math.sqrt(x * x + y * y + z * z)
     if d > view.farthest[i, j] + _SAME_SURFACE_M:
         return False
-    at_m, triangle = np.zeros(1), np.zeros(1, dtype=np.int64)
-    rim_m = 2.0 * SAME_M
-    if d > view.nearest[i, j] - _SAME_SURFACE_M:
-        if crossings(faces.bvh, at, point, rim_m, at_m, triangle) > 0:
-            return False
-    return sees(around, faces.bvh, at)
+    if not sees_face(around, faces, view.face, at):
+        return False
+    if not view.whole and triangle_at(faces.bvh, faces.of_triangle, view.face, at) < 0:
+        return False
+    if d < view.nearest[i, j] - _SAME_SURFACE_M:
+        return True
+    return not blocked(faces.bvh, at, point, 2.0 * SAME_M)

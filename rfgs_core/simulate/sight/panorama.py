@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from rfgs_core.simulate.geometry.bvh import SAME_M, Bvh, crossings, nearest
+from rfgs_core.simulate.geometry.bvh import SAME_M, Bvh, blocked, nearest
+from rfgs_core.simulate.geometry.faces import Faces
 
 #: Directions along a side of each of six pictures; things narrower than 0.4° may be overlooked.
 SIZE = 256
@@ -31,14 +32,17 @@ class Panorama(NamedTuple):
     float32, shape (picture, row, column)."""
     farthest: np.ndarray
     """That of the farthest [m], of the same shape."""
+    face: np.ndarray
+    """Face that all neighbours belong to, −1 for none, −2 where they differ, int32, of the same
+    shape."""
 
 
 @numba.njit(cache=True, nogil=True)
-def panorama(bvh: Bvh, place: np.ndarray, size: int) -> Panorama:
+def panorama(faces: Faces, place: np.ndarray, size: int) -> Panorama:
     """Looks around from a place.
 
     Args:
-        bvh: What stands around.
+        faces: What stands around.
         place: Where [m], shape (3,).
         size: Directions along a side of each picture.
     """
@@ -46,6 +50,8 @@ def panorama(bvh: Bvh, place: np.ndarray, size: int) -> Panorama:
     far = np.zeros_like(near)
     # One more direction on each side, so that neighbours are known everywhere.
     seen = np.zeros((size + 2, size + 2), dtype=np.float32)
+    of = np.full((size + 2, size + 2), -1, dtype=np.int32)
+    face = np.zeros((6, size, size), dtype=np.int32)
     way = np.zeros(3)
     for side in range(6):
         axis = side // 2
@@ -54,12 +60,16 @@ def panorama(bvh: Bvh, place: np.ndarray, size: int) -> Panorama:
                 way[axis] = 1.0 - 2.0 * (side % 2)
                 way[(axis + 1) % 3] = (2.0 * i - 1.0) / size - 1.0
                 way[(axis + 2) % 3] = (2.0 * j - 1.0) / size - 1.0
-                seen[i, j] = nearest(bvh, place, way / math.sqrt((way * way).sum()), SAME_M)
+                unit = way / math.sqrt((way * way).sum())
+                seen[i, j], hit = nearest(faces.bvh, place, unit, SAME_M)
+                of[i, j] = faces.of_triangle[hit] if hit >= 0 else -1
         for i in range(size):
             for j in range(size):
                 some = seen[i : i + 3, j : j + 3]
                 near[side, i, j], far[side, i, j] = some.min(), some.max()
-    return Panorama(place, near, far)
+                every = of[i : i + 3, j : j + 3]
+                face[side, i, j] = every[0, 0] if every.min() == every.max() else -2
+    return Panorama(place, near, far, face)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -76,14 +86,44 @@ def in_sight(around: Panorama, bvh: Bvh, points: np.ndarray, out: np.ndarray) ->
         out[p] = sees(around, bvh, points[p])
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, inline="always")
 def sees(around: Panorama, bvh: Bvh, point: np.ndarray) -> bool:
     """Whether nothing that stands still is between a place and a point."""
-    place, size = around.place, around.nearest.shape[1]
+    place = around.place
     x, y, z = point[0] - place[0], point[1] - place[1], point[2] - place[2]
     d = math.sqrt(x * x + y * y + z * z)
     if d < SAME_M:
         return True
+    side, i, j = _pixel(x, y, z, around.nearest.shape[1])
+    if d < around.nearest[side, i, j] - _SAME_SURFACE_M:
+        return True
+    if d > around.farthest[side, i, j] + _SAME_SURFACE_M:
+        return False
+    return not blocked(bvh, place, point, 2.0 * SAME_M)
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def sees_face(around: Panorama, faces: Faces, face: int, point: np.ndarray) -> bool:
+    """Whether nothing that stands still is between a place and a point on a face.
+
+    Args:
+        around: What is seen from the place.
+        faces: What stands around.
+        face: The face.
+        point: The point [m], shape (3,).
+    """
+    place = around.place
+    x, y, z = point[0] - place[0], point[1] - place[1], point[2] - place[2]
+    side, i, j = _pixel(x, y, z, around.nearest.shape[1])
+    seen = around.face[side, i, j]
+    if seen != -2:
+        return seen == face
+    return not blocked(faces.bvh, place, point, 2.0 * SAME_M)
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _pixel(x: float, y: float, z: float, size: int) -> tuple[int, int, int]:
+    """Picture, row and column of a direction."""
     a_x, a_y, a_z = abs(x), abs(y), abs(z)
     if a_x >= a_y and a_x >= a_z:
         side, u, v = (0 if x > 0.0 else 1), y / a_x, z / a_x
@@ -93,9 +133,4 @@ def sees(around: Panorama, bvh: Bvh, point: np.ndarray) -> bool:
         side, u, v = (4 if z > 0.0 else 5), x / a_z, y / a_z
     i = min(int(0.5 * (u + 1.0) * size), size - 1)
     j = min(int(0.5 * (v + 1.0) * size), size - 1)
-    if d < around.nearest[side, i, j] - _SAME_SURFACE_M:
-        return True
-    if d > around.farthest[side, i, j] + _SAME_SURFACE_M:
-        return False
-    at_m, triangle = np.zeros(1), np.zeros(1, dtype=np.int64)
-    return crossings(bvh, place, point, 2.0 * SAME_M, at_m, triangle) == 0
+    return side, i, j

@@ -11,7 +11,6 @@ import sionna.rt as rt
 
 from dataset_factory.scene.bundle import Bundle
 from dataset_factory.trace.rays.fields import Fields, SceneMeshes
-from dataset_factory.trace.rays.movers import Movers
 from dataset_factory.trace.rays.paths import path_set
 from dataset_factory.trace.rays.scene import (
     Group,
@@ -35,6 +34,7 @@ from rfgs_core.simulate.geometry import (
     specular_paths,
 )
 from rfgs_core.simulate.paths.path_set import PathSet, joined, merged
+from rfgs_core.simulate.surface.movers import Movers
 
 #: Interactions of an environment path; a fourth would change bistatic links by −39 dB.
 MAX_DEPTH = 3

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from dataset_factory.scene.bundle import Bundle, BundleFrame
@@ -22,13 +20,11 @@ from rfgs_core.radio.layout import DevicePose
 from rfgs_core.radio.path_table import PathTable
 from rfgs_core.seeds import sub_seed
 from rfgs_core.simulate.environment import environment_channel
+from rfgs_core.simulate.packets import sampled
 from rfgs_core.simulate.paths.path_set import PathSet
 from rfgs_core.simulate.paths.steering import steer
 from rfgs_core.simulate.shadow.kirchhoff import Outline, Shadow, transmission
 from rfgs_core.simulate.surface.direct import PosedPoints, direct_channel
-
-#: Longest time between traces of a frame with several samples [s].
-TRACE_STEP_S = 0.02
 
 
 class Tracer(BaseTracer):
@@ -105,7 +101,7 @@ class Tracer(BaseTracer):
 
     def trace(self, frame: BundleFrame) -> Trace:
         """Everything about a frame that needs rays, for `samples` and `paths`."""
-        return self._trace(frame.vertices)
+        return self.trace_at(frame.vertices)
 
     def samples(self, frame: BundleFrame, trace: Trace | None = None) -> np.ndarray:
         """Channels at every sample of a frame, complex64, shape (sample, tx, rx, subcarrier).
@@ -128,21 +124,25 @@ class Tracer(BaseTracer):
         if span_s is None:
             return out
         motion = read_motion(self._bundle, frame.frame, span_s)
-        parts = max(1, math.ceil(offset_s[-1] / TRACE_STEP_S - 1e-9))
-        before, after, part = first, first, 0
-        for k, time_s in enumerate(offset_s[1:], start=1):
-            progress = time_s / offset_s[-1] * parts
-            while part < progress and part < parts:
-                part += 1
-                before = after
-                after = self._trace(motion.at(offset_s[-1] * part / parts))
-            share = 1.0 - part + progress
-            pose = motion.at(time_s)
-            environment = self._environment_at(pose) if len(self._bodies.vehicles) else None
-            shares = (1.0 - share, share)
-            points = self._bodies.points(pose)
-            out[k] = self._channel(points, (before, after), shares, environment)
+        for k, later in enumerate(sampled(self, first, offset_s, motion.at), start=1):
+            out[k] = later
         return out
+
+    def mixture(
+        self, vertices: np.ndarray, traces: tuple[Trace, ...], shares: tuple[float, ...]
+    ) -> np.ndarray:
+        """Channel at a pose, visibility, walls and shadows as some traces have them, mixed.
+
+        Args:
+            vertices: Vertices of the bundle [m], shape (V, 3).
+            traces: Traces before and after.
+            shares: Weight of each.
+
+        Returns:
+            Complex128, shape (tx, rx, subcarrier).
+        """
+        environment = self._environment_at(vertices) if len(self._bodies.vehicles) else None
+        return self._channel(self._bodies.points(vertices), traces, shares, environment)
 
     def frame(self, frame: BundleFrame) -> np.ndarray:
         """Channel at one frame; the result does not depend on frames traced before.
@@ -153,10 +153,10 @@ class Tracer(BaseTracer):
         Returns:
             Complex64, shape (tx, rx, subcarrier), zero where a link is not measured.
         """
-        trace = self._trace(frame.vertices)
+        trace = self.trace_at(frame.vertices)
         return self._channel(trace.points, (trace,), (1.0,)).astype(np.complex64)
 
-    def _trace(self, vertices: np.ndarray) -> Trace:
+    def trace_at(self, vertices: np.ndarray) -> Trace:
         """Everything that needs rays, with everything that moves in place.
 
         Args:

@@ -9,7 +9,7 @@ import numpy as np
 import sionna.rt as rt
 
 from dataset_factory.scene.bundle import Bundle
-from dataset_factory.trace.rays.movers import split_movers
+from dataset_factory.scene.movers import split_movers
 from dataset_factory.trace.rays.scene import (
     BODY,
     environment_scene,

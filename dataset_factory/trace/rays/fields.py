@@ -14,9 +14,9 @@ from sionna.rt.path_solvers.field_calculator import FieldCalculator
 from sionna.rt.path_solvers.paths_buffer import PathsBuffer
 
 from dataset_factory.scene.bundle import Bundle
-from dataset_factory.trace.rays.movers import Movers
 from dataset_factory.trace.rays.scene import set_frequency, static_name, vehicle_meshes
 from rfgs_core.simulate.geometry import SpecularPaths
+from rfgs_core.simulate.surface.movers import Movers
 
 
 class SceneMeshes:

@@ -12,7 +12,6 @@ import sionna.rt as rt
 from sionna.rt.radio_materials.itu import itu_material
 
 from dataset_factory.scene.bundle import Bundle
-from dataset_factory.trace.rays.movers import Movers
 from rfgs_core.errors import RfgsError
 from rfgs_core.radio import Layout, Radio
 from rfgs_core.radio.check import material_problems
@@ -20,6 +19,7 @@ from rfgs_core.radio.constants import VACUUM_PERMITTIVITY
 from rfgs_core.radio.layout import DevicePose, rotation
 from rfgs_core.radio.sites import centres, owners
 from rfgs_core.radio.tissue import normal_reflection, skin_conductivity, skin_permittivity
+from rfgs_core.simulate.surface.movers import Movers
 
 #: Transmitting and receiving sites that are traced together.
 Group = tuple[np.ndarray, np.ndarray]

@@ -8,10 +8,10 @@ import sionna.rt as rt
 import trimesh
 
 from dataset_factory.scene.bundle import Bundle
-from dataset_factory.trace.rays.movers import Movers
 from dataset_factory.trace.rays.scene import static_name, vehicle_meshes
 from rfgs_core.radio.images import SCATTERING, directions
 from rfgs_core.simulate.paths.path_set import PathSet
+from rfgs_core.simulate.surface.movers import Movers
 
 
 class CornerObjects:

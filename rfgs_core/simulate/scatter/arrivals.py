@@ -9,38 +9,14 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from rfgs_core.simulate.geometry.bvh import SAME_M, Bvh, blocked, crossings
+from rfgs_core.simulate.geometry.bvh import SAME_M, blocked, crossings
 from rfgs_core.simulate.geometry.faces import Faces
 from rfgs_core.simulate.scatter.antenna import Antenna, sent_towards
 from rfgs_core.simulate.scatter.kernel import seen_from_centres
 from rfgs_core.simulate.sight.bodies import HIDDEN, UNSURE, Picture, hides
 from rfgs_core.simulate.sight.mirrors import Mirror, free_by_mirror, on_mirror
 from rfgs_core.simulate.sight.panorama import Panorama, sees
-
-
-class Facets(NamedTuple):
-    """Facets of one frame, and what hides them."""
-
-    points: np.ndarray
-    """Positions on the skin [m], shape (facet, 3)."""
-    lifted: np.ndarray
-    """Positions just outside the skin, to look from [m], shape (facet, 3)."""
-    normals: np.ndarray
-    """Unit outward normals, shape (facet, 3)."""
-    areas: np.ndarray
-    """Areas [m²], shape (facet,)."""
-    material: np.ndarray
-    """Material of each, int64, shape (facet,)."""
-    body: np.ndarray
-    """Body of each, ascending, int64, shape (facet,)."""
-    vertices: np.ndarray
-    """Vertices of everything that moves [m], shape (V, 3)."""
-    corners: np.ndarray
-    """Vertices of each triangle, int64, shape (triangle, 3)."""
-    triangles: np.ndarray
-    """Triangles of everything that moves [m], shape (triangle, 3, 3)."""
-    bvh: Bvh
-    """The same for rays."""
+from rfgs_core.simulate.surface.posed import Facets
 
 
 class Slabs(NamedTuple):

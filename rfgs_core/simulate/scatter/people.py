@@ -16,7 +16,6 @@ from rfgs_core.simulate.geometry.surroundings import Surroundings
 from rfgs_core.simulate.room import Room
 from rfgs_core.simulate.scatter.antenna import CODES, Antenna
 from rfgs_core.simulate.scatter.arrivals import (
-    Facets,
     Pictures,
     Slabs,
     by_mirror,
@@ -30,6 +29,7 @@ from rfgs_core.simulate.sight.bodies import SIZE, picture
 from rfgs_core.simulate.sight.mirrors import Mirror, meeting_ball, mirror
 from rfgs_core.simulate.sight.panorama import SIZE as AROUND
 from rfgs_core.simulate.sight.panorama import Panorama, panorama
+from rfgs_core.simulate.surface.posed import Facets
 
 #: Faces smaller than this do not mirror people [m²].
 SMALLEST_MIRROR_M2 = 0.1
@@ -65,6 +65,15 @@ class Ways(NamedTuple):
     """Elements from there, and their squared distances [m, m²], float32, (way, 4, element)."""
     field: np.ndarray
     """θ and φ of the field, 0 where it does not reach, complex64, shape (way, facet, 2, node)."""
+
+
+class Arrivals(NamedTuple):
+    """What reaches the facets from all sites."""
+
+    sent: tuple[Ways, ...]
+    """From transmitters, port by port."""
+    heard: tuple[Ways, ...]
+    """From receivers, port by port, as if they sent."""
 
 
 class PeopleChannel:
@@ -119,27 +128,41 @@ class PeopleChannel:
         """Frequencies at which materials are asked for [Hz], shape (node,)."""
         return self._grid.node_hz
 
-    def channel(self, facets: Facets, gamma: np.ndarray) -> np.ndarray:
+    def arrivals(self, facets: Facets) -> Arrivals:
+        """What reaches facets from all sites, with everything that moves in place."""
+        balls = _balls(facets)
+        tx_seen, rx_seen = (
+            [_pictures(facets, site.around.place, balls) for site in sites]
+            for sites in (self._tx, self._rx)
+        )
+        layout = self._layout
+        return Arrivals(
+            tuple(
+                self._ways(self._tx, self._rx, port, facets, tx_seen, balls)
+                for port in range(len(np.unique(layout.tx_port)))
+            ),
+            tuple(
+                self._ways(self._rx, self._tx, port, facets, rx_seen, balls)
+                for port in range(len(np.unique(layout.rx_port)))
+            ),
+        )
+
+    def channel(self, facets: Facets, arrivals: Arrivals, gamma: np.ndarray) -> np.ndarray:
         """What facets add to every measured link, complex64, shape (tx, rx, subcarrier).
 
         Args:
-            facets: The facets, in place.
+            facets: The facets, where they are now.
+            arrivals: What reaches them, perhaps a moment before.
             gamma: Reflection coefficient of each material at `node_hz`, shape (material, node).
         """
         layout, grid = self._layout, self._grid
         shape = (len(layout.tx_xyz), len(layout.rx_xyz), len(grid.row))
         out = np.zeros(shape, dtype=np.complex64)
         gamma = np.ascontiguousarray(gamma, dtype=np.complex64)
-        balls = _balls(facets)
-        tx_seen, rx_seen = (
-            [_pictures(facets, site.around.place, balls) for site in sites]
-            for sites in (self._tx, self._rx)
-        )
         for i, j in ports(layout):
-            sent = self._ways(self._tx, self._rx, i, facets, tx_seen, balls)
-            heard = self._ways(self._rx, self._tx, j, facets, rx_seen, balls)
-            for b in np.unique(heard.site):
-                self._add(facets, gamma, (sent, heard), int(b), (i, j), out)
+            ways = arrivals.sent[i], arrivals.heard[j]
+            for b in np.unique(ways[1].site):
+                self._add(facets, gamma, ways, int(b), (i, j), out)
         out[~layout.measured] = 0.0
         return out
 

@@ -23,6 +23,7 @@ def segments_in_view(
     corners: np.ndarray,
     vertices: np.ndarray,
     faces: np.ndarray,
+    wanted: np.ndarray | None = None,
 ) -> np.ndarray:
     """Whether any of a body is in sight from where segments of paths pass it.
 
@@ -32,9 +33,10 @@ def segments_in_view(
         corners: Corners of paths [m], shape (path, corner, 3).
         vertices: Vertices of the body [m], shape (V, 3).
         faces: Its triangles, shape (T, 3).
+        wanted: Segments to look from, bool, shape (path, corner - 1); None takes all.
 
     Returns:
-        One value per segment, bool, shape (path, corner - 1).
+        One value per segment, False where it is not wanted, bool, shape (path, corner - 1).
     """
     start, way = corners[:, :-1], np.diff(corners, axis=1)
     if not start.size:
@@ -42,8 +44,12 @@ def segments_in_view(
     length = np.maximum(np.linalg.norm(way, axis=2), 2 * _MARGIN_M)
     share = ((vertices.mean(axis=0) - start) * way).sum(axis=2) / length**2
     share = np.clip(share, _MARGIN_M / length, 1 - _MARGIN_M / length)
-    foot = (start + share[..., None] * way).reshape(-1, 3)
+    if wanted is None:
+        wanted = np.ones(share.shape, dtype=bool)
+    foot = (start + share[..., None] * way)[wanted]
     # Not vertices: those of a simple mesh are its corners, which may stick in floor and ceiling.
     places = vertices[faces[:: -(-len(faces) // PLACES)]].mean(axis=1)
     seen = visible(np.repeat(foot, len(places), axis=0), np.tile(places, (len(foot), 1)))
-    return seen.reshape(*share.shape, len(places)).any(axis=2)
+    out = np.zeros(share.shape, dtype=bool)
+    out[wanted] = seen.reshape(len(foot), len(places)).any(axis=1)
+    return out

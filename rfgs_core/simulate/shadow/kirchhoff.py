@@ -160,6 +160,19 @@ def transmission(
     return Passed(shaded, out, grid_hz)
 
 
+def near_segments(paths: PathSet, vertices: np.ndarray, highest_hz: float) -> np.ndarray:
+    """Which segments of paths a body may shade, walls or not, bool, shape (path, segment).
+
+    Args:
+        paths: Environment paths.
+        vertices: Vertices of the body [m], shape (V, 3).
+        highest_hz: Highest frequency [Hz].
+    """
+    before, after, _, _ = unfold(paths)
+    ball = _ball(vertices)
+    return _near(paths.vertices, before, after, _relative(paths), *ball, highest_hz)
+
+
 def _places(xyz: np.ndarray, site: np.ndarray, port: np.ndarray) -> np.ndarray:
     """Positions of each site's elements [m], shape (site, place, 3)."""
     first = port == port.min()

@@ -72,20 +72,6 @@ def panorama(faces: Faces, place: np.ndarray, size: int) -> Panorama:
     return Panorama(place, near, far, face)
 
 
-@numba.njit(cache=True, nogil=True)
-def in_sight(around: Panorama, bvh: Bvh, points: np.ndarray, out: np.ndarray) -> None:
-    """Fills in whether nothing that stands still is between a place and points.
-
-    Args:
-        around: What is seen from the place.
-        bvh: What stands around.
-        points: The points [m], shape (point, 3).
-        out: Filled, bool, shape (point,).
-    """
-    for p in range(len(points)):
-        out[p] = sees(around, bvh, points[p])
-
-
 @numba.njit(cache=True, nogil=True, inline="always")
 def sees(around: Panorama, bvh: Bvh, point: np.ndarray) -> bool:
     """Whether nothing that stands still is between a place and a point."""

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dataset_factory.scene.bundle import Bundle
-from dataset_factory.trace.rays.movers import split_movers
+from dataset_factory.scene.movers import split_movers
 from rfgs_core.radio import DevicePose, Radio, layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 

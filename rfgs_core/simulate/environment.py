@@ -34,7 +34,10 @@ def node_frequencies(radio: Radio) -> np.ndarray:
 
 
 def environment_channel(
-    paths: PathSet, radio: Radio, layout: Layout, passed: Passed | None = None
+    paths: PathSet,
+    radio: Radio,
+    layout: Layout,
+    passed: Passed | None = None,
 ) -> np.ndarray:
     """Channel of the environment, complex128, shape (tx, rx, subcarrier).
 
@@ -52,4 +55,18 @@ def environment_channel(
         channel = steer(paths.select(free), layout, radio.freq_hz, nodes_hz)
         shaded = resampled(paths.select(passed.path), nodes_hz, passed.grid_hz)
         channel += steer(shaded, layout, radio.freq_hz, passed.grid_hz, passed.factor)
+    return channel * (radio.centre_hz / radio.freq_hz)
+
+
+def shadow_channel(paths: PathSet, radio: Radio, layout: Layout, passed: Passed) -> np.ndarray:
+    """What shadows change of the environment's channel, complex128, shape (tx, rx, subcarrier).
+
+    Args:
+        paths: Paths of the environment.
+        radio: The radio they were traced for.
+        layout: Antenna elements.
+        passed: What bodies leave of some of them.
+    """
+    shaded = resampled(paths.select(passed.path), node_frequencies(radio), passed.grid_hz)
+    channel = steer(shaded, layout, radio.freq_hz, passed.grid_hz, passed.factor - 1.0)
     return channel * (radio.centre_hz / radio.freq_hz)

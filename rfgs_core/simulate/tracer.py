@@ -17,7 +17,11 @@ from rfgs_core.radio.reflection import material_permittivity
 from rfgs_core.radio.sites import centres, measured_pairs
 from rfgs_core.radio.tissue import normal_reflection
 from rfgs_core.seeds import sub_seed
-from rfgs_core.simulate.environment import environment_channel, node_frequencies
+from rfgs_core.simulate.environment import (
+    environment_channel,
+    node_frequencies,
+    shadow_channel,
+)
 from rfgs_core.simulate.geometry import Sight, Surroundings, specular_paths
 from rfgs_core.simulate.geometry.bvh import Bvh
 from rfgs_core.simulate.paths.fields import with_fields
@@ -88,7 +92,8 @@ class FastTracer:
             seed: Root seed of the facets.
         """
         self._room, self._radio, self._devices = room, radio, devices
-        self._people, self._vehicles, self._shadow = people, vehicles, shadow
+        self._people, self._vehicles = people, vehicles
+        self._shadow: Shadow = shadow
         self._layout = layout(radio, devices)
         self._nodes = node_frequencies(radio)
         self._grid = fine_grid(self._nodes)
@@ -151,8 +156,9 @@ class FastTracer:
         if len(self._vehicles) and len(traces) > 1:
             channel = self._environment_at(vertices.astype(np.float32))
         else:
-            weighted = zip(traces, shares, strict=True)
-            channel = sum(share * trace.environment for trace, share in weighted)
+            channel = shares[0] * traces[0].environment
+            for trace, share in zip(traces[1:], shares[1:], strict=True):
+                channel = channel + share * trace.environment
         if self._surface is not None:
             with self._timed("people"):
                 facets = self._surface.facets(vertices)
@@ -165,18 +171,18 @@ class FastTracer:
 
     def _environment_at(self, vertices: np.ndarray) -> np.ndarray:
         """Channel of everything but people's echoes, complex128, (tx, rx, subcarrier)."""
-        paths, room = self._static_paths, self._room
+        paths, room, channel = self._static_paths, self._room, self._unshaded
         if len(self._vehicles):
             with self._timed("environment"):
                 room = self._with_vehicles(vertices)
                 paths = self._paths(room, self._look(room))
+                channel = environment_channel(paths, self._radio, self._layout)
         outlines = self._shades(paths, room.faces.bvh, vertices)
+        if not outlines:
+            return channel
         with self._timed("shadow"):
-            if not outlines:
-                return environment_channel(paths, self._radio, self._layout)
             passed = transmission(paths, self._layout, outlines, self._grid, self._shadow)
-        with self._timed("environment"):
-            return environment_channel(paths, self._radio, self._layout, passed)
+            return channel + shadow_channel(paths, self._radio, self._layout, passed)
 
     def _shades(self, paths: PathSet, standing: Bvh, vertices: np.ndarray) -> list[Outline]:
         """What casts the shadow of each person."""

@@ -45,7 +45,13 @@ def build_bvh(triangles: Float64[np.ndarray, "triangle 3 3"]) -> Bvh:
 
 
 @numba.njit(cache=True, nogil=True)
-def blocked(bvh: Bvh, start: np.ndarray, end: np.ndarray, rim_m: float) -> bool:
+def new_stack() -> np.ndarray:
+    """Scratch for many calls of `blocked`."""
+    return np.zeros(_STACK, dtype=np.int64)
+
+
+@numba.njit(cache=True, nogil=True)
+def blocked(bvh: Bvh, start: np.ndarray, end: np.ndarray, rim_m: float, stack: np.ndarray) -> bool:
     """Whether a segment crosses any triangle, as `crossings` tells, looking no further.
 
     Args:
@@ -53,6 +59,7 @@ def blocked(bvh: Bvh, start: np.ndarray, end: np.ndarray, rim_m: float) -> bool:
         start: Where it starts [m], shape (3,).
         end: Where it leads to [m], shape (3,).
         rim_m: What is nearer to either end does not count [m].
+        stack: Scratch, from `new_stack`.
     """
     x, y, z = start[0], start[1], start[2]
     wx, wy, wz = end[0] - x, end[1] - y, end[2] - z
@@ -63,8 +70,7 @@ def blocked(bvh: Bvh, start: np.ndarray, end: np.ndarray, rim_m: float) -> bool:
     inverse_x, inverse_y, inverse_z = _inverse(wx), _inverse(wy), _inverse(wz)
     reach = length - rim_m
     low, high, first, count, corners = bvh.low, bvh.high, bvh.first, bvh.count, bvh.corners
-    stack = np.zeros(_STACK, dtype=np.int64)
-    size = 1
+    stack[0], size = 0, 1
     while size:
         size -= 1
         node = stack[size]

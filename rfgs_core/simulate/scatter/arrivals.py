@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from rfgs_core.simulate.geometry.bvh import SAME_M, blocked, crossings
+from rfgs_core.simulate.geometry.bvh import SAME_M, blocked, crossings, new_stack
 from rfgs_core.simulate.geometry.faces import Faces
 from rfgs_core.simulate.scatter.antenna import Antenna, sent_towards
 from rfgs_core.simulate.scatter.kernel import seen_from_centres
@@ -74,15 +74,15 @@ def straight(
     """
     wave = np.zeros((clear.shape[2], 3), dtype=np.complex64)
     at_m, hit = np.zeros(1), np.zeros(1, dtype=np.int64)
-    way, n_clear, n_through = np.zeros(3), 0, 0
+    way, stack, n_clear, n_through = np.zeros(3), new_stack(), 0, 0
     for p in wanted:
         lifted = facets.lifted[p]
-        free = sees(around, faces.bvh, lifted)
+        free = sees(around, faces.bvh, lifted, stack)
         if not (free or len(through)):
             continue
         drawn = _picture(pictures, around.place, facets.body[p])
         hidden = hides(drawn, facets.triangles, lifted)
-        if hidden == UNSURE and blocked(facets.bvh, around.place, lifted, 2.0 * SAME_M):
+        if hidden == UNSURE and blocked(facets.bvh, around.place, lifted, 2.0 * SAME_M, stack):
             hidden = HIDDEN
         if hidden == HIDDEN:
             continue
@@ -118,9 +118,9 @@ def free_facets(
         Which facets, and where they are mirrored [m], shape (found, 3).
     """
     met, at = on_mirror(faces, view.face, view.image, facets.lifted, wanted)
-    count = 0
+    stack, count = new_stack(), 0
     for k in range(len(met)):
-        if free_by_mirror(faces, view, around, facets.lifted[met[k]], at[k]):
+        if free_by_mirror(faces, view, around, facets.lifted[met[k]], at[k], stack):
             met[count], at[count] = met[k], at[k]
             count += 1
     return met[:count], at[:count]
@@ -130,7 +130,6 @@ def free_facets(
 def by_mirror(
     facets: Facets,
     met: tuple[np.ndarray, np.ndarray],
-    from_image: Picture,
     pictures: Pictures,
     around: Panorama,
     faces: Faces,
@@ -144,8 +143,7 @@ def by_mirror(
     Args:
         facets: The facets.
         met: Those that may be met and where they are mirrored, from `free_facets`.
-        from_image: Everything that moves as seen from the image of the site towards them.
-        pictures: The same as seen from the site.
+        pictures: What moves, as seen from the site.
         around: What stands around the site.
         faces: The same as faces.
         view: The face that mirrors.
@@ -158,24 +156,22 @@ def by_mirror(
         How many facets it reaches.
     """
     wave = np.zeros((out.shape[2], 3), dtype=np.complex64)
-    into, count = np.zeros(3), 0
+    into, stack, count = np.zeros(3), new_stack(), 0
     factors = slabs.mirrored[slabs.of_face[view.face]]
     normal = faces.normal[view.face]
     for k in range(len(met[0])):
         p, at = met[0][k], met[1][k]
-        hidden = hides(from_image, facets.triangles, facets.lifted[p])
-        if hidden == UNSURE and blocked(facets.bvh, at, facets.lifted[p], 2.0 * SAME_M):
-            hidden = HIDDEN
-        if hidden == HIDDEN:
+        if blocked(facets.bvh, at, facets.lifted[p], 2.0 * SAME_M, stack):
             continue
+        hidden = False
         for other in range(len(pictures.per_pixel)):
             # What moves may also stand before the mirror.
             drawn = _picture(pictures, around.place, other)
             before = hides(drawn, facets.triangles, at)
-            if before == UNSURE and blocked(facets.bvh, around.place, at, 2.0 * SAME_M):
+            if before == UNSURE and blocked(facets.bvh, around.place, at, 2.0 * SAME_M, stack):
                 before = HIDDEN
-            hidden = max(hidden, before) if before == HIDDEN else hidden
-        if hidden == HIDDEN:
+            hidden |= before == HIDDEN
+        if hidden:
             continue
         for axis in range(3):
             into[axis] = at[axis] - around.place[axis]

@@ -15,7 +15,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import scipy.fft
 from scipy.integrate import quad
 
 from rfgs_core.radio import Layout, Radio
@@ -60,7 +59,7 @@ def delay_grid(radio: Radio, layout: Layout) -> DelayGrid:
     count = len(k)
     middle = count // 2
     step = (k[-1] - k[0]) / max(count - 1, 1)
-    cells = scipy.fft.next_fast_len(max(2 * count, 4 * WIDTH))
+    cells = max(2 * count, 4 * WIDTH)
     half = max(0.5 * (k[-1] - k[0]), 1e-9)
     reach_m = array_reach(layout.tx_xyz, layout.tx_site) + array_reach(
         layout.rx_xyz, layout.rx_site

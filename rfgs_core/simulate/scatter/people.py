@@ -33,8 +33,6 @@ from rfgs_core.simulate.surface.posed import Facets
 
 #: Faces smaller than this do not mirror people [m²].
 SMALLEST_MIRROR_M2 = 0.1
-#: Pixels of what moves as seen by way of a mirror, along a side.
-MIRRORED_SIZE = 128
 #: Angles at which slabs are tabled.
 _COSINES = 513
 
@@ -282,18 +280,14 @@ class PeopleChannel:
         """Fills in what reaches the facets by way of a mirror; returns how many it reaches."""
         faces, count = self._room.faces, 0
         for ball in balls:
-            centre, radius = ball[2:]
             wanted = self._wanted(facets, [ball], view.image, partners)
             if not len(wanted):
                 continue
             met = free_facets(facets, wanted, site.around, faces, view)
             if not len(met[0]):
                 continue
-            drawn = picture(
-                facets.vertices, facets.corners, view.image, centre, radius, MIRRORED_SIZE
-            )
             count += by_mirror(
-                facets, met, drawn, seen, site.around, faces, view, antenna, self._slabs, field
+                facets, met, seen, site.around, faces, view, antenna, self._slabs, field
             )
         return count
 

@@ -15,8 +15,6 @@ from rfgs_core.simulate.sight.panorama import Panorama, sees_face
 
 #: Step of the places on a mirror that are looked by way of [m], and most of them along a side.
 STEP_M, MOST = 0.05, 256
-#: A mirror is whole when its triangles cover this share of its rectangle.
-_WHOLE = 0.9999
 #: Distances that agree this well are those of one surface [m].
 _SAME_SURFACE_M = 0.02
 
@@ -28,8 +26,9 @@ class Mirror(NamedTuple):
     """The face."""
     image: np.ndarray
     """Mirror image of the place [m], shape (3,)."""
-    whole: bool
-    """Whether the face covers all of its rectangle."""
+    covered: np.ndarray
+    """Whether the face covers the neighbourhood of each place of its rectangle: 1 all, 0 nothing,
+    −1 some of it, int8, shape (u, w)."""
     nearest: np.ndarray
     """How far one sees beyond each place on the mirror [m], float32, shape (u, w)."""
     farthest: np.ndarray
@@ -45,25 +44,19 @@ def mirror(faces: Faces, face: int, place: np.ndarray) -> Mirror:
         place: Where from [m], shape (3,).
     """
     image = mirrored(faces, face, place)
-    own = faces.of_triangle[faces.bvh.triangle] == face
-    corners = faces.bvh.corners[own]
-    area = 0.5 * np.linalg.norm(
-        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-    )
-    sides = faces.high[face] - faces.low[face]
-    near, far = _looked(faces, face, image, STEP_M, MOST)
-    return Mirror(face, image, bool(area.sum() > _WHOLE * sides.prod()), near, far)
+    return Mirror(face, image, *_looked(faces, face, image, STEP_M, MOST))
 
 
 @numba.njit(cache=True, nogil=True)
 def _looked(
     faces: Faces, face: int, image: np.ndarray, step_m: float, most: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Nearest and farthest distance beyond the places of a mirror."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What is covered, and nearest and farthest distance beyond, of the places of a mirror."""
     sides = faces.high[face] - faces.low[face]
     n_u = min(max(int(math.ceil(sides[0] / step_m)), 1), most)  # noqa: RUF046
     n_w = min(max(int(math.ceil(sides[1] / step_m)), 1), most)  # noqa: RUF046
     seen = np.zeros((n_u, n_w), dtype=np.float32)
+    holds = np.zeros((n_u, n_w), dtype=np.int8)
     for i in range(n_u):
         for j in range(n_w):
             u = faces.low[face, 0] + sides[0] * (i + 0.5) / n_u
@@ -73,12 +66,15 @@ def _looked(
             way = place - image
             way = way / math.sqrt((way * way).sum())
             seen[i, j] = nearest(faces.bvh, place, way, 2.0 * SAME_M)[0]
-    near, far = np.zeros_like(seen), np.zeros_like(seen)
+            holds[i, j] = triangle_at(faces.bvh, faces.of_triangle, face, place) >= 0
+    near, far, covered = np.zeros_like(seen), np.zeros_like(seen), np.zeros_like(holds)
     for i in range(n_u):
         for j in range(n_w):
             some = seen[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2]
             near[i, j], far[i, j] = some.min(), some.max()
-    return near, far
+            every = holds[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2]
+            covered[i, j] = every[0, 0] if every.min() == every.max() else -1
+    return covered, near, far
 
 
 @numba.njit(cache=True, nogil=True)
@@ -160,7 +156,12 @@ def on_mirror(
 
 @numba.njit(cache=True, nogil=True, inline="always")
 def free_by_mirror(
-    faces: Faces, view: Mirror, around: Panorama, point: np.ndarray, at: np.ndarray
+    faces: Faces,
+    view: Mirror,
+    around: Panorama,
+    point: np.ndarray,
+    at: np.ndarray,
+    stack: np.ndarray,
 ) -> bool:
     """Whether nothing that stands still is on the way to a point by a mirror.
 
@@ -170,6 +171,7 @@ def free_by_mirror(
         around: What is seen from the place itself.
         point: The point [m], shape (3,).
         at: Where the way meets the mirror [m], shape (3,).
+        stack: Scratch of `blocked`.
     """
     n_u, n_w = view.nearest.shape
     low, high, axes = faces.low[view.face], faces.high[view.face], faces.axes[view.face]
@@ -179,12 +181,12 @@ def free_by_mirror(
     j = min(int((w - low[1]) / (high[1] - low[1]) * n_w), n_w - 1)
     x, y, z = point[0] - at[0], point[1] - at[1], point[2] - at[2]
     d = math.sqrt(x * x + y * y + z * z)
-    if d > view.farthest[i, j] + _SAME_SURFACE_M:
+    if view.covered[i, j] == 0 or d > view.farthest[i, j] + _SAME_SURFACE_M:
         return False
-    if not sees_face(around, faces, view.face, at):
+    if not sees_face(around, faces, view.face, at, stack):
         return False
-    if not view.whole and triangle_at(faces.bvh, faces.of_triangle, view.face, at) < 0:
+    if view.covered[i, j] < 0 and triangle_at(faces.bvh, faces.of_triangle, view.face, at) < 0:
         return False
     if d < view.nearest[i, j] - _SAME_SURFACE_M:
         return True
-    return not blocked(faces.bvh, at, point, 2.0 * SAME_M)
+    return not blocked(faces.bvh, at, point, 2.0 * SAME_M, stack)

@@ -73,8 +73,8 @@ def panorama(faces: Faces, place: np.ndarray, size: int) -> Panorama:
 
 
 @numba.njit(cache=True, nogil=True, inline="always")
-def sees(around: Panorama, bvh: Bvh, point: np.ndarray) -> bool:
-    """Whether nothing that stands still is between a place and a point."""
+def sees(around: Panorama, bvh: Bvh, point: np.ndarray, stack: np.ndarray) -> bool:
+    """Whether nothing that stands still is between a place and a point; see `blocked`."""
     place = around.place
     x, y, z = point[0] - place[0], point[1] - place[1], point[2] - place[2]
     d = math.sqrt(x * x + y * y + z * z)
@@ -85,11 +85,13 @@ def sees(around: Panorama, bvh: Bvh, point: np.ndarray) -> bool:
         return True
     if d > around.farthest[side, i, j] + _SAME_SURFACE_M:
         return False
-    return not blocked(bvh, place, point, 2.0 * SAME_M)
+    return not blocked(bvh, place, point, 2.0 * SAME_M, stack)
 
 
 @numba.njit(cache=True, nogil=True, inline="always")
-def sees_face(around: Panorama, faces: Faces, face: int, point: np.ndarray) -> bool:
+def sees_face(
+    around: Panorama, faces: Faces, face: int, point: np.ndarray, stack: np.ndarray
+) -> bool:
     """Whether nothing that stands still is between a place and a point on a face.
 
     Args:
@@ -97,6 +99,7 @@ def sees_face(around: Panorama, faces: Faces, face: int, point: np.ndarray) -> b
         faces: What stands around.
         face: The face.
         point: The point [m], shape (3,).
+        stack: Scratch of `blocked`.
     """
     place = around.place
     x, y, z = point[0] - place[0], point[1] - place[1], point[2] - place[2]
@@ -104,7 +107,7 @@ def sees_face(around: Panorama, faces: Faces, face: int, point: np.ndarray) -> b
     seen = around.face[side, i, j]
     if seen != -2:
         return seen == face
-    return not blocked(faces.bvh, place, point, 2.0 * SAME_M)
+    return not blocked(faces.bvh, place, point, 2.0 * SAME_M, stack)
 
 
 @numba.njit(cache=True, nogil=True, inline="always")

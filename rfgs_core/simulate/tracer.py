@@ -48,8 +48,8 @@ class Instant:
 
     environment: np.ndarray
     """Channel of everything but people's echoes, complex128, shape (tx, rx, subcarrier)."""
-    arrivals: Arrivals | None
-    """What reaches people's facets; None if nobody is there."""
+    arrivals: list[Arrivals]
+    """What reaches each person's facets."""
 
 
 class FastTracer:
@@ -134,7 +134,7 @@ class FastTracer:
         """What stands in whose way, with everything that moves at vertices [m], shape (V, 3)."""
         vertices = vertices.astype(np.float32)
         environment = self._environment_at(vertices)
-        arrivals = None
+        arrivals: list[Arrivals] = []
         if self._surface is not None:
             with self._timed("people"):
                 arrivals = self._echoes.arrivals(self._surface.facets(vertices))
@@ -163,7 +163,7 @@ class FastTracer:
             with self._timed("people"):
                 facets = self._surface.facets(vertices)
                 for trace, share in zip(traces, shares, strict=True):
-                    if share and trace.arrivals is not None:
+                    if share and trace.arrivals:
                         echo = self._echoes.channel(facets, trace.arrivals, self._gamma)
                         channel = channel + share * echo
         channel[~self._layout.measured] = 0.0

@@ -187,26 +187,23 @@ def by_mirror(
 @numba.njit(cache=True, nogil=True)
 def wanted_facets(
     facets: Facets,
-    body: tuple[int, int],
     place: np.ndarray,
     partners: np.ndarray,
     lowest_k: float,
     size_m: float,
 ) -> np.ndarray:
-    """Facets of a body that a place and any of its partners may see together, int64.
+    """Facets that a place and any of its partners may see together, int64.
 
     Args:
         facets: The facets.
-        body: First facet of the body and one past its last.
         place: Centre of an array, or of its image [m], shape (3,).
         partners: Centres of the arrays at the other end, and of their images [m], (partner, 3).
         lowest_k: Lowest wavenumber [rad/m].
         size_m: Size of both arrays together [m].
     """
-    found = np.zeros(body[1] - body[0], dtype=np.int64)
-    count = 0
-    points, normals = facets.points, facets.normals
-    for p in range(body[0], body[1]):
+    found = np.zeros(len(facets.points), dtype=np.int64)
+    points, normals, count = facets.points, facets.normals, 0
+    for p in range(len(points)):
         n = normals[p, 0], normals[p, 1], normals[p, 2]
         x, y, z = place[0] - points[p, 0], place[1] - points[p, 1], place[2] - points[p, 2]
         if x * n[0] + y * n[1] + z * n[2] < -size_m:

@@ -12,6 +12,9 @@ from rfgs_core.simulate.surface.movers import Movers
 from rfgs_core.simulate.surface.points import LIFT_M, surface_points
 from rfgs_core.simulate.surface.posed import Facets
 
+#: Distance by which bodies are held apart while their hierarchy is built [m].
+_APART_M = 1e3
+
 
 class BodySurface:
     """Scattering facets of people, body by body."""
@@ -42,7 +45,10 @@ class BodySurface:
         self._material = self._points.material[self._order].astype(np.int64)
         self._corners = np.concatenate([people.faces, vehicles.faces + len(people.rest_vertices)])
         rest = np.concatenate([people.rest_vertices, vehicles.rest_vertices]).astype(np.float64)
-        self._bvh = build_bvh(rest[self._corners])
+        # Bodies may rest at one place and move apart: no branch may hold parts of two.
+        moved = np.concatenate([people.instance, vehicles.instance])
+        apart = _APART_M * np.unique(moved, return_inverse=True)[1]
+        self._bvh = build_bvh(rest[self._corners] + apart[:, None, None])
 
     def facets(self, vertices: np.ndarray) -> Facets:
         """Facets with everything that moves at places [m], shape (V, 3)."""

@@ -7,6 +7,8 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+from dataset_factory.plan.tracers import TracerName
+
 
 @dataclass(frozen=True)
 class VerifyArgs:
@@ -21,6 +23,9 @@ class VerifyArgs:
 
     only: tuple[str, ...] = ()
     """Groups to verify, several in a row; default: all."""
+    tracer: TracerName = "sionna"
+    """Which tracer: Sionna RT, or the fast one, which has no antennas that move and no tables of
+    paths."""
     out: Path = Path("physics")
     """Folder that gets index.html (with plots), physics.md and card.json."""
     markdown: Path | None = None
@@ -54,7 +59,7 @@ def run(args: VerifyArgs) -> int:
             bar.update(seconds)
             bar.refresh()
 
-        card = verify(args.only, args.out, done)
+        card = verify(args.only, args.out, done, args.tracer)
     card.facts = facts(_command(args), card)
     sys.stdout.write(as_text(card))
     write_card(card, args.out)
@@ -69,5 +74,6 @@ def run(args: VerifyArgs) -> int:
 def _command(args: VerifyArgs) -> str:
     """The command line that makes the same card again."""
     only = ["--only", *args.only] if args.only else []
+    only += ["--tracer", args.tracer] if args.tracer != "sionna" else []
     markdown = ["--markdown", str(args.markdown)] if args.markdown else []
     return " ".join(["rfgs-factory verify", *only, *markdown])

@@ -1,20 +1,46 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Traces scene bundles with Sionna RT.
+"""Traces scene bundles, with Sionna RT or with the fast tracer.
 
-Call `dataset_factory.trace.setup.prepare` first, then import `Tracer`, or `ApertureTracer` for a
-radio whose antennas move, from here, which imports them on demand, since Sionna RT reads its
-settings from the environment at import.
+Call `dataset_factory.trace.setup.prepare` first, then import `Tracer`, `ApertureTracer` for a
+radio whose antennas move, or `FastBundleTracer` from here, which imports them on demand, since
+Sionna RT reads its settings from the environment at import.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from dataset_factory.plan.tracers import TracerName
+from rfgs_core.radio import Radio
 
 if TYPE_CHECKING:
     from dataset_factory.trace.aperture import ApertureTracer
+    from dataset_factory.trace.fast import FastBundleTracer
     from dataset_factory.trace.tracer import Tracer
 
-__all__ = ["ApertureTracer", "Tracer"]
+    AnyTracer: TypeAlias = Tracer | ApertureTracer | FastBundleTracer
+
+__all__ = ["ApertureTracer", "FastBundleTracer", "Tracer", "tracer_class"]
+
+
+def tracer_class(name: TracerName, radio: Radio) -> Any:
+    """The class that traces a radio.
+
+    Args:
+        name: Which tracer.
+        radio: The radio.
+    """
+    if name == "fast":
+        from dataset_factory.trace.fast import FastBundleTracer
+
+        return FastBundleTracer
+    if radio.antennas_move:
+        from dataset_factory.trace.aperture import ApertureTracer
+
+        return ApertureTracer
+    from dataset_factory.trace.tracer import Tracer
+
+    return Tracer
 
 
 def __getattr__(name: str) -> Any:
@@ -23,6 +49,10 @@ def __getattr__(name: str) -> Any:
         from dataset_factory.trace.aperture import ApertureTracer
 
         return ApertureTracer
+    if name == "FastBundleTracer":
+        from dataset_factory.trace.fast import FastBundleTracer
+
+        return FastBundleTracer
     if name == "Tracer":
         from dataset_factory.trace.tracer import Tracer
 

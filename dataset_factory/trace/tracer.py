@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from dataset_factory.scene.bundle import Bundle, BundleFrame
@@ -78,6 +80,11 @@ class Tracer(BaseTracer):
         """Paths behind `static`."""
         return self._tables.environment(self._static_paths, self._static_corners, [])
 
+    def static_delays_s(self, tx: int, rx: int) -> np.ndarray:
+        """Delays of the paths behind `static` between two devices, ascending [s], (path,)."""
+        table = self.static_paths()
+        return np.sort(table.delay_s[(table.tx_device == tx) & (table.rx_device == rx)])
+
     def paths(self, frame: BundleFrame, trace: Trace | None = None) -> PathTable:
         """Paths behind the channel at a frame's own time.
 
@@ -129,7 +136,7 @@ class Tracer(BaseTracer):
         return out
 
     def mixture(
-        self, vertices: np.ndarray, traces: tuple[Trace, ...], shares: tuple[float, ...]
+        self, vertices: np.ndarray, traces: Sequence[Trace], shares: Sequence[float]
     ) -> np.ndarray:
         """Channel at a pose, visibility, walls and shadows as some traces have them, mixed.
 
@@ -203,8 +210,8 @@ class Tracer(BaseTracer):
     def _channel(
         self,
         points: PosedPoints | None,
-        traces: tuple[Trace, ...],
-        shares: tuple[float, ...],
+        traces: Sequence[Trace],
+        shares: Sequence[float],
         environment: np.ndarray | None = None,
     ) -> np.ndarray:
         """Channel of points in a mixture of traces, complex128, (tx, rx, subcarrier).

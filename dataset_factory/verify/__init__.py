@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from dataset_factory.plan.tracers import TracerName
 from dataset_factory.verify.card import Card, Group
 from dataset_factory.verify.workshop import Workshop
 from rfgs_core.errors import RfgsError
@@ -42,7 +43,10 @@ def chosen_groups(only: Sequence[str]) -> list[str]:
 
 
 def verify(
-    only: Sequence[str], work: Path, done: Callable[[str, float], None] = lambda name, s: None
+    only: Sequence[str],
+    work: Path,
+    done: Callable[[str, float], None] = lambda name, s: None,
+    tracer: TracerName = "sionna",
 ) -> Card:
     """Builds the scenes, traces them and compares.
 
@@ -50,6 +54,7 @@ def verify(
         only: Names of groups; none takes all.
         work: A folder in which scenes are built; what is made there is removed.
         done: Called before each group with its name and the usual seconds of the one before.
+        tracer: Which tracer to verify.
 
     Raises:
         RfgsError: There is no such group, or a scene could not be built or traced.
@@ -61,7 +66,7 @@ def verify(
             done(name, before_s)
             start = time.perf_counter()
             module = importlib.import_module(f"{__name__}.{name}")
-            group: Group = module.verify(Workshop(Path(folder)))
+            group: Group = module.verify(Workshop(Path(folder), tracer))
             card.groups.append(replace(group, seconds=time.perf_counter() - start))
             before_s = GROUPS[name]
         done("", before_s)

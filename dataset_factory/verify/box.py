@@ -67,7 +67,7 @@ def verify(workshop: Workshop, built: Box = CONCRETE) -> Group:
     ]
     for name, made, box, radio, limit_db in cases:
         bundle = workshop.bundle(scene(made))
-        found = static_links(bundle, radio, devices_of(bundle, radio))
+        found = static_links(workshop, bundle, radio)
         exact = _exact(box, radio, found)
         error = error_db(found.channel[~found.steep], exact[~found.steep])
         rows.append(within(f"{name}, error power", error, limit_db, "dB", SOURCE))
@@ -93,12 +93,9 @@ def _exact(box: Box, radio: Radio, found: Links) -> np.ndarray:
 
 def _delays(workshop: Workshop, built: Box, radio: Radio) -> list[Row]:
     """Number and delays of the paths from one device to the other."""
-    from dataset_factory.trace import Tracer
-
     bundle = workshop.bundle(scene(built))
     devices = devices_of(bundle, radio)
-    table = Tracer(bundle, radio, devices, depth=1).static_paths()
-    found = np.sort(table.delay_s[(table.tx_device == 0) & (table.rx_device == 1)])
+    found = workshop.traced(bundle, radio, devices, depth=1).static_delays_s(0, 1)
     tx, rx = (np.array(device.position_m) for device in devices[:2])
     exact = delays_s(CONCRETE, tx, rx)
     count = Row(

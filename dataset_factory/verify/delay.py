@@ -43,11 +43,13 @@ def verify(workshop: Workshop) -> Group:
     """Reads delays off the profiles of every link of every preset."""
     bundle, rows, plots = workshop.bundle(SCENE), [], []
     for name, radio in PRESETS.items():
+        if not workshop.traces(radio):
+            continue
         if radio.antennas_move:
             radio = replace(radio, samples_per_frame=2)
         # Half a range bin c/(2B) of range, which is half of the path there and back.
         limit_mm = 1e3 * 0.5 * radio.range_resolution_m
-        static, change = _links(bundle, radio)
+        static, change = _links(workshop, bundle, radio)
         ends, middle = zip(change.tx_xyz, change.rx_xyz, strict=True), np.array(CENTRE)
         echo_m = np.array([sphere_path_m(t, r, middle, RADIUS_M) for t, r in ends])
         for what, found, path_m in (
@@ -89,10 +91,10 @@ def peaks_m(channel: np.ndarray, radio: Radio) -> np.ndarray:
     return (top + share) * (length_m[1] - length_m[0])
 
 
-def _links(bundle: Bundle, radio: Radio) -> tuple[Links, Links]:
+def _links(workshop: Workshop, bundle: Bundle, radio: Radio) -> tuple[Links, Links]:
     """Links without the sphere, and what it adds to them in the first frame."""
     devices = devices_of(bundle, radio)
-    still, moved = _traced(bundle, radio)
+    still, moved = _traced(workshop, bundle, radio)
     pairs = [
         (links(elements, a), links(elements, b.astype(np.complex128) - a))
         for elements, a, b in zip(
@@ -103,17 +105,11 @@ def _links(bundle: Bundle, radio: Radio) -> tuple[Links, Links]:
     return static, change
 
 
-def _traced(bundle: Bundle, radio: Radio) -> Iterator[np.ndarray]:
+def _traced(workshop: Workshop, bundle: Bundle, radio: Radio) -> Iterator[np.ndarray]:
     """Channels of all places without and with the sphere, shape (place, tx, rx, subcarrier)."""
-    from dataset_factory.trace import ApertureTracer, Tracer
-
-    devices, frame = devices_of(bundle, radio), bundle.frame(1)
-    if radio.antennas_move:
-        tracer = ApertureTracer(bundle, radio, devices, shadow="hard")
-        yield from (tracer.static(), tracer.samples(frame))
-        return
-    tracer = Tracer(bundle, radio, devices, depth=1, shadow="hard")
-    yield from (tracer.static()[None], tracer.frame(frame)[None])
+    tracer = workshop.traced(bundle, radio, depth=1, shadow="hard")
+    still, moved = tracer.static(), tracer.samples(bundle.frame(1))
+    yield from (still, moved) if radio.antennas_move else (still[None], moved[:1])
 
 
 def _plot(name: str, radio: Radio, found: Links, path_m: np.ndarray) -> Plot:

@@ -63,7 +63,8 @@ def verify(workshop: Workshop) -> Group:
         if way in ("approaching", "receding"):
             found, _ = _packets(workshop, way, chirps)
             rows.append(near(f"{way}, 62 GHz", *found, "Hz", SOURCE))
-        rows.append(_table_row(workshop, way, replace(radio, samples_per_frame=1)))
+        if workshop.tracer == "sionna":
+            rows.append(_table_row(workshop, way, replace(radio, samples_per_frame=1)))
     return Group(
         "doppler",
         "Doppler shifts",
@@ -78,12 +79,10 @@ def verify(workshop: Workshop) -> Group:
 
 def _packets(workshop: Workshop, way: str, radio: Radio) -> tuple[tuple[float, float, float], Plot]:
     """Expected and found shift and its tolerance [Hz], and the phases over time."""
-    from dataset_factory.trace import Tracer
-
     span_s = pose_span_s(radio)
     bundle = workshop.bundle(scene(way), "--span", repr(span_s))
     devices = devices_of(bundle, radio)
-    tracer = Tracer(bundle, radio, devices, depth=1, shadow="hard")
+    tracer = workshop.traced(bundle, radio, devices, depth=1, shadow="hard")
     echo = tracer.samples(bundle.frame(1)) - tracer.static()
     time_s = frame_samples(radio, bundle.fps).offset_s
     elements = layout(radio, devices)

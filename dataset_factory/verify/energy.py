@@ -52,13 +52,13 @@ def verify(workshop: Workshop) -> Group:
     """Fits exponents of the energy over the distance."""
     radio = single(preset("wifi"))
     bundle = workshop.bundle(SPREAD)
-    found = static_links(bundle, radio, devices_of(bundle, radio))
+    found = static_links(workshop, bundle, radio)
     distance = found.distance_m
     there = np.mean(np.abs(found.channel) ** 2, axis=1)
     exact = np.mean(np.abs(friis(radio.freq_hz, distance)) ** 2, axis=1)
     radar = monostatic(preset("wifi24"), 8)
     bundle = workshop.bundle(RECEDING)
-    back = np.mean(np.abs(echoes(bundle, radar)[:, 0, 0]) ** 2, axis=1)
+    back = np.mean(np.abs(echoes(workshop, bundle, radar)[:, 0, 0]) ** 2, axis=1)
     elements = layout(radar, devices_of(bundle, radar))
     ends = elements.tx_xyz[0], elements.rx_xyz[0]
     plates = [cuboid(PLATE_M, (0.0, -d - PLATE_M[1] / 2, 1.2)) for d in RANGES_M]

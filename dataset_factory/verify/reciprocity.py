@@ -10,7 +10,7 @@ import numpy as np
 from dataset_factory.verify.card import Group, Row, within
 from dataset_factory.verify.description import Description, Device, Part, room, stepping
 from dataset_factory.verify.tracing import single
-from dataset_factory.verify.workshop import Workshop, devices_of
+from dataset_factory.verify.workshop import Workshop
 from rfgs_core.radio import Radio, preset
 from rfgs_core.radio.levels import decibels
 
@@ -63,17 +63,12 @@ def verify(workshop: Workshop) -> Group:
 
 
 def _static(workshop: Workshop, radio: Radio) -> np.ndarray:
-    from dataset_factory.trace import Tracer
-
-    bundle = workshop.bundle(FURNISHED)
-    return Tracer(bundle, radio, devices_of(bundle, radio), depth=1).static()
+    return workshop.traced(workshop.bundle(FURNISHED), radio, depth=1).static()
 
 
 def _frame(workshop: Workshop, radio: Radio) -> np.ndarray:
-    from dataset_factory.trace import Tracer
-
     bundle = workshop.bundle(FURNISHED)
-    tracer = Tracer(bundle, radio, devices_of(bundle, radio), depth=2)
+    tracer = workshop.traced(bundle, radio, depth=2)
     return tracer.frame(bundle.frame(2))
 
 

@@ -11,7 +11,7 @@ from dataset_factory.verify.card import Curve, Group, Plot, Row, near, within
 from dataset_factory.verify.closed_forms import C, db, fresnel_integral
 from dataset_factory.verify.description import Description, Device, Part, stepping
 from dataset_factory.verify.tracing import single
-from dataset_factory.verify.workshop import Workshop, devices_of
+from dataset_factory.verify.workshop import Workshop
 from rfgs_core.radio import Radio, preset
 
 #: Largest error of the factor T, and of the level at grazing [dB].
@@ -118,10 +118,8 @@ def _far(workshop: Workshop, name: str, radio: Radio, half_m: float) -> Row:
 
 def _factors(workshop: Workshop, screen: Screen, radio: Radio) -> np.ndarray:
     """Csi / csi_static of the only link, shape (frame, subcarrier)."""
-    from dataset_factory.trace import Tracer
-
     bundle = workshop.bundle(screen.scene())
-    tracer = Tracer(bundle, radio, devices_of(bundle, radio), depth=1)
+    tracer = workshop.traced(bundle, radio, depth=1)
     static = tracer.static().astype(np.complex128)[0, 0]
     return np.stack([tracer.frame(bundle.frame(n))[0, 0] / static for n in bundle.frames])
 

@@ -87,7 +87,7 @@ def ball_sections(workshop: Workshop, radio: Radio, cells: int) -> np.ndarray:
         radio: A monostatic radio, whose first eight subcarriers are taken.
         cells: Subdivisions of the ball's icosahedron.
     """
-    found = echoes(workshop.bundle(ball(cells)), radio)[..., :8]
+    found = echoes(workshop, workshop.bundle(ball(cells)), radio)[..., :8]
     spread = sphere_spread_m2(RADIUS_M, BEFORE_M)
     sigma = np.mean(cross_section(found, radio.freq_hz[:8], spread), axis=3)
     own = np.arange(sigma.shape[1])
@@ -123,7 +123,7 @@ def _own(elements: Layout, channel: np.ndarray) -> np.ndarray:
 
 def _plate_far(workshop: Workshop, radio: Radio) -> list[Row]:
     bundle = workshop.bundle(plate(12.0))
-    found = echoes(bundle, radio)[0]
+    found = echoes(workshop, bundle, radio)[0]
     elements = layout(radio, devices_of(bundle, radio))
     face = np.array([PLATE_AT[0], PLATE_AT[1] + PLATE_M[1] / 2, PLATE_AT[2]])
     ways = (np.linalg.norm(xyz[0] - face) for xyz in (elements.tx_xyz, elements.rx_xyz))
@@ -138,7 +138,7 @@ def _plate_far(workshop: Workshop, radio: Radio) -> list[Row]:
 def _plate(workshop: Workshop, name: str, radio: Radio, phase_deg: float) -> list[Row]:
     """Level and phase of a plate 2.5 m away."""
     bundle = workshop.bundle(plate(2.5))
-    found = echoes(bundle, radio)[0]
+    found = echoes(workshop, bundle, radio)[0]
     elements = layout(radio, devices_of(bundle, radio))
     ends = elements.tx_xyz[0], elements.rx_xyz[0]
     exact = METAL * scattered([cuboid(PLATE_M, PLATE_AT)], *ends, radio.freq_hz)
@@ -160,7 +160,11 @@ def _cube(workshop: Workshop, radio: Radio) -> tuple[list[Row], Plot]:
     # Powers, mean over the band: shape (frame, tx, rx).
     powers = [
         np.mean(np.abs(h) ** 2, axis=3)
-        for h in (exact, echoes(bundle, radio), echoes(workshop.bundle(fine), radio))
+        for h in (
+            exact,
+            echoes(workshop, bundle, radio),
+            echoes(workshop, workshop.bundle(fine), radio),
+        )
     ]
     rows = []
     for name, frames, pairs in (

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from dataset_factory.scene.bundle import Bundle
-from dataset_factory.verify.workshop import devices_of
-from rfgs_core.radio import DevicePose, Layout, Radio, layout
+from dataset_factory.verify.workshop import Workshop, devices_of
+from rfgs_core.radio import Layout, Radio, layout
 
 #: Arrays nearly one above the other have no defined sign of a vertical polarisation.
 STEEP = 0.999
@@ -36,24 +36,20 @@ class Links:
         return np.linalg.norm(self.rx_xyz - self.tx_xyz, axis=1)
 
 
-def static_links(bundle: Bundle, radio: Radio, devices: list[DevicePose], seed: int = 0) -> Links:
+def static_links(workshop: Workshop, bundle: Bundle, radio: Radio) -> Links:
     """What every measured link hears of a scene without anything that moves.
 
     Args:
+        workshop: Chooses the tracer.
         bundle: Scene bundle.
         radio: Its radio.
-        devices: Its devices.
-        seed: Root seed.
 
     Returns:
         Those of all places of a radio that moves.
     """
-    from dataset_factory.trace import ApertureTracer, Tracer
-
-    if radio.antennas_move:
-        csi = ApertureTracer(bundle, radio, devices, seed=seed).static()
-    else:
-        csi = Tracer(bundle, radio, devices, depth=1, seed=seed).static()[None]
+    devices = devices_of(bundle, radio)
+    csi = workshop.traced(bundle, radio, devices, depth=1).static()
+    csi = csi if radio.antennas_move else csi[None]
     return joined([links(layout(radio, devices, n), channel) for n, channel in enumerate(csi)])
 
 
@@ -105,20 +101,17 @@ def monostatic(radio: Radio, subcarriers: int, **fields: Any) -> Radio:
     return single(radio, **{**near, "num_subcarriers": subcarriers, **fields})
 
 
-def echoes(bundle: Bundle, radio: Radio, depth: int = 1, seed: int = 0) -> np.ndarray:
+def echoes(workshop: Workshop, bundle: Bundle, radio: Radio) -> np.ndarray:
     """What moving things add to the channel of each frame, without the shadows that they cast.
 
     Args:
+        workshop: Chooses the tracer.
         bundle: Scene bundle.
         radio: Its radio.
-        depth: Interactions of their paths.
-        seed: Root seed.
 
     Returns:
         Complex128, shape (frame, tx, rx, subcarrier).
     """
-    from dataset_factory.trace import Tracer
-
-    tracer = Tracer(bundle, radio, devices_of(bundle, radio), depth=depth, shadow="hard", seed=seed)
+    tracer = workshop.traced(bundle, radio, depth=1, shadow="hard")
     static = tracer.static().astype(np.complex128)
     return np.stack([tracer.frame(bundle.frame(frame)) - static for frame in bundle.frames])

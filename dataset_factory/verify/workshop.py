@@ -9,8 +9,10 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from dataset_factory.children import child_environment, end_with_parent
+from dataset_factory.plan.tracers import TracerName
 from dataset_factory.scene.blender import Blender
 from dataset_factory.scene.bundle import Bundle, read_bundle
 from dataset_factory.scene.devices import choose_devices
@@ -26,6 +28,28 @@ class Workshop:
 
     folder: Path
     """Where `.blend` files and bundles lie."""
+    tracer: TracerName = "sionna"
+    """Which tracer is verified."""
+
+    def traces(self, radio: Radio) -> bool:
+        """Whether the tracer has such radios at all."""
+        return self.tracer == "sionna" or not radio.antennas_move
+
+    def traced(
+        self, bundle: Bundle, radio: Radio, devices: list[DevicePose] | None = None, **options: Any
+    ) -> Any:
+        """The tracer of a radio in a scene.
+
+        Args:
+            bundle: The scene.
+            radio: The radio.
+            devices: Its devices; None takes the scene's own.
+            **options: More arguments of the tracer.
+        """
+        from dataset_factory.trace import tracer_class
+
+        poses = devices_of(bundle, radio) if devices is None else devices
+        return tracer_class(self.tracer, radio)(bundle, radio, poses, **options)
 
     def blend(self, description: Description) -> Path:
         """The Blender file of a description.

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol, TypeVar
 
 import numpy as np
@@ -23,7 +23,7 @@ class Traces(Protocol[Instant]):
         ...
 
     def mixture(
-        self, vertices: np.ndarray, traces: tuple[Instant, ...], shares: tuple[float, ...]
+        self, vertices: np.ndarray, traces: Sequence[Instant], shares: Sequence[float]
     ) -> np.ndarray:
         """Channel at a pose, visibility and walls as traces have them, each with its share."""
         ...

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -12,9 +12,10 @@ from functools import partial
 import numpy as np
 
 from rfgs_core.radio import Radio, layout
+from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.layout import DevicePose
 from rfgs_core.radio.reflection import material_permittivity
-from rfgs_core.radio.sites import centres, measured_pairs
+from rfgs_core.radio.sites import centres, measured_pairs, owners
 from rfgs_core.radio.tissue import normal_reflection
 from rfgs_core.seeds import sub_seed
 from rfgs_core.simulate.environment import (
@@ -119,6 +120,13 @@ class FastTracer:
         """Channel without anything that moves, complex64, shape (tx, rx, subcarrier)."""
         return self._unshaded.astype(np.complex64)
 
+    def static_delays_s(self, tx: int, rx: int) -> np.ndarray:
+        """Delays of the paths behind `static` between two devices, ascending [s], (path,)."""
+        tx_owner, rx_owner = owners(self._layout)
+        paths = self._static_paths
+        here = (tx_owner[paths.tx] == tx) & (rx_owner[paths.rx] == rx)
+        return np.sort(paths.length_m[here]) / SPEED_OF_LIGHT
+
     def frame_at(self, vertices: np.ndarray) -> np.ndarray:
         """Channel at one pose; it does not depend on poses before.
 
@@ -141,7 +149,7 @@ class FastTracer:
         return Instant(environment, arrivals)
 
     def mixture(
-        self, vertices: np.ndarray, traces: tuple[Instant, ...], shares: tuple[float, ...]
+        self, vertices: np.ndarray, traces: Sequence[Instant], shares: Sequence[float]
     ) -> np.ndarray:
         """Channel at a pose, what reaches the facets as traces have it, each with its share.
 

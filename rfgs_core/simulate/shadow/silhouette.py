@@ -183,6 +183,20 @@ def _spans(
 
 
 @numba.njit(cache=True)
+def _joined(runs: np.ndarray, at: int, count: int) -> int:
+    """Joins a run that has grown with those after it that it now meets; returns how many remain."""
+    last = at + 1
+    while last < count and runs[last, 0] <= runs[at, 1] + _GAP_M:
+        runs[at, 1] = max(runs[at, 1], runs[last, 1])
+        last += 1
+    gone = last - at - 1
+    if gone:
+        for i in range(last, count):
+            runs[i - gone, 0], runs[i - gone, 1] = runs[i, 0], runs[i, 1]
+    return count - gone
+
+
+@numba.njit(cache=True)
 def _merged(spans: np.ndarray, window: float, runs: np.ndarray) -> int:
     """Fills in the union of one row's spans as disjoint runs, clipped ends pushed to infinity.
 
@@ -214,15 +228,7 @@ def _merged(spans: np.ndarray, window: float, runs: np.ndarray) -> int:
             count += 1
             continue
         runs[at, 0], runs[at, 1] = min(runs[at, 0], low), max(runs[at, 1], high)
-        last = at + 1
-        while last < count and runs[last, 0] <= runs[at, 1] + _GAP_M:
-            runs[at, 1] = max(runs[at, 1], runs[last, 1])
-            last += 1
-        gone = last - at - 1
-        if gone:
-            for i in range(last, count):
-                runs[i - gone, 0], runs[i - gone, 1] = runs[i, 0], runs[i, 1]
-            count -= gone
+        count = _joined(runs, at, count)
     for i in range(count):
         if runs[i, 0] <= -window:
             runs[i, 0] = -math.inf

@@ -1,0 +1,9 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The tracers there are."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+#: Sionna RT, the reference; or `rfgs_core.simulate`, the fast one that is held against it.
+TracerName = Literal["sionna", "fast"]

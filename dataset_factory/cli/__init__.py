@@ -19,6 +19,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "stats": ("stats", "StatsArgs"),
     "convert": ("convert", "ConvertArgs"),
     "bench": ("bench", "BenchArgs"),
+    "tracers": ("tracers", "TracersArgs"),
     "verify": ("verify", "VerifyArgs"),
 }
 

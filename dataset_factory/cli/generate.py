@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 
+from dataset_factory.plan.tracers import TracerName
 from dataset_factory.scene.overrides import SceneOptions
 from rfgs_core.errors import RfgsError
 
@@ -62,6 +63,9 @@ class GenerateArgs:
     scheduler: str = ""
     """Address of a Dask scheduler, as in tcp://node1:8786, whose workers trace instead. They
     need this version of RF-GS, no shared storage; see docs/cluster.md."""
+    tracer: TracerName = "sionna"
+    """What traces the channels: Sionna RT, the reference, or the fast tracer, several times
+    quicker and held against it (`rfgs-factory tracers`); see docs/tracers.md."""
     shadow: Literal["kirchhoff", "hard"] = "kirchhoff"
     """How bodies shadow paths: diffracted at the silhouette, or cut off sharply."""
     impairments: str = ""
@@ -168,6 +172,7 @@ def _plan(
         depth=scene.depth if args.depth is None else args.depth,
         seed=args.seed,
         shadow=args.shadow,
+        tracer=args.tracer,
         images=args.images,
         impairments=asdict(read_impairments(args.impairments)) if args.impairments else None,
         packets_per_frame=args.packets_per_frame,

@@ -55,6 +55,7 @@ def describe_sequence(
         guesses=[*(read_json(file) if file.is_file() else []), *guesses],
         trace_depth=plan.depth,
         shadow=plan.shadow,
+        tracer=plan.tracer,
     )
 
 

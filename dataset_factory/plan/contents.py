@@ -8,6 +8,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, Literal
 
+from dataset_factory.plan.tracers import TracerName
 from dataset_factory.scene.catalogue import Scene, blend_digest
 from dataset_factory.scene.radios import chosen_radios
 from rfgs_core.dataset.csi_store import chunk_file
@@ -56,6 +57,8 @@ class Plan:
     move, whose pulses are their places."""
     paths: bool = False
     """Whether the paths behind every channel are stored."""
+    tracer: TracerName = "sionna"
+    """What traces the channels."""
     overrides: dict[str, Any] = field(default_factory=dict)
     """What the user says about the scene, in the words of the YAML file."""
     custom_radios: dict[str, dict[str, Any]] = field(default_factory=dict)
@@ -100,6 +103,8 @@ def make_plan(scene: Scene, radios: tuple[str, ...], frames: str, **options: Any
             f"--paths: radio {moving[0]!r} has antennas that move, paths are told between antennas "
             "that stand still; leave one of them out"
         )
+    if options.get("tracer") == "fast":
+        _refuse_fast(bool(options.get("paths")), moving)
     refuse_packets(options.get("packets_per_frame", 1))
     return Plan(
         scene=scene.name,
@@ -111,6 +116,21 @@ def make_plan(scene: Scene, radios: tuple[str, ...], frames: str, **options: Any
         frames=whole_frames(frames),
         **options,
     )
+
+
+def _refuse_fast(paths: bool, moving: list[str]) -> None:
+    """Refuses what the fast tracer does not do.
+
+    Raises:
+        RfgsError: Tables of paths are wanted, or a radio's antennas move.
+    """
+    if paths:
+        raise RfgsError("--tracer fast keeps no tables of paths; leave --paths out")
+    if moving:
+        raise RfgsError(
+            f"--tracer fast: radio {moving[0]!r} has antennas that move, the fast tracer's stand "
+            "still; use --tracer sionna"
+        )
 
 
 def refuse_packets(packets: int) -> None:

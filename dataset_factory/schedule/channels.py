@@ -112,6 +112,7 @@ def _request(job: Job, bundle: Bundle, sequence: SequenceInfo, log: str) -> Requ
         devices=devices,
         depth=plan.depth,
         shadow=plan.shadow,
+        tracer=plan.tracer,
         seed=plan.seed,
         paths=plan.paths,
         versions=versions(),

@@ -21,6 +21,7 @@ import psutil
 
 from dataset_factory.children import end_with_parent
 from dataset_factory.plan.contents import versions
+from dataset_factory.plan.tracers import TracerName
 from dataset_factory.scene.bundle import BundleFrame, frame_file, read_bundle
 from rfgs_core.dataset.path_store import write_paths
 from rfgs_core.dataset.schema import device_pose, radio_from_json
@@ -28,7 +29,7 @@ from rfgs_core.errors import RfgsError
 from rfgs_core.radio.path_table import PathTable
 
 if TYPE_CHECKING:
-    from dataset_factory.trace import ApertureTracer, Tracer
+    from dataset_factory.trace import AnyTracer
 
 #: Frames after which a worker asks for another process: a start costs seconds.
 FRESH_AFTER_FRAMES = 300
@@ -81,6 +82,8 @@ class Request:
     """Interactions of a path; radios that cannot go so deep go as deep as they can."""
     shadow: Any
     """How bodies shadow paths."""
+    tracer: TracerName
+    """What traces."""
     seed: int
     """Root seed."""
     paths: bool
@@ -102,7 +105,7 @@ class SceneTracer:
         self._request = request
         self._bundle = read_bundle(bundle)
         self._radio = ""
-        self._tracer: Tracer | ApertureTracer | None = None
+        self._tracer: AnyTracer | None = None
 
     def trace(self, task: Task) -> tuple[np.ndarray, PathTable | None, dict[str, float]]:
         """Channel of a frame, the paths behind it if they are wanted, and seconds per stage."""
@@ -115,7 +118,7 @@ class SceneTracer:
         return value, table, spent
 
     def _traced(
-        self, tracer: Tracer | ApertureTracer, frame: BundleFrame | None
+        self, tracer: AnyTracer, frame: BundleFrame | None
     ) -> tuple[np.ndarray, PathTable | None]:
         from dataset_factory.trace import Tracer
 
@@ -126,16 +129,15 @@ class SceneTracer:
         trace = tracer.trace(frame)
         return tracer.samples(frame, trace), tracer.paths(frame, trace)
 
-    def _load(self, radio: str) -> Tracer | ApertureTracer:
-        from dataset_factory.trace import ApertureTracer, Tracer
+    def _load(self, radio: str) -> AnyTracer:
+        from dataset_factory.trace import tracer_class
 
         request = self._request
         devices = [device_pose(row) for row in request.devices[radio]]
         spec = radio_from_json(self._bundle.path, request.radios[radio])
-        kind = ApertureTracer if spec.antennas_move else Tracer
         # The one before is dropped first: two scenes at once would take twice the memory.
         self._tracer, self._radio = None, radio
-        self._tracer = kind(
+        tracer = tracer_class(request.tracer, spec)(
             self._bundle,
             spec,
             devices,
@@ -143,7 +145,8 @@ class SceneTracer:
             shadow=request.shadow,
             seed=request.seed,
         )
-        return self._tracer
+        self._tracer = tracer
+        return tracer
 
 
 class _Place:

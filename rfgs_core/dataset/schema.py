@@ -103,6 +103,8 @@ class SequenceInfo:
     """Interactions of a path that meets a person, that one included; of an ultra-wide band 1."""
     shadow: str = "kirchhoff"
     """How bodies shadow paths: kirchhoff or hard."""
+    tracer: str = "sionna"
+    """What traced the channels: sionna or fast."""
 
 
 def info_json(info: DatasetInfo | SequenceInfo) -> dict[str, Any]:

@@ -166,7 +166,7 @@ def hides(drawn: Picture, triangles: np.ndarray, point: np.ndarray) -> int:
         return SEEN if drawn.per_pixel * size < 2.0 * _WIDEST else UNSURE
     if drawn.depth[j, i] * (forward - _OWN_M) <= 1.0:
         return SEEN
-    return HIDDEN if _meets(triangles, drawn.nearest[j, i], drawn.place, x, y, z) else UNSURE
+    return HIDDEN if _meets(triangles, int(drawn.nearest[j, i]), drawn.place, x, y, z) else UNSURE
 
 
 @numba.njit(cache=True, nogil=True, inline="always")

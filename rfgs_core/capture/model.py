@@ -13,8 +13,8 @@ from jaxtyping import Bool, Complex64, Float64, Int64
 from rfgs_core.errors import RfgsFormatError
 
 #: What the last axis of a capture runs over: subcarriers [Hz from the centre], delays [s] or
-#: ranges of an out-and-back path [m].
-Axis = Literal["subcarrier", "delay", "range"]
+#: ranges of an out-and-back path [m], or directions of a picture (row · columns + column).
+Axis = Literal["subcarrier", "delay", "range", "direction"]
 
 #: Decoded values of one file, at most; 1 GiB of complex64. A file never takes more memory than
 #: three times that: its bytes, its values and their mask, and one copy on the way.

@@ -41,7 +41,10 @@ _WIDTHS_MHZ = {2: 20, 3: 40, 4: 80}
 #: Mantissa and exponent bits of chips with floating-point channels.
 _FLOATS = {"4358": (9, 5), "4366c0": (12, 6)}
 #: Chips by the number that the firmware writes.
-_CHIPS = {0x4339: "4339", 0x0065: "43455c0", 0x006A: "4366c0", 0xDEAD: "4358"}
+_CHIPS = {
+    **{0x0001: "4339", 0x0065: "43455c0", 0xA6DC: "43455c0"},
+    **{0x0003: "4358", 0xDEAD: "4358", 0x006A: "4366c0", 0xE834: "4366c0"},
+}
 
 
 @dataclass(frozen=True)

@@ -42,15 +42,38 @@ def fill_gaps(
 
 
 def phase_step(
-    values: Complex[np.ndarray, "*link bin"], index: Int[np.ndarray, "bin"]
+    values: Complex[np.ndarray, "*link bin"],
+    index: Int[np.ndarray, "bin"],
+    *,
+    shared: bool = False,
 ) -> Float[np.ndarray, "*link"]:
-    """Mean phase step per index of each link [rad], arg Σ H̄_m H_n over closest neighbours."""
+    """Mean phase step per index of each link [rad], arg Σ H̄_m H_n over neighbours m and n.
+
+    Closest neighbours come first, as they turn least; what is left is then taken from all
+    neighbours, of which a grid with holes has many more.
+
+    Args:
+        values: Channels.
+        index: True number of each bin, ascending.
+        shared: One step for all links of the last axis but one.
+    """
+    axis = (-2, -1) if shared else -1
+    if len(index) < 2:
+        return np.zeros(values.shape[:-2] if shared else values.shape[:-1])
     apart = np.diff(index)
-    near = np.flatnonzero(apart == apart.min()) if len(apart) else np.zeros(0, int)
-    if not len(near):
-        return np.zeros(values.shape[:-1])
+    near = np.flatnonzero(apart == apart.min())
     products = np.conj(values[..., near]) * values[..., near + 1]
-    return np.angle(products.sum(axis=-1)) / apart.min()
+    step = np.angle(products.sum(axis=axis)) / apart.min()
+    if (apart == apart.min()).all():
+        return step
+    # Pairs across a wide hole turn too far to tell by.
+    close = np.flatnonzero(apart <= 2 * apart.min())
+    products = np.conj(values[..., close]) * values[..., close + 1]
+    shaped = step[..., None, None] if shared else step[..., None]
+    left = products * np.exp(-1j * shaped * apart[close])
+    weight = np.abs(products)
+    mean = (weight * apart[close]).sum(axis=axis) / np.maximum(weight.sum(axis=axis), 1e-30)
+    return step + np.angle(left.sum(axis=axis)) / np.maximum(mean, apart.min())
 
 
 def _fill(

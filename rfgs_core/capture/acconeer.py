@@ -42,8 +42,8 @@ def read(path: Path) -> Reading:
     Returns:
         Radar cubes (time, 1, 1, 1, point), each sweep of a frame a time of its own; `bins` the
         range [m] of each point. `packets` holds frame, sweep and temperature_c; `info` the frame
-        rate, sweeps per frame, the profile of each point and whether a reflection of the receiver's
-        loopback is measured. Points of overlapping subsweeps stand in the order of range.
+        rate, sweeps per frame, and of each point its profile and its subsweep (segment). Points of
+        overlapping subsweeps stand in the order of range.
 
     Raises:
         RfgsError: The file cannot be read.
@@ -96,6 +96,7 @@ def _entry(path: Path, tables: dict[str, np.ndarray], entry: str) -> Capture | N
         return None
     refuse_too_many(path, frame.size)
     order = np.argsort(index, kind="stable")
+    counts = [len(row) for row in points]
     frames, sweeps, _ = frame.shape
     values = frame[:, :, order].reshape(frames * sweeps, 1, 1, 1, -1)
     time_s = _frame_times_s(tables.get(f"{entry}/result/tick"), frames, ticks_hz, rate_hz)
@@ -119,6 +120,7 @@ def _entry(path: Path, tables: dict[str, np.ndarray], entry: str) -> Capture | N
             "sweeps_per_frame": sweeps,
             "frame_rate_hz": rate_hz,
             "profile": [np.concatenate(profiles)[k] for k in order],
+            "segment": [int(np.repeat(np.arange(len(points)), counts)[k]) for k in order],
             "entry": entry,
         },
     )

@@ -64,7 +64,7 @@ def phase_step(
     near = np.flatnonzero(apart == apart.min())
     products = np.conj(values[..., near]) * values[..., near + 1]
     step = np.angle(products.sum(axis=axis)) / apart.min()
-    if (apart == apart.min()).all():
+    if 2 * len(near) >= len(apart):
         return step
     # Pairs across a wide hole turn too far to tell by.
     close = np.flatnonzero(apart <= 2 * apart.min())

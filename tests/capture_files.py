@@ -13,8 +13,10 @@ import numpy as np
 import pytest
 
 #: Captures of others, beside the repository or where the variable says.
-SHARED = Path(os.environ.get("RFGS_SHARED_DATA", "")) if os.environ.get("RFGS_SHARED_DATA") else (
-    Path(__file__).resolve().parents[2] / "shared" / "data"
+SHARED = (
+    Path(os.environ.get("RFGS_SHARED_DATA", ""))
+    if os.environ.get("RFGS_SHARED_DATA")
+    else (Path(__file__).resolve().parents[2] / "shared" / "data")
 )
 
 
@@ -208,10 +210,15 @@ def esp32_file(path: Path, packets: int = 3) -> np.ndarray:
 def dw1000_file(path: Path, receptions: int = 4, taps: int = 1016) -> np.ndarray:
     """Writes a log; returns (time, tap)."""
     value = integers((receptions, taps), 900)
-    lines = ["File:x.log, created by DecaRanging MP", "Mode: 2, Chan 2, Code 9, PRF 64, Plength 1024"]
+    lines = [
+        "File:x.log, created by DecaRanging MP",
+        "Mode: 2, Chan 2, Code 9, PRF 64, Plength 1024",
+    ]
     for time in range(receptions):
         lines += [f"21 4E Rx time = {17.0 + 0.15 * time if time < 2 else 0.1 + time:.9e} 813F", ""]
-        lines.append(f"RX OK WInd(0735), HLP(07{40 + time}.5000), PSC(0429), RSL(-081.5), FSL(-086.5)")
+        lines.append(
+            f"RX OK WInd(0735), HLP(07{40 + time}.5000), PSC(0429), RSL(-081.5), FSL(-086.5)"
+        )
         lines.append(f"Accum Len {taps}")
         lines += [f"{int(tap.real)}, {int(tap.imag)}" for tap in value[time]]
         if time % 2:

@@ -109,8 +109,9 @@ def _manifest_faults(path: Path, manifest_sha256: str) -> Iterator[str]:
 def _sequence_faults(sequence: Sequence, has: list[str]) -> Iterator[str]:
     with tqdm(sequence.radios, desc="channels", unit="radio") as bar:
         for radio in bar:
-            traced = "geometry" in has
-            yield from _caught(lambda radio=radio: _radio_faults(sequence, radio, traced))
+            yield from _caught(
+                lambda radio=radio: _radio_faults(sequence, radio, "geometry" in has)
+            )
             if "paths" in has:
                 yield from _caught(lambda radio=radio: path_faults(sequence, radio))
     if "geometry" in has:
@@ -150,9 +151,7 @@ def _radio_faults(sequence: Sequence, radio: str, traced: bool) -> Iterator[str]
         if not (np.isfinite(values).all() and np.allclose(values, expected, atol=1e-9)):
             yield f"{store}: {name}: differs from the devices in sequence.json"
     static = sequence.csi_static_samples(radio)
-    if traced:
-        yield from channel_faults(sequence, radio, static, chunk_file(store, None))
-        yield from energy_faults(sequence, radio, static, f"{chunk_file(store, None)}: static")
+    yield from _static_faults(sequence, radio, static) if traced else ()
     for index, frame in enumerate(sequence.frames):
         file = chunk_file(store, index)
         yield from _caught(
@@ -162,6 +161,13 @@ def _radio_faults(sequence: Sequence, radio: str, traced: bool) -> Iterator[str]
         )
     if has_impaired(store):
         yield from _caught(lambda: _impaired_faults(sequence, radio))
+
+
+def _static_faults(sequence: Sequence, radio: str, static: np.ndarray) -> Iterator[str]:
+    """What the static channel of a traced scene says against physics."""
+    file = chunk_file(sequence.files.csi(radio), None)
+    yield from channel_faults(sequence, radio, static, file)
+    yield from energy_faults(sequence, radio, static, f"{file}: static")
 
 
 def _frame_faults(

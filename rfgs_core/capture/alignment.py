@@ -60,7 +60,10 @@ def schedule(
     per_frame = max(int(rate_hz / fps + 1e-6), 1)
     ticks_s = common_clock(times_s, rate_hz) if _overlap(times_s) else np.zeros(0)
     # What is shorter than a frame makes one of fewer samples.
-    frames, per_frame = max(int(len(ticks_s) * fps / rate_hz + 1e-6), 1), min(per_frame, len(ticks_s))
+    frames, per_frame = (
+        max(int(len(ticks_s) * fps / rate_hz + 1e-6), 1),
+        min(per_frame, len(ticks_s)),
+    )
     if not len(ticks_s):
         spans = "; ".join(f"{row[0]:.3f} to {row[-1]:.3f} s" for row in times_s)
         raise RfgsError(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""ESP32 captures as text: ESP32-CSI-Tool (Hernandez and Bulut 2020) and Espressif's esp-csi, `.csv`.
+"""ESP32 captures, `.csv`: ESP32-CSI-Tool (Hernandez and Bulut 2020) and Espressif's esp-csi.
 
 One line per packet: fields, then signed bytes, imaginary part before real. ESP32-CSI-Tool writes
 them apart by spaces, esp-csi apart by commas in quotes, with the names of the fields in its first

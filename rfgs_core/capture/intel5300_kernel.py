@@ -151,6 +151,8 @@ def unpack(data, places, ports, values, valid):
                     low >>= shift
                     real, imaginary = low & 0xFF, (low >> 8) & 0xFF
                     values[time, port, stream, 2 * group] = real - ((real & 0x80) << 1)
-                    values[time, port, stream, 2 * group + 1] = imaginary - ((imaginary & 0x80) << 1)
+                    values[time, port, stream, 2 * group + 1] = imaginary - (
+                        (imaginary & 0x80) << 1
+                    )
                     valid[time, port, stream, group] = True
                     bit += 3 + 16 * num_rx * num_tx

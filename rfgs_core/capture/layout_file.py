@@ -135,9 +135,7 @@ def assign(layout: CaptureLayout, files: list[Path]) -> dict[int, Path]:
     return dict(sorted(found.items()))
 
 
-def _device(
-    path: Path, row: Any
-) -> tuple[DevicePose, str | None, float, dict[str, Any] | None]:
+def _device(path: Path, row: Any) -> tuple[DevicePose, str | None, float, dict[str, Any] | None]:
     if not isinstance(row, dict) or set(row) - set(_DEVICE_FIELDS):
         odd = sorted(set(row) - set(_DEVICE_FIELDS))[0] if isinstance(row, dict) else row
         raise RfgsFormatError(

@@ -13,6 +13,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 #: Bytes 4 to 7 of every frame.
 MAGIC = (0x20150315).to_bytes(4, "little")
@@ -131,7 +132,7 @@ def _frame(data: bytes, damage: dict[str, int]) -> Frame | None:
     return Frame(**csi, **basic)
 
 
-def _basic(content: bytes, version: int, damage: dict[str, int]) -> dict | None:
+def _basic(content: bytes, version: int, damage: dict[str, int]) -> dict[str, Any] | None:
     if version not in _BASIC or len(content) < _BASIC[version][0].size:
         _count(damage, f"packets with a segment RxSBasic of version {version}", 1)
         return None
@@ -147,7 +148,7 @@ def _basic(content: bytes, version: int, damage: dict[str, int]) -> dict | None:
     }
 
 
-def _csi(content: bytes, version: int, damage: dict[str, int]) -> dict | None:
+def _csi(content: bytes, version: int, damage: dict[str, int]) -> dict[str, Any] | None:
     if version not in _CSI or len(content) < _CSI[version].size:
         _count(damage, f"packets with a segment CSI of version {version}", 1)
         return None
@@ -155,7 +156,7 @@ def _csi(content: bytes, version: int, damage: dict[str, int]) -> dict | None:
     if version >= 4:
         del row[1]
     names = ("device", "form", "width_mhz", "carrier_hz", "_", "spacing_hz", "count", "num_tx")
-    found = dict(zip((*names, "num_rx", "num_extra"), row, strict=False))
+    found: dict[str, Any] = dict(zip((*names, "num_rx", "num_extra"), row, strict=False))
     del found["_"]
     length, payload = row[-1], content[_CSI[version].size :]
     if length > len(payload):

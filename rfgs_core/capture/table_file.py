@@ -48,11 +48,15 @@ def read_tables(path: Path, kind: Kind) -> dict[str, np.ndarray]:
     try:
         done = subprocess.run(command, capture_output=True, timeout=2 * SECONDS, check=False)
     except subprocess.TimeoutExpired as error:
-        raise RfgsFormatError(f"{path}: reading took over {2 * SECONDS} s; is it damaged?") from error
+        raise RfgsFormatError(
+            f"{path}: reading took over {2 * SECONDS} s; is it damaged?"
+        ) from error
     if done.returncode:
         said = done.stderr.decode("utf-8", "replace").strip().splitlines()
         reason = said[-1] if said and done.returncode > 0 else "the library that reads it crashed"
-        raise RfgsFormatError(f"{path}: expected a whole {_NAMES[kind]} file, found damage ({reason})")
+        raise RfgsFormatError(
+            f"{path}: expected a whole {_NAMES[kind]} file, found damage ({reason})"
+        )
     try:
         with np.load(io.BytesIO(done.stdout), allow_pickle=False) as stored:
             return {name: stored[name] for name in stored.files}

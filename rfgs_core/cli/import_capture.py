@@ -49,10 +49,11 @@ def run(args: ImportArgs) -> int:
         given = read_layout(args.layout)
         prepared, warnings = prepare(list(args.files), given, list(args.empty) or None, args.format)
     else:
-        reading = read_capture(args.files[0], args.format)
-        if len(args.files) > 1 or not tells_places(reading.largest):
+        first, *others = args.files
+        reading = read_capture(first, args.format)
+        if others or not tells_places(reading.largest):
             raise RfgsError(
-                f"{args.files[0]}: the file does not tell where its antennas were; give --layout "
+                f"{first}: the file does not tell where its antennas were; give --layout "
                 f"with {EXAMPLE}"
             )
         prepared, warnings = prepare_placed(reading.largest, "capture"), reading.warnings

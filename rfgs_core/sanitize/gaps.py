@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pilots, nulls and the centre: subcarriers that were not measured, filled from their neighbours."""
+"""Pilots, nulls and the centre: what was not measured, filled from its neighbours."""
 
 from __future__ import annotations
 

@@ -84,7 +84,7 @@ def remove_linear_phase(
         values: Channels of packets.
         index: True number of each subcarrier.
         valid: Subcarriers to fit to; all if None.
-        offset: Also take the common phase off, that of Σ_a Σ_k H.
+        offset: Also take the common phase off, that of Σ_k H of the link where it is largest.
 
     Returns:
         Channels; the relative phases of antennas are untouched.
@@ -98,7 +98,10 @@ def remove_linear_phase(
     turn = np.exp(-1j * slope[:, None] * index)
     if offset:
         still = rows * np.exp(-1j * slope[:, None, None] * known)
-        turn = turn * np.exp(-1j * np.angle(still.sum(axis=(1, 2))))[:, None]
+        # One link tells the phase of all: sums over antennas cancel where these point apart.
+        sums = still.sum(axis=2)
+        clearest = int(np.abs(sums).mean(axis=0).argmax())
+        turn = turn * np.exp(-1j * np.angle(sums[:, clearest]))[:, None]
     shaped = turn.reshape(len(values), *[1] * (values.ndim - 2), -1)
     return (values * shaped).astype(values.dtype)
 

@@ -108,11 +108,11 @@ def test_truncated_files_give_what_is_whole(name: str, tmp_path: Path) -> None:
         if isinstance(answer, Reading):
             counts.append(sum(map(len, answer.captures)))
             for capture in answer.captures:
-                first = next(c for c in whole.captures if c.index.tolist() == capture.index.tolist())
-                before = first.values[: len(capture), :, : capture.values.shape[2]]
-                np.testing.assert_array_equal(
-                    capture.values[capture.valid], before[capture.valid]
+                first = next(
+                    c for c in whole.captures if c.index.tolist() == capture.index.tolist()
                 )
+                before = first.values[: len(capture), :, : capture.values.shape[2]]
+                np.testing.assert_array_equal(capture.values[capture.valid], before[capture.valid])
     if name not in APART:
         assert counts and counts == sorted(counts)
 
@@ -149,9 +149,7 @@ def test_damage_between_records_is_counted(tmp_path: Path) -> None:
     (tmp_path / "a.dat").write_bytes(record + b"spoilt!" + record + record[:-3])
     reading = read_capture(tmp_path / "a.dat")
     assert len(reading.largest) == 2
-    assert reading.warnings == [
-        "7 bytes that belong to no record", "1 record cut off at the end"
-    ]
+    assert reading.warnings == ["7 bytes that belong to no record", "1 record cut off at the end"]
 
 
 def test_sizes_are_bounded_before_anything_is_decoded(tmp_path: Path, monkeypatch) -> None:

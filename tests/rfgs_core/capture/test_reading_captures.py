@@ -154,9 +154,7 @@ def test_nexmon_cores_share_a_time_and_nulls_are_masked(tmp_path: Path) -> None:
     np.testing.assert_array_equal(
         capture.values[:, 0, :, 0][..., valid], np.fft.fftshift(value, axes=-1)[..., valid]
     )
-    assert capture.index[~valid].tolist() == [
-        *range(-128, -122), *range(-1, 2), *range(123, 128)
-    ]
+    assert capture.index[~valid].tolist() == [*range(-128, -122), *range(-1, 2), *range(123, 128)]
     assert capture.centre_hz == 5e9 + 5e6 * 0x6A and capture.packets["rssi_dbm"][0] == -55
     np.testing.assert_allclose(capture.time_s, 1e-3 * np.arange(4), atol=1e-9)
 
@@ -177,8 +175,10 @@ def test_nexmon_floats_agree_with_csiread(tmp_path: Path, chip: str) -> None:
     theirs = csiread.Nexmon(str(tmp_path / "a.pcap"), chip=chip, bw=80, if_report=False)
     theirs.read()
     ours = unpack_words(words.astype(np.uint32)[None], chip)[0]
-    np.testing.assert_array_equal(ours, (1 - 2 * signs[0]) * real * 2.0**power
-                                  + 1j * (1 - 2 * signs[1]) * imaginary * 2.0**power)
+    np.testing.assert_array_equal(
+        ours,
+        (1 - 2 * signs[0]) * real * 2.0**power + 1j * (1 - 2 * signs[1]) * imaginary * 2.0**power,
+    )
     scale = np.abs(theirs.csi[0]).max() / np.abs(ours).max()
     assert np.abs(theirs.csi[0] - scale * ours).max() < 3.0
 

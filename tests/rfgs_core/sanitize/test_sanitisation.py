@@ -158,8 +158,9 @@ def test_products_and_ratios_cancel_what_antennas_share() -> None:
 
 def test_the_steadiest_antenna_is_the_reference() -> None:
     generator = np.random.default_rng(4)
-    level = np.array([1.0, 10.0, 30.0])[:, None] + generator.normal(size=(200, 3, 30)) * (
-        np.array([0.3, 1.0, 9.0])[:, None]
+    level = (
+        np.array([1.0, 10.0, 30.0])[:, None]
+        + generator.normal(size=(200, 3, 30)) * (np.array([0.3, 1.0, 9.0])[:, None])
     )
     assert sanitize.reference_antenna(level + 0j) == 1
 
@@ -169,7 +170,9 @@ def moving(rate_hz: float, doppler_hz: float) -> np.ndarray:
     time_s = np.arange(int(4 * rate_hz)) / rate_hz
     generator = np.random.default_rng(5)
     still = 10 * np.exp(1j * np.array([0.3, 1.9, -1.0]))
-    echo = np.exp(1j * np.array([0.1, -2.0, 2.2])) * np.exp(2j * np.pi * doppler_hz * time_s)[:, None]
+    echo = (
+        np.exp(1j * np.array([0.1, -2.0, 2.2])) * np.exp(2j * np.pi * doppler_hz * time_s)[:, None]
+    )
     random = np.exp(1j * generator.uniform(0, 2 * np.pi, (len(time_s), 1)))
     return ((still + echo) * random)[:, :, None]
 
@@ -179,9 +182,7 @@ def test_adjusted_amplitudes_tell_approach_from_retreat(doppler_hz: float) -> No
     values = moving(500.0, doppler_hz)
     reference = 0
     plain = sanitize.conjugate_product(values, reference)
-    shifted = sanitize.conjugate_product(
-        sanitize.adjust_amplitudes(values, reference), reference
-    )
+    shifted = sanitize.conjugate_product(sanitize.adjust_amplitudes(values, reference), reference)
     found = []
     for product in (plain, shifted):
         series = sanitize.first_component(sanitize.doppler_band(product[:, :, 0], 500.0))
@@ -194,7 +195,9 @@ def test_adjusted_amplitudes_tell_approach_from_retreat(doppler_hz: float) -> No
 
 def test_hampel_replaces_outliers_and_leaves_its_input() -> None:
     generator = np.random.default_rng(6)
-    values = (10 + 0.1 * generator.normal(size=(100, 2))) * np.exp(1j * generator.normal(size=(100, 2)))
+    values = (10 + 0.1 * generator.normal(size=(100, 2))) * np.exp(
+        1j * generator.normal(size=(100, 2))
+    )
     spoilt = values.copy()
     spoilt[30, 0] *= 5
     spoilt[60:62, 1] *= 0.1

@@ -80,6 +80,11 @@ def _over_subcarriers(capture: Capture) -> Iterator[Step]:
     cleaned, changed = sanitize.hampel(capture.values)
     capture = replace(capture, values=cleaned)
     yield Step(f"{int(changed.sum())} outliers replaced", capture)
+    if capture.source == "intel5300":
+        whole, turns = sanitize.undo_quarter_turns(capture.values[:, 0])
+        capture = replace(capture, values=whole[:, None])
+        if turns.any():
+            yield Step(f"{np.count_nonzero(turns)} quarter turns of antennas undone", capture)
     straight = np.stack(
         [
             sanitize.remove_linear_phase(capture.values[:, device], capture.index)

@@ -125,7 +125,9 @@ def predict(
     level = float(np.mean(np.abs(csi[train]) ** 2))
     best, found = -np.inf, np.zeros_like(csi)
     for length_m in _LENGTHS_M:
-        covariance = sum(_covariance(row, number, length_m) for number, row in enumerate(sources))
+        covariance = np.zeros((len(csi), len(csi)), np.complex128)
+        for number, row in enumerate(sources):
+            covariance += _covariance(row, number, length_m)
         seen = covariance[np.ix_(train, train)]
         for noise in _NOISES:
             factor = np.linalg.cholesky(seen + noise * level * np.eye(len(seen)))
@@ -150,9 +152,7 @@ def _covariance(
     return _REFLECTED * outer * (0.5 + 0.5 * np.exp(-0.5 * apart / length_m**2))
 
 
-def surfaces(
-    room: _Room, csi: np.ndarray, train: Bool[np.ndarray, "receiver"]
-) -> list[_Surface]:
+def surfaces(room: _Room, csi: np.ndarray, train: Bool[np.ndarray, "receiver"]) -> list[_Surface]:
     """Surfaces that explain most of the training channels, found one after the other.
 
     While they are looked for, a surface's gain is a parabola of the cosine of incidence.

@@ -78,25 +78,27 @@ def _loudest_amplitude(frames: Complex[np.ndarray, "frame point"]) -> Float[np.n
 
 
 def _displacement(frames: Complex[np.ndarray, "frame point"]) -> Float[np.ndarray, "frame"]:
-    """Phase change from frame to frame, summed: displacement up to a factor.
+    """First principal component of real and imaginary parts of all points.
 
-    Weighted by power over all points, so that fades of one do not count; points that stand still
-    turn nothing and only weigh the sum down alike.
+    Linear demodulation: of a chest that moves by less than a quarter of the wavelength the
+    fundamental is the largest line, whatever the phase of what stands still around it.
     """
     moving = frames - frames.mean(axis=0)
-    weight = np.abs(moving).std(axis=0) + 1e-12
-    product = (frames[1:] * np.conj(frames[:-1]) * (weight / weight.max())).sum(axis=1)
-    return np.concatenate([[0.0], np.cumsum(np.angle(product))])
+    parts = np.concatenate([moving.real, moving.imag], axis=1)
+    _, _, axes = np.linalg.svd(parts, full_matrices=False)
+    return parts @ axes[0]
 
 
 def _peak(series: Float[np.ndarray, "frame"], rate_hz: float) -> tuple[float, float]:
     """Frequency of the highest line in the band [Hz], and its height over the median [dB]."""
-    from scipy.signal import detrend
+    from scipy.signal import butter, sosfiltfilt
 
     from rfgs_core.radio.levels import decibels
 
     size = _PADDING * len(series)
-    windowed = detrend(series) * np.hanning(len(series))
+    # People who come and go leave a drift that would stand at the band's lower edge.
+    high = butter(2, BREATHING_HZ[0], "highpass", fs=rate_hz, output="sos")
+    windowed = sosfiltfilt(high, series) * np.hanning(len(series))
     power = np.abs(np.fft.rfft(windowed, n=size)) ** 2
     freq_hz = np.fft.rfftfreq(size, 1.0 / rate_hz)
     band = (freq_hz >= BREATHING_HZ[0]) & (freq_hz <= BREATHING_HZ[1])

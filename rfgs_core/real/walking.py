@@ -13,8 +13,9 @@ from rfgs_core.capture import Capture, read_capture
 
 #: Rates of change of a path's length that a walking body and its limbs cause [m/s].
 WALKING_M_S = (0.5, 3.0)
-#: Wavelength of the band at 5.825 GHz, where the file does not tell [m].
-_WAVELENGTH_M = 0.0515
+#: Wavelength [m]; the file does not tell its channel, but its antennas turn against each other by
+#: quarter turns, as the card's do at 2.4 GHz alone.
+_WAVELENGTH_M = 0.123
 
 
 def judge_walking(path: Path) -> dict[str, float | str]:
@@ -51,7 +52,7 @@ def judge_walking(path: Path) -> dict[str, float | str]:
 def _on_a_clock(capture: Capture) -> tuple[Complex[np.ndarray, "time rx bin"], float]:
     """Packets of antennas that heard something, at their own mean rate."""
     used = np.flatnonzero(capture.valid[:, 0].any(axis=(0, 2, 3)))
-    values = capture.values[:, 0, used, 0].astype(np.complex128)
+    values = sanitize.undo_quarter_turns(capture.values[:, 0, used, 0].astype(np.complex128))[0]
     rate_hz = capture.rate_hz
     ticks_s = sanitize.common_clock([capture.time_s], rate_hz)
     return sanitize.resample(values, capture.time_s, ticks_s, "nearest")[0], rate_hz

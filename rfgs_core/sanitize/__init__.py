@@ -13,7 +13,12 @@ from rfgs_core.sanitize.doppler import doppler_band, doppler_spectrum, first_com
 from rfgs_core.sanitize.gain import normalise_power, scale_intel5300, scale_to_rssi, undo_gain
 from rfgs_core.sanitize.gaps import fill_gaps
 from rfgs_core.sanitize.outliers import hampel
-from rfgs_core.sanitize.phase import remove_linear_phase, undo_rotations, unwrap
+from rfgs_core.sanitize.phase import (
+    remove_linear_phase,
+    undo_quarter_turns,
+    undo_rotations,
+    unwrap,
+)
 from rfgs_core.sanitize.products import (
     adjust_amplitudes,
     conjugate_product,
@@ -38,6 +43,7 @@ __all__ = [
     "scale_intel5300",
     "scale_to_rssi",
     "undo_gain",
+    "undo_quarter_turns",
     "undo_rotations",
     "unwrap",
     "windowed_profile",

@@ -106,6 +106,36 @@ def remove_linear_phase(
     return (values * shaped).astype(values.dtype)
 
 
+def undo_quarter_turns(
+    values: Complex[np.ndarray, "time rx *any"], memory: float = 0.9
+) -> tuple[Complex[np.ndarray, "time rx *any"], Int[np.ndarray, "time rx"]]:
+    """Takes back multiples of 90° by which antennas turn against each other from packet to packet.
+
+    At 2.4 GHz each RX chain of an Intel 5300 locks at one of four phases per packet
+    (dhalperi/linux-80211n-csitool-supplementary, issue 6). With p = H_a H̄_0 and m its running mean,
+    n = round(arg Σ p m̄ / 90°) and H_a ← H_a e^{−j90°n}: what changes slowly stays. Antennas
+    whose phases hold anyway are not turned.
+
+    Args:
+        values: Channels of packets, in the order of time.
+        memory: Weight of the past in the running mean.
+
+    Returns:
+        Channels, and the number of quarter turns taken back, 0 to 3.
+    """
+    rows = values.reshape(*values.shape[:2], -1)
+    products = rows * np.conj(rows[:, :1])
+    turns = np.zeros(values.shape[:2], np.int64)
+    mean = products[0].astype(np.complex128)
+    for time in range(1, len(values)):
+        against = (products[time] * np.conj(mean)).sum(axis=-1)
+        turns[time] = np.rint(np.angle(against) / (0.5 * np.pi)).astype(np.int64) % 4
+        turned = products[time] * (-1j) ** turns[time][:, None]
+        mean = memory * mean + (1.0 - memory) * turned
+    factor = ((-1j) ** turns).reshape(*turns.shape, *[1] * (values.ndim - 2))
+    return (values * factor).astype(values.dtype), turns
+
+
 def _left_slope(
     rows: Complex[np.ndarray, "time link bin"], index: Int[np.ndarray, "bin"]
 ) -> Float[np.ndarray, "time"]:

@@ -253,3 +253,19 @@ def test_a_path_peaks_at_its_delay_and_amplitude() -> None:
     peak = np.abs(profile).argmax()
     assert delays[peak] == pytest.approx(delay_s, abs=5e-9)
     assert abs(profile[peak] - 0.7 * np.exp(0.4j)) < 0.03
+
+
+def test_quarter_turns_of_antennas_are_taken_back() -> None:
+    generator = np.random.default_rng(8)
+    drift = np.exp(1j * np.linspace(0, 2, 60))[:, None, None] ** np.array([0, 1, 0.5])[:, None]
+    smooth = multipath(INDEX, times=60) * drift
+    turns = generator.integers(0, 4, (60, 3))
+    turns[0] = 0
+    common = np.exp(1j * generator.uniform(-3, 3, (60, 1, 1)))
+    turned = smooth * 1j ** turns[..., None] * common
+    undone, found = sanitize.undo_quarter_turns(turned)
+    # One antenna is the reference: turns are those against it.
+    np.testing.assert_array_equal(found, (turns - turns[:, :1]) % 4)
+    relative = undone[:, 1:] * np.conj(undone[:, :1])
+    np.testing.assert_allclose(relative, smooth[:, 1:] * np.conj(smooth[:, :1]), atol=1e-9)
+    assert not sanitize.undo_quarter_turns(smooth * common)[1].any()

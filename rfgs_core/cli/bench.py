@@ -117,9 +117,10 @@ def run(args: BenchArgs) -> int:
     if args.part in ("propagation", "raster", "blender"):
         sys.stderr.write(f"timing {args.part}; the plain twin takes most of it, about a minute\n")
     result = _bench(args)()
+    width = max(28, *map(len, result))
     for name, value in result.items():
         shown = f"{value:.4g}" if isinstance(value, float) else value
-        sys.stdout.write(f"{name:<28} {shown}\n")
+        sys.stdout.write(f"{name:<{width}} {shown}\n")
     if args.json is not None:
         write_json(args.json, result)
     return 0

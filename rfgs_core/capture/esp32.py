@@ -45,23 +45,30 @@ _START = re.compile(rb"^\s*(type,|CSI_DATA,)", re.MULTILINE)
 _LONGEST_CHANNEL = 1024
 
 
+#: Fields that are kept of each line.
+_KEPT = (
+    *("channel", "secondary_channel", "sig_mode", "bandwidth"),
+    *("rssi", "noise_floor", "local_timestamp", "agc_gain", "fft_gain"),
+)
+
+
 @dataclass(frozen=True)
 class _Row:
-    fields: dict[str, str]
+    """One line: kept fields in the order of `_KEPT`, None where there is none, and its bytes."""
+
+    fields: tuple[int | None, ...]
     numbers: np.ndarray
 
-    def number(self, name: str, instead: int = 0) -> int:
-        try:
-            return int(float(self.fields.get(name, instead)))
-        except (ValueError, OverflowError):
-            return instead
-
     @property
-    def kind(self) -> tuple[int, int, int, int, int]:
+    def kind(self) -> tuple[int, ...]:
         """What decides where each byte belongs: channel, second channel, mode, width, count."""
-        names = ("channel", "secondary_channel", "sig_mode", "bandwidth")
-        channel, second, mode, width = (self.number(name) for name in names)
-        return channel, second, mode, width, len(self.numbers)
+        return (*(value or 0 for value in self.fields[:4]), len(self.numbers))
+
+
+def _column(rows: list[_Row], name: str) -> np.ndarray:
+    """A field of all lines, 0 where it is missing."""
+    place = _KEPT.index(name)
+    return np.array([row.fields[place] or 0 for row in rows], np.int64)
 
 
 def looks_like(head: bytes, _path: Path) -> bool:
@@ -127,7 +134,18 @@ def _row(line: bytes, names: tuple[str, ...] | None) -> _Row | None:
     whole = len(numbers) % 2 == 0 and 4 <= len(numbers) <= 2 * _LONGEST_CHANNEL
     if chosen is None or not whole or np.abs(numbers).max() > 128:
         return None
-    return _Row(dict(zip(chosen, fields, strict=True)), numbers)
+    given = dict(zip(chosen, fields, strict=True))
+    kept = tuple(_whole(given[name]) if name in given else None for name in _KEPT)
+    return _Row(kept, numbers.astype(np.int8 if numbers.max() < 128 else np.int16))
+
+
+def _whole(text: str) -> int:
+    """A whole number of at most 63 bits; 0 where the text is none."""
+    try:
+        number = int(float(text))
+    except (ValueError, OverflowError):
+        return 0
+    return number if abs(number) < 1 << 62 else 0
 
 
 def _capture(path: Path, kind: tuple[int, ...], rows: list[_Row]) -> Capture | None:
@@ -148,15 +166,15 @@ def _capture(path: Path, kind: tuple[int, ...], rows: list[_Row]) -> Capture | N
     if centre is not None and second in (1, 2):
         # Numbers of a 40 MHz channel count from its middle, 10 MHz from the primary one.
         centre += 10e6 if second == 1 else -10e6
-    stamps = np.array([row.number("local_timestamp") for row in rows], np.int64)
+    stamps = _column(rows, "local_timestamp")
     packets = {
-        "rssi_dbm": np.array([float(row.number("rssi")) for row in rows]),
-        "noise_dbm": np.array([float(row.number("noise_floor")) for row in rows]),
+        "rssi_dbm": _column(rows, "rssi").astype(np.float64),
+        "noise_dbm": _column(rows, "noise_floor").astype(np.float64),
         "clock_us": stamps,
     }
     for name in ("agc_gain", "fft_gain"):
-        if name in rows[0].fields:
-            packets[name] = np.array([row.number(name) for row in rows])
+        if rows[0].fields[_KEPT.index(name)] is not None:
+            packets[name] = _column(rows, name)
     return Capture(
         source=NAME,
         values=values,

@@ -16,9 +16,10 @@ from rfgs_core.errors import RfgsFormatError
 #: ranges of an out-and-back path [m], or directions of a picture (row · columns + column).
 Axis = Literal["subcarrier", "delay", "range", "direction"]
 
-#: Decoded values of one file, at most; 1 GiB of complex64. A file never takes more memory than
-#: three times that: its bytes, its values and their mask, and one copy on the way.
-MOST_VALUES = 2**27
+#: Decoded values of one file, at most; half a GiB of complex64.
+MOST_VALUES = 2**26
+#: Memory that reading one file takes at most: its bytes, its values and mask, copies on the way.
+MOST_MEMORY_BYTES = 4 * 2**30
 
 
 @dataclass(frozen=True)

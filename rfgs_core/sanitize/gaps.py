@@ -6,6 +6,9 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
+#: Values that are filled at once.
+_BLOCK = 1 << 20
+
 
 def fill_gaps(
     values: Complex[np.ndarray, "*link bin"],
@@ -30,7 +33,9 @@ def fill_gaps(
     """
     rows = values.reshape(-1, values.shape[-1]).copy()
     if valid.ndim == 1:
-        _fill(rows, slice(None), valid, index)
+        step = max(_BLOCK // max(rows.shape[1], 1), 1)
+        for first in range(0, len(rows), step):
+            _fill(rows[first : first + step], slice(None), valid, index)
         return rows.reshape(values.shape)
     masks = np.broadcast_to(valid, values.shape).reshape(rows.shape)
     patterns, which = np.unique(np.packbits(masks, axis=1), axis=0, return_inverse=True)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from rfgs_core.capture import Reading, read_capture
-from rfgs_core.capture.model import MOST_VALUES
+from rfgs_core.capture.model import MOST_MEMORY_BYTES
 from rfgs_core.errors import RfgsError
 
 #: Formats that a process of its own reads, with limits; each file takes a fifth of a second.
@@ -91,7 +91,7 @@ def test_mutated_files_of_libraries(name: str, tmp_path: Path) -> None:
 def test_two_thousand_mutated_files(name: str, tmp_path: Path) -> None:
     mutate_all(name, tmp_path, ALL)
     peak_bytes = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    assert peak_bytes < 3 * 8 * MOST_VALUES
+    assert peak_bytes < MOST_MEMORY_BYTES
 
 
 @pytest.mark.parametrize("name", files.WRITERS)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from jaxtyping import Complex64
 from rfgs_core.capture.alignment import Schedule, schedule
 from rfgs_core.capture.channels import Channels, channels_of
 from rfgs_core.capture.layout_file import CaptureLayout, assign
-from rfgs_core.capture.model import Capture
+from rfgs_core.capture.model import MOST_VALUES, Capture
 from rfgs_core.capture.prepared import Prepared, bounds_around, guess, scale_to_free_space
 from rfgs_core.capture.readers import read_capture
 from rfgs_core.errors import RfgsError
@@ -158,6 +159,11 @@ def _arranged(
     """
     elements = layout(radio, list(given.devices))
     shape = (*packet.shape[1:], *elements.measured.shape, radio.num_subcarriers)
+    if math.prod(shape) > 2 * MOST_VALUES:
+        raise RfgsError(
+            f"{math.prod(shape)} values, at most {2 * MOST_VALUES} make a sequence; lower rate_hz "
+            "in --layout, or cut the captures into pieces"
+        )
     csi = np.zeros(shape, np.complex64)
     sender = int(elements.tx_device[0])
     for number, (device, value) in enumerate(zip(given.receivers, values, strict=True)):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rfgs_core.errors import RfgsError
 
-#: Part → its file below the data folder.
+#: Part → its file, or folder of NeRF2's layout, below the data folder.
 PARTS = {
     "bedroom": "newrf/dataset_bedroom.mat",
     "aperture": "sar/data_3dsar_pass1_az001_HH.mat",
@@ -16,6 +16,7 @@ PARTS = {
     "breathing": "acconeer/acconeer_a121_presence-medium_range_no_timeout.h5",
     "reflector": "acconeer/acconeer_a121_corner-reflector.h5",
     "walking": "intel5300/walk_post_1597163546.dat",
+    "spectra": "nerf2",
 }
 
 
@@ -36,6 +37,7 @@ def bench_real(data: Path, say: Callable[[str], None]) -> dict[str, float | str]
     from rfgs_core.real.bedroom import judge_bedroom
     from rfgs_core.real.radar import judge_breathing, judge_reflector
     from rfgs_core.real.ranging import judge_ranging
+    from rfgs_core.real.spectra import judge_spectra
     from rfgs_core.real.walking import judge_walking
 
     judges: dict[str, Callable[[Path], dict[str, float | str]]] = {
@@ -45,11 +47,12 @@ def bench_real(data: Path, say: Callable[[str], None]) -> dict[str, float | str]
         "breathing": judge_breathing,
         "reflector": judge_reflector,
         "walking": judge_walking,
+        "spectra": judge_spectra,
     }
     result: dict[str, float | str] = {}
     for part, judge in judges.items():
         file = data / PARTS[part]
-        if not file.is_file():
+        if not file.exists():
             say(f"{part}: skipped, no {PARTS[part]} in {data}")
             continue
         result |= {f"{part}_{name}": value for name, value in judge(file).items()}

@@ -236,6 +236,19 @@ def test_receivers_that_share_no_time_are_refused(tmp_path: Path, capsys) -> Non
     assert "share no time" in refused(arguments, capsys)
 
 
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [("rate_hz: 1e12", "samples; lower rate_hz"), ("rate_hz: 4e7", "values, at most")],
+)
+def test_clocks_that_are_too_fast_are_refused(
+    tmp_path: Path, capsys, line: str, message: str
+) -> None:
+    files.intel5300_file(tmp_path / "a.dat", packets=100)
+    (tmp_path / "radios.yaml").write_text(f"{line}\n{PAIR}")
+    arguments = ["import", str(tmp_path / "a.dat"), "--out", str(tmp_path / "out")]
+    assert message in refused([*arguments, "--layout", str(tmp_path / "radios.yaml")], capsys)
+
+
 @pytest.mark.parametrize("name", files.WRITERS)
 def test_inspect_tells_and_draws(name: str, tmp_path: Path, capsys) -> None:
     file, write = files.WRITERS[name]

@@ -13,7 +13,7 @@ from scipy.io import savemat
 from rfgs_core.cli import main
 from rfgs_core.files import read_json
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
-from rfgs_core.real import PARTS, aperture, bedroom, radar, ranging, reading, walking
+from rfgs_core.real import PARTS, aperture, bedroom, radar, ranging, reading, spectra, walking
 
 
 def write_room(path: Path, receivers: int = 260) -> None:
@@ -181,6 +181,33 @@ def test_walking_stands_out_of_shuffled_packets(tmp_path: Path) -> None:
     result = walking.judge_walking(tmp_path / "a.dat")
     assert float(result["ours_share"]) > 0.9 > float(result["shuffled_share"]) + 0.2
     assert result["ours_median_m_s"] == pytest.approx(1.5, abs=0.2)
+
+
+def write_spectra(folder: Path, count: int = 60) -> None:
+    """Pictures of one lobe that follows the transmitter across the room."""
+    from PIL import Image
+
+    generator = np.random.default_rng(7)
+    places = generator.uniform([-2, -2, 1], [2, 2, 1.2], (count, 3))
+    row, column = np.mgrid[0:90, 0:360]
+    (folder / "spectrum").mkdir(parents=True)
+    for number, (x, y, _) in enumerate(places):
+        lobe = np.exp(-(((row - 45 - 8 * y) / 15) ** 2) - ((column - 180 - 40 * x) / 40) ** 2)
+        picture = Image.fromarray(np.round(255 * lobe).astype(np.uint8))
+        picture.save(folder / "spectrum" / f"{number + 1:05d}.png")
+    lines = "".join(f"{x:.6f},{y:.6f},{z:.6f}\n" for x, y, z in places)
+    (folder / "tx_pos.csv").write_text(f"x,y,z\n{lines}")
+    (folder / "test_index.txt").write_text("".join(f"{k:05d}\n" for k in range(1, count, 5)))
+    gateway = "gateway1:\n  position: [0, 0, 0]\n  orientation: [0, 0, 0, 1]\n"
+    (folder / "gateway_info.yml").write_text(gateway)
+
+
+def test_spectra_are_judged_on_blocks_and_beside_the_random_split(tmp_path: Path) -> None:
+    write_spectra(tmp_path)
+    result = {name: float(value) for name, value in spectra.judge_spectra(tmp_path).items()}
+    assert result["ours_ssim"] > result["nearest_ssim"] > result["mean_picture_ssim"]
+    # Neighbours of a random split are nearer than any block allows.
+    assert result["nearest_random_ssim"] > result["nearest_ssim"]
 
 
 def test_the_readers_are_timed(monkeypatch) -> None:

@@ -58,11 +58,12 @@ def schedule(
     rate_hz = rate_hz or float(min(rates))
     fps = min(fps, rate_hz)
     per_frame = max(int(rate_hz / fps + 1e-6), 1)
-    span_s = min(float(row[-1]) for row in times_s) - max(float(row[0]) for row in times_s)
+    first_s, last_s = max(row[0] for row in times_s), min(row[-1] for row in times_s)
+    span_s = float(last_s - first_s)
     if span_s * rate_hz > MOST_TICKS:
         raise RfgsError(
-            f"{span_s:.3g} s at {rate_hz:g} Hz are more than {MOST_TICKS} samples; lower rate_hz in "
-            "--layout, or cut the captures into pieces"
+            f"{span_s:.3g} s at {rate_hz:g} Hz are more than {MOST_TICKS} samples; lower rate_hz "
+            "in --layout, or cut the captures into pieces"
         )
     ticks_s = common_clock(times_s, rate_hz) if _overlap(times_s) else np.zeros(0)
     # What is shorter than a frame makes one of fewer samples.

@@ -14,6 +14,7 @@ from rfgs_core.sanitize.clock import common_clock
 
 #: Packets between which the clock of a capture has no ticks are not resampled below this [Hz].
 _SLOWEST_HZ = 20.0
+_RESAMPLED = "resampled at"
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,12 @@ def steps(capture: Capture) -> Iterator[Step]:
         yield Step(f"{int(changed.sum())} outliers replaced", replace(capture, values=cleaned))
 
 
+def cleaned(capture: Capture) -> tuple[Capture, list[str]]:
+    """A capture after every step but the common clock, at its own packets; and what was done."""
+    taken = [step for step in steps(capture) if not step.name.startswith(_RESAMPLED)]
+    return (taken[-1].capture if taken else capture), [step.name for step in taken]
+
+
 def _over_subcarriers(capture: Capture) -> Iterator[Step]:
     """Gaps, rotations, outliers, one clock and linear phase."""
     received = capture.valid.any(axis=-1, keepdims=True)
@@ -96,7 +103,7 @@ def _over_subcarriers(capture: Capture) -> Iterator[Step]:
     yield Step("timing and phase offset removed, one slope per packet", capture)
     rate_hz = min(capture.rate_hz, 2.0 * len(capture) / max(float(capture.time_s[-1]), 1e-9))
     if rate_hz >= _SLOWEST_HZ and len(capture) > 2:
-        yield Step(f"resampled at {rate_hz:.0f} Hz", _resampled(capture, rate_hz))
+        yield Step(f"{_RESAMPLED} {rate_hz:.0f} Hz", _resampled(capture, rate_hz))
 
 
 def _resampled(capture: Capture, rate_hz: float) -> Capture:

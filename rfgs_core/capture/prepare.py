@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from jaxtyping import Complex64
 
 from rfgs_core.capture.alignment import Schedule, schedule
 from rfgs_core.capture.channels import Channels, channels_of
+from rfgs_core.capture.cleaned import cleaned
 from rfgs_core.capture.layout_file import CaptureLayout, assign
 from rfgs_core.capture.model import MOST_VALUES, Capture
 from rfgs_core.capture.prepared import Prepared, bounds_around, guess, scale_to_free_space
@@ -35,6 +37,8 @@ def prepare(
     given: CaptureLayout,
     empty: list[Path] | None = None,
     form: str | None = None,
+    *,
+    sanitise: bool = False,
 ) -> tuple[Prepared, list[str]]:
     """Reads the files of one radio and puts them on one clock.
 
@@ -43,6 +47,8 @@ def prepare(
         given: Where the devices stood.
         empty: The same without anything that moves; None takes the mean over the capture.
         form: Name of the reader; None tells it by the files.
+        sanitise: Clean each packet first: gain, outliers, timing and phase, so that packets agree
+            and their mean says something. Absolute delays and levels are gone then.
 
     Returns:
         What to write into a dataset, and warnings of the readers.
@@ -51,7 +57,8 @@ def prepare(
         RfgsError: Files and devices do not go together, or a file cannot be read.
     """
     warnings: list[str] = []
-    receivers = _receivers(assign(given, files), given, form, warnings)
+    read = partial(_receivers, given=given, form=form, sanitise=sanitise, warnings=warnings)
+    receivers = read(assign(given, files))
     _need_alike(receivers)
     times_s = [r.capture.time_s + given.offsets_s[d] for d, r in receivers.items()]
     plan = schedule(times_s, given.fps, given.rate_hz)
@@ -61,16 +68,24 @@ def prepare(
     if empty is None:
         static = csi.mean(axis=(0, 1))
     else:
-        rooms = _receivers(assign(given, empty), given, form, warnings)
+        rooms = read(assign(given, empty))
         _need_alike({**receivers, **{-1 - d: room for d, room in rooms.items()}})
         means = [room.channels.values.mean(axis=0, keepdims=True) for room in rooms.values()]
         first = np.zeros((len(rooms), 1, 1), np.int64)
         static = _arranged(given, radio, means, used, first)[0, 0]
-    return _prepared(given, radio, csi, static, receivers, plan, empty is None), warnings
+    done = _prepared(given, radio, csi, static, receivers, plan, empty is None)
+    if sanitise:
+        reason = "asked for; absolute delays and levels are gone"
+        done.guesses.append(guess(radio.name, "packets", "sanitised", reason))
+    return done, warnings
 
 
 def _receivers(
-    assigned: dict[int, Path], given: CaptureLayout, form: str | None, warnings: list[str]
+    assigned: dict[int, Path],
+    given: CaptureLayout,
+    form: str | None,
+    sanitise: bool,
+    warnings: list[str],
 ) -> dict[int, _Receiver]:
     found = {}
     for device, path in assigned.items():
@@ -82,7 +97,7 @@ def _receivers(
                 f"{path.name}: {left} packets of {len(reading.captures) - 1} other formats are "
                 "left out"
             )
-        capture = reading.largest
+        capture = cleaned(reading.largest)[0] if sanitise else reading.largest
         found[device] = _Receiver(path, capture, channels_of(capture, 0, given.centre_hz))
     return found
 

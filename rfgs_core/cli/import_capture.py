@@ -6,6 +6,7 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import tyro
 
@@ -30,6 +31,9 @@ class ImportArgs:
     """Where the radios stood (YAML); captures that tell it themselves need none."""
     empty: tuple[Path, ...] = ()
     """The same radios with nothing that moves; the mean over the capture when left out."""
+    sanitize: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """Clean each packet first, as `rfgs inspect --sanitize` shows: packets of most Wi-Fi cards
+    share no phase, so their mean says nothing otherwise. Absolute delays and levels are gone."""
     format: str | None = None
     """Name of the reader, where a file does not tell it."""
 
@@ -47,7 +51,13 @@ def run(args: ImportArgs) -> int:
         raise RfgsError("import: expected at least one capture")
     if args.layout is not None:
         given = read_layout(args.layout)
-        prepared, warnings = prepare(list(args.files), given, list(args.empty) or None, args.format)
+        prepared, warnings = prepare(
+            list(args.files),
+            given,
+            list(args.empty) or None,
+            args.format,
+            sanitise=args.sanitize,
+        )
     else:
         first, *others = args.files
         reading = read_capture(first, args.format)

@@ -249,6 +249,25 @@ def test_clocks_that_are_too_fast_are_refused(
     assert message in refused([*arguments, "--layout", str(tmp_path / "radios.yaml")], capsys)
 
 
+def test_sanitised_packets_have_a_mean(tmp_path: Path) -> None:
+    index = occupied("HT", 20)
+    assert index is not None
+    generator = np.random.default_rng(1)
+    turn = generator.uniform(-1, 1, (60, 1)) * index + generator.uniform(-3, 3, (60, 1))
+    value = np.round(200 * np.exp(1j * turn))[:, None, None]
+    records = [files.feitcsi_record(row, 10_000 * k) for k, row in enumerate(value)]
+    (tmp_path / "a.csi").write_bytes(b"".join(records))
+    coherent = {}
+    for extra in ((), ("--sanitize",)):
+        folder = tmp_path / f"with{len(extra)}"
+        folder.mkdir()
+        sequence = imported(folder, tmp_path / "a.csi", extra=extra)
+        static, csi = sequence.csi_static("wifi"), sequence.csi("wifi", 1)
+        coherent[extra] = np.abs(static).mean() / np.abs(csi).mean()
+    assert coherent[()] < 0.3 and coherent["--sanitize",] > 0.99
+    assert "packets" in {row["what"] for row in sequence.info.guesses}
+
+
 @pytest.mark.parametrize("name", files.WRITERS)
 def test_inspect_tells_and_draws(name: str, tmp_path: Path, capsys) -> None:
     file, write = files.WRITERS[name]

@@ -77,6 +77,9 @@ def unwrapped_s(
 
 
 def _read(path: Path, count: int) -> bytes:
+    if path.exists() and not path.is_file():
+        # A pipe would wait for somebody who writes.
+        raise RfgsError(f"{path}: expected a file with a capture, found none")
     try:
         with path.open("rb") as stream:
             return stream.read(count)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import resource
 import time
 import warnings
@@ -142,6 +143,12 @@ def test_a_folder_is_no_file(tmp_path: Path) -> None:
     for name in files.WRITERS:
         assert isinstance(read_or_refuse(tmp_path, name), str)
     assert isinstance(read_or_refuse(tmp_path, None), str)
+
+
+def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.dat")
+    for name in (None, *files.WRITERS):
+        assert isinstance(read_or_refuse(tmp_path / "pipe.dat", name), str)
 
 
 def test_damage_between_records_is_counted(tmp_path: Path) -> None:

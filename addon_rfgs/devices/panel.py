@@ -66,7 +66,9 @@ class RFGS_PT_devices(Tab, bpy.types.Panel):
         row = layout.row(align=True)
         for role, text in (("TRANSMITTER", "TX"), ("RECEIVER", "RX"), ("ACCESS_POINT", "AP")):
             row.operator("rfgs.add_device", text=text, icon=_ICONS[role]).role = role
-        layout.operator_menu_enum("rfgs.place_radio", "radio", text="Place Preset", icon="ADD")
+        row = layout.row(align=True)
+        row.operator_menu_enum("rfgs.place_radio", "radio", text="Place Preset", icon="ADD")
+        row.operator("rfgs.import_devices", text="Of a Dataset", icon="IMPORT")
         row = layout.row()
         row.template_list(*("RFGS_UL_devices", "", bpy.data, "objects", settings, "active"), rows=4)
         side = row.column(align=True)

@@ -92,18 +92,11 @@ def open_path_dataset(folder: Path) -> PathDataset:
     Raises:
         AddonError: There is none, or it is damaged.
     """
-    found = [folder] if (folder / "sequence.json").is_file() else []
-    found = found or sorted(file.parent for file in folder.glob("*/sequence.json"))
-    if not found:
-        raise AddonError(f"{folder}: no dataset there; expected a folder made by Generate Dataset")
-    if len(found) > 1:
-        names = ", ".join(path.name for path in found)
-        raise AddonError(f"{folder}: several sequences; choose the folder of one: {names}")
-    file = found[0] / "sequence.json"
-    info = _read_json(file)
+    found, info = read_sequence(folder)
+    file = found / "sequence.json"
     try:
         return PathDataset(
-            found[0],
+            found,
             [int(frame) for frame in info["frames"]],
             {
                 str(radio): [str(row["name"]) for row in rows]
@@ -113,6 +106,25 @@ def open_path_dataset(folder: Path) -> PathDataset:
         )
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise AddonError(f"{file}: damaged; make the dataset anew") from error
+
+
+def read_sequence(folder: Path) -> tuple[Path, dict[str, Any]]:
+    """Folder of a dataset's only sequence, and what its `sequence.json` holds.
+
+    Args:
+        folder: The dataset, or one of its sequences.
+
+    Raises:
+        AddonError: There is none or several, or it cannot be read.
+    """
+    found = [folder] if (folder / "sequence.json").is_file() else []
+    found = found or sorted(file.parent for file in folder.glob("*/sequence.json"))
+    if not found:
+        raise AddonError(f"{folder}: no dataset there; expected a folder made by Generate Dataset")
+    if len(found) > 1:
+        names = ", ".join(path.name for path in found)
+        raise AddonError(f"{folder}: several sequences; choose the folder of one: {names}")
+    return found[0], _read_json(found[0] / "sequence.json")
 
 
 def recorded_frames(dataset: PathDataset, radio: str) -> list[int]:

@@ -109,7 +109,9 @@ def _manifest_faults(path: Path, manifest_sha256: str) -> Iterator[str]:
 def _sequence_faults(sequence: Sequence, has: list[str]) -> Iterator[str]:
     with tqdm(sequence.radios, desc="channels", unit="radio") as bar:
         for radio in bar:
-            yield from _caught(lambda radio=radio: _radio_faults(sequence, radio))
+            yield from _caught(
+                lambda radio=radio: _radio_faults(sequence, radio, "geometry" in has)
+            )
             if "paths" in has:
                 yield from _caught(lambda radio=radio: path_faults(sequence, radio))
     if "geometry" in has:
@@ -121,7 +123,8 @@ def _sequence_faults(sequence: Sequence, has: list[str]) -> Iterator[str]:
             yield from _caught(lambda name=camera["name"]: _empty_faults(sequence, name))
 
 
-def _radio_faults(sequence: Sequence, radio: str) -> Iterator[str]:
+def _radio_faults(sequence: Sequence, radio: str, traced: bool) -> Iterator[str]:
+    """Faults of one radio; levels and delays of captures are their radios' own, not physics."""
     store = sequence.files.csi(radio)
     data, spec, devices = (
         sequence.radio(radio),
@@ -148,19 +151,27 @@ def _radio_faults(sequence: Sequence, radio: str) -> Iterator[str]:
         if not (np.isfinite(values).all() and np.allclose(values, expected, atol=1e-9)):
             yield f"{store}: {name}: differs from the devices in sequence.json"
     static = sequence.csi_static_samples(radio)
-    yield from channel_faults(sequence, radio, static, chunk_file(store, None))
-    yield from energy_faults(sequence, radio, static, f"{chunk_file(store, None)}: static")
+    yield from _static_faults(sequence, radio, static) if traced else ()
     for index, frame in enumerate(sequence.frames):
         file = chunk_file(store, index)
         yield from _caught(
-            lambda frame=frame, file=file: _frame_faults(sequence, radio, frame, file, static)
+            lambda frame=frame, file=file: _frame_faults(
+                sequence, radio, frame, file, static, traced
+            )
         )
     if has_impaired(store):
         yield from _caught(lambda: _impaired_faults(sequence, radio))
 
 
+def _static_faults(sequence: Sequence, radio: str, static: np.ndarray) -> Iterator[str]:
+    """What the static channel of a traced scene says against physics."""
+    file = chunk_file(sequence.files.csi(radio), None)
+    yield from channel_faults(sequence, radio, static, file)
+    yield from energy_faults(sequence, radio, static, f"{file}: static")
+
+
 def _frame_faults(
-    sequence: Sequence, radio: str, frame: int, file: Path, static: np.ndarray
+    sequence: Sequence, radio: str, frame: int, file: Path, static: np.ndarray, traced: bool
 ) -> Iterator[str]:
     value = sequence.csi_samples(radio, frame)
     measured = sequence.layout(radio).measured
@@ -170,6 +181,8 @@ def _frame_faults(
         yield f"{file}: frame {frame}: values on links that are not measured"
     elif not np.abs(value[:, measured]).any(axis=(1, 2)).all():
         yield f"{file}: frame {frame}: silent channel"
+    elif not traced:
+        return
     elif _nobody(sequence, radio, value, static):
         hint = (
             "" if sequence.trace_depth(radio) > 2 else "; behind a wall only --depth 3 shows people"

@@ -20,6 +20,7 @@ import numpy as np
 from jaxtyping import Complex64
 from tqdm import tqdm
 
+from rfgs_core.dataset.aperture import whole_layout
 from rfgs_core.dataset.observed import Observed
 from rfgs_core.errors import RfgsError
 from rfgs_core.fit.frame import explained_change, solved_frame
@@ -77,7 +78,10 @@ def learned_background(
         RfgsError: There are fewer than `LEAST_FRAMES` frames, or a channel is not finite.
     """
     need_enough_frames(sequence)
+    spec = sequence.radio_spec(radio)
     measured = sequence.coordinates(radio)["measured"].values
+    if spec.antennas_move:
+        measured = whole_layout(sequence, radio).measured
     ever, rows, shape = np.zeros_like(measured), [], ()
     for frame in sequence.frames:
         _, links, subcarriers, csi = visible_channel(sequence, radio, frame, channel, packets)

@@ -22,6 +22,8 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "ablate": ("ablate", "AblateArgs"),
     "predict": ("predict", "PredictArgs"),
     "csi": ("csi", "CsiArgs"),
+    "inspect": ("inspect_capture", "InspectArgs"),
+    "import": ("import_capture", "ImportArgs"),
     "bench": ("bench", "BenchArgs"),
 }
 

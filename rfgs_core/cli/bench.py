@@ -24,10 +24,16 @@ class BenchArgs:
     imported and 100,000 per frame played by the add-on, in Blender as a program of its own.
     training: 20,000 Gaussians on one frame of a dataset, until the loss of links that are set
     aside changes by under 1 % over 50 steps; or --gaussians and --steps of your own.
+    readers: captures of Intel 5300 beside csiread, and of FeitCSI. real: not speed but how well
+    measured data are explained, each part beside a baseline; docs/captures.md names the files.
     """
 
-    part: tyro.conf.Positional[Literal["propagation", "raster", "blender", "training"]]
-    """What to time."""
+    part: tyro.conf.Positional[
+        Literal["propagation", "raster", "blender", "training", "readers", "real"]
+    ]
+    """What to time or judge."""
+    data: Path | None = None
+    """Folder of real captures for the part `real`."""
     blender: Path | None = None
     """Blender program for the part `blender`; else $BLENDER, else pip's bpy."""
     dataset: Path | None = None
@@ -54,6 +60,12 @@ def _bench(args: BenchArgs) -> Callable[[], dict[str, Any]]:
         return lambda: {**bench_blender(args.blender), **hardware()}
     if args.part == "training":
         return partial(_training, args)
+    if args.part == "readers":
+        from rfgs_core.real.reading import bench_readers
+
+        return bench_readers
+    if args.part == "real":
+        return partial(_real, args)
     if args.part == "raster":
         from rfgs_core.render.bench import bench_raster
 
@@ -80,6 +92,20 @@ def _training(args: BenchArgs) -> dict[str, Any]:
     return {**bench_training(args.dataset, args.radio, args.frame, bench), **hardware()}
 
 
+def _real(args: BenchArgs) -> dict[str, Any]:
+    from rfgs_core.errors import RfgsError
+    from rfgs_core.real import bench_real
+
+    if args.data is None:
+        raise RfgsError("bench real: expected --data FOLDER of captures, see docs/captures.md")
+    return bench_real(args.data, _note)
+
+
+def _note(line: str) -> None:
+    """Tells something that is no result."""
+    sys.stderr.write(f"{line}\n")
+
+
 def run(args: BenchArgs) -> int:
     """Prints one number per line."""
     from rfgs_core.errors import RfgsError
@@ -88,12 +114,13 @@ def run(args: BenchArgs) -> int:
     for name, value in (("gaussians", args.gaussians), ("steps", args.steps)):
         if value is not None and value < 1:
             raise RfgsError(f"--{name} {value}: expected at least 1")
-    if args.part != "training":
+    if args.part in ("propagation", "raster", "blender"):
         sys.stderr.write(f"timing {args.part}; the plain twin takes most of it, about a minute\n")
     result = _bench(args)()
+    width = max(28, *map(len, result))
     for name, value in result.items():
         shown = f"{value:.4g}" if isinstance(value, float) else value
-        sys.stdout.write(f"{name:<28} {shown}\n")
+        sys.stdout.write(f"{name:<{width}} {shown}\n")
     if args.json is not None:
         write_json(args.json, result)
     return 0

@@ -78,18 +78,24 @@ class HeldOut:
     """Links of held-out device pairs, in both directions; all their subcarriers are held out."""
     element_links: Bool[np.ndarray, "tx rx"]
     """Links of held-out elements outside the held-out device pairs."""
+    unmeasured: Bool[np.ndarray, "subcarrier"] | None = None
+    """Subcarriers that a real radio did not report, which nobody sees and nothing is judged by;
+    None where there are all."""
 
     @staticmethod
     def of(split: Mapping[str, Any], layout: Layout, num_subcarriers: int) -> HeldOut:
         """Reads a radio's split, as `radio_split` chooses it.
 
         Args:
-            split: `rx_elements`, `subcarriers` and unordered `device_pairs`.
+            split: `rx_elements`, `subcarriers` and unordered `device_pairs`; of captures also
+                `unmeasured_subcarriers`.
             layout: Antenna elements and the links that exist.
             num_subcarriers: Subcarriers of the radio.
         """
         subcarriers = np.ones(num_subcarriers, dtype=bool)
         subcarriers[list(split["subcarriers"])] = False
+        unmeasured = np.zeros(num_subcarriers, dtype=bool)
+        unmeasured[list(split.get("unmeasured_subcarriers", ()))] = True
         column = np.zeros(layout.measured.shape, dtype=bool)
         column[:, list(split["rx_elements"])] = True
         pair = np.zeros(layout.measured.shape, dtype=bool)
@@ -97,9 +103,10 @@ class HeldOut:
             pair |= layout.links_between(a, b) | layout.links_between(b, a)
         return HeldOut(
             links=layout.measured & ~pair & ~column,
-            subcarriers=subcarriers,
+            subcarriers=subcarriers & ~unmeasured,
             pair_links=layout.measured & pair,
             element_links=layout.measured & ~pair & column,
+            unmeasured=unmeasured,
         )
 
     @property
@@ -110,7 +117,10 @@ class HeldOut:
     @property
     def subcarrier(self) -> Bool[np.ndarray, "tx rx subcarrier"]:
         """Held-out subcarriers, at training elements."""
-        return self.links[:, :, None] & ~self.subcarriers
+        hidden = ~self.subcarriers
+        if self.unmeasured is not None:
+            hidden = hidden & ~self.unmeasured
+        return self.links[:, :, None] & hidden
 
     @property
     def visible(self) -> Bool[np.ndarray, "tx rx subcarrier"]:

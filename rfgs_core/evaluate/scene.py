@@ -12,7 +12,8 @@ import numpy as np
 from jaxtyping import Complex, Float, Float32, Float64
 
 from rfgs_core.bodies.body_prior import Bodies
-from rfgs_core.dataset.observed import Observed, observed_csi
+from rfgs_core.dataset.aperture import whole_csi, whole_layout, whole_static
+from rfgs_core.dataset.observed import Observed
 from rfgs_core.dataset.sequence import Sequence
 from rfgs_core.dataset.splits import HeldOut
 from rfgs_core.evaluate.baselines.gaussian_process import krige, krige_level
@@ -122,11 +123,12 @@ class Scene:
             RfgsError: Nothing that moves has a surface.
         """
         sequence, name = run.sequence, run.config.radio
-        radio, layout = sequence.radio_spec(name), sequence.layout(name)
+        radio = sequence.radio_spec(name)
+        layout = whole_layout(sequence, name, coherent=False)
         held_out = HeldOut.of(sequence.splits["rf"][name], layout, radio.num_subcarriers)
         grid = Grid.over(sequence.bounds_m)
         voxels = voxel_budget(sequence.instances)
-        static = sequence.csi_static(name)
+        static = whole_static(sequence, name)
         evidence = Evidence.hide(static, static, held_out, layout, radio.freq_hz, grid, voxels)
         environment = fill(evidence.static, evidence, krige, krige_level)
         return Scene(run, radio, layout, held_out, grid, voxels, static, environment)
@@ -148,13 +150,13 @@ class Scene:
 
     def csi(self, frame: int) -> Complex[np.ndarray, "tx rx subcarrier"]:
         """True channel of a frame: predictions are held against it, whatever was observed."""
-        return self.run.sequence.csi(self.radio.name, frame)
+        return whole_csi(self.run.sequence, self.radio.name, frame)
 
     def evidence(self, frame: int, score: Float[np.ndarray, "x y z"]) -> Evidence:
         """What baselines may see of a frame, and where the method's own `score` is centred."""
         static, power_map = self.csi_static, None
         if (self.observe, self.background, self.packets) == ("complex", "empty_room", "first"):
-            csi = observed_csi(self.run.sequence, self.radio.name, frame, self.run.channel)
+            csi = whole_csi(self.run.sequence, self.radio.name, frame, self.run.channel)
         else:
             seen = self.run.observations(frame)
             hidden, static = ~(seen.links[..., None] & seen.subcarriers), seen.static

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Complex64
 
+from rfgs_core.dataset.aperture import whole_csi, whole_layout, whole_static
 from rfgs_core.errors import RfgsError
 from rfgs_core.figures.radio import PADDING, RANGE_DB, padded_profile
 from rfgs_core.figures.style import new_figure, write_picture
@@ -61,7 +62,7 @@ def link_channels(run: Run, tx_device: int, rx_device: int) -> LinkChannels:
         RfgsError: The radio does not measure this link.
     """
     sequence, name = run.sequence, run.config.radio
-    layout, radio = sequence.layout(name), sequence.radio_spec(name)
+    layout, radio = whole_layout(sequence, name), sequence.radio_spec(name)
     pairs = layout.device_pairs
     if (tx_device, rx_device) not in pairs:
         known = ", ".join(f"{a}→{b}" for a, b in pairs)
@@ -69,8 +70,8 @@ def link_channels(run: Run, tx_device: int, rx_device: int) -> LinkChannels:
     tx, rx = np.nonzero(
         layout.measured & (layout.tx_device[:, None] == tx_device) & (layout.rx_device == rx_device)
     )
-    static = sequence.csi_static(name)
-    measured = [(sequence.csi(name, frame) - static)[tx, rx] for frame in run.frames]
+    static = whole_static(sequence, name)
+    measured = [(whole_csi(sequence, name, frame) - static)[tx, rx] for frame in run.frames]
     predicted = [run.predict(frame)[tx, rx] for frame in run.frames]
     low, high = sequence.bounds_m
     longest_m = min(2.0 * float(np.linalg.norm(high - low)), radio.unambiguous_path_m)

@@ -16,6 +16,8 @@ from rfgs_core.radio.levels import decibels
 RANGE_DB = 30.0
 #: Zero padding of delay transforms.
 PADDING = 4
+#: Devices of which delay–angle images are drawn.
+_MOST_DEVICES = 8
 #: Directions of delay–angle images [degree].
 ANGLES_DEG = np.linspace(-85.0, 85.0, 121)
 
@@ -74,7 +76,8 @@ def delay_angle_chart(scene: Scene, frame: int, centroid_m: Float[np.ndarray, "3
     Angles are azimuths in the device's own frame, left positive; rows of the array and
     transmitting elements add in power.
     """
-    devices = scene.run.sequence.devices(scene.radio.name)
+    # Of antennas that move, the first few places stand for all.
+    devices = scene.run.sequence.devices(scene.radio.name)[:_MOST_DEVICES]
     delta = scene.csi(frame) - scene.csi_static
     with new_figure(2.7 * len(devices) + 0.4, 3.2) as figure:
         axes = np.atleast_1d(figure.subplots(1, len(devices), sharey=True))

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import Bool, Complex, Complex64, Float32, Float64, Int64
 
-from rfgs_core.dataset.observed import Observed, observed_packets
+from rfgs_core.dataset.aperture import whole_layout, whole_packets, whole_static
+from rfgs_core.dataset.observed import Observed
 from rfgs_core.dataset.splits import HeldOut
 from rfgs_core.errors import RfgsError
 from rfgs_core.measure.kinds import KINDS, Reported, Visible
@@ -87,20 +88,6 @@ class Observations:
         return self.with_delta(delta)
 
 
-def need_still_antennas(sequence: Sequence, radio: str) -> None:
-    """Refuses radios that training cannot use.
-
-    Raises:
-        RfgsError: The radio's antennas move within a frame.
-    """
-    data = sequence.coordinates(radio)
-    if data["tx_xyz"].ndim != 2 or data["rx_xyz"].ndim != 2:
-        raise RfgsError(
-            f"{sequence.name}, {radio}: the antennas move within a frame, and training takes one "
-            "sample per frame; choose a radio whose antennas stand still"
-        )
-
-
 def packets_to_read(
     asked: Packets | None, sequence: Sequence, radio: str, config: TrainConfig
 ) -> Packets:
@@ -109,8 +96,10 @@ def packets_to_read(
     Raises:
         RfgsError: All are asked for where there is one, or where their phases are not known.
     """
-    count = sequence.radio_spec(radio).samples_per_frame
-    if count == 1:
+    spec = sequence.radio_spec(radio)
+    if spec.antennas_move:
+        why_not = f"{radio} sends one packet from each of its places"
+    elif spec.samples_per_frame == 1:
         why_not = (
             f"{sequence.name} holds one packet of {radio} per frame; generate it with "
             "--packets-per-frame"
@@ -136,16 +125,22 @@ def visible_channel(
         lost all of them are not visible.
 
     Raises:
-        RfgsError: What is visible is not finite, or the antennas move within a frame.
+        RfgsError: What is visible is not finite, or the antennas' places are not the radio's.
     """
-    need_still_antennas(sequence, radio)
     data = sequence.coordinates(radio)
-    # The links that exist are those the channels were stored with.
-    elements = replace(sequence.layout(radio), measured=data["measured"].values.copy())
+    elements = whole_layout(sequence, radio)
+    if not sequence.radio_spec(radio).antennas_move:
+        if data["tx_xyz"].ndim != 2 or data["rx_xyz"].ndim != 2:
+            raise RfgsError(
+                f"{sequence.name}, {radio}: the antennas move within a frame, but the radio in "
+                "sequence.json does not say so (antennas_move); make the dataset again"
+            )
+        # The links that exist are those the channels were stored with.
+        elements = replace(elements, measured=data["measured"].values.copy())
     split = HeldOut.of(sequence.splits["rf"][radio], elements, data.sizes["subcarrier"])
     links, subcarriers = split.links, split.subcarriers
     count = 1 if packets == "first" else None
-    csi = observed_packets(sequence, radio, frame, channel, count)
+    csi = whole_packets(sequence, radio, frame, channel, count)
     received = np.broadcast_to(links, csi.shape[:3])
     if channel == "impaired":
         received = received & ~np.isnan(csi).all(axis=3)
@@ -182,14 +177,13 @@ def observe(
         kept: Hides all other links and subcarriers as well, before anything is made of the channel.
 
     Raises:
-        RfgsError: The channel holds values that are not finite, or its antennas move within a
-            frame.
+        RfgsError: The channel holds values that are not finite.
     """
     elements, links, subcarriers, csi = visible_channel(sequence, radio, frame, channel, packets)
     if kept is not None:
         links, subcarriers = links & kept[0], subcarriers & kept[1]
     if empty is None:
-        static = sequence.csi_static(radio)
+        static = whole_static(sequence, radio)
         _need_finite(
             static, links, subcarriers, f"csi_static of frame {frame} ({sequence.name}, {radio})"
         )

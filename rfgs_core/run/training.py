@@ -30,7 +30,6 @@ from rfgs_core.fit.refine import need_sample_points
 from rfgs_core.fit.stages import fit_frame
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.gaussians.ply import GaussianCloud, cloud_of, read_ply, write_ply
-from rfgs_core.measure.observations import need_still_antennas
 from rfgs_core.measure.offsets import Offsets
 from rfgs_core.model.head import HEAD_SHAPES, RadioHead
 from rfgs_core.radio.levels import decibels
@@ -145,7 +144,6 @@ def train_sequence(
 
 def _check(dataset: Dataset, sequence: Sequence, radio: str, config: TrainConfig) -> None:
     """Refuses settings that do not go together, or ask for what is not there."""
-    need_still_antennas(sequence, radio)
     need_shared_links(sequence, radio, config)
     need_phases(config)
     need_sample_points(config)

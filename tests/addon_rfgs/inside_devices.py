@@ -278,3 +278,67 @@ def test_the_overlay_is_to_scale(role: str) -> None:
 
 def test_nothing_is_drawn_without_a_window() -> None:
     assert bpy.app.background and not overlay._handles
+
+
+def recorded(folder: Path, **changes: object) -> Path:
+    """A dataset's description of two devices, as `rfgs import` writes it."""
+    radio = {"name": "intel", "freq_min_hz": 5.816e9, "freq_max_hz": 5.834e9}
+    radio |= {"num_subcarriers": 57, "tx_rows": 1, "tx_cols": 2, "rx_rows": 1, "rx_cols": 3}
+    radio |= {"rx_spacing_m": 0.03, "own_device_links": "excluded", "tx_offset_m": [0.0, 0.0, 0.0]}
+    rows = [
+        {"name": "tx", "role": "TRANSMITTER", "position_m": [0, 0, 1], "quat_wxyz": [1, 0, 0, 0]},
+        {"name": "rx", "role": "RECEIVER", "position_m": [3, 0, 2], "quat_wxyz": [0, 0, 0, 2]},
+    ]
+    info = {"frames": [1], "radios": {"intel": radio}, "devices": {"intel": rows}, **changes}
+    (folder / "lab").mkdir(parents=True, exist_ok=True)
+    (folder / "lab" / "sequence.json").write_text(json.dumps(info))
+    return folder
+
+
+def test_devices_of_a_dataset_stand_where_it_has_them(tmp_path: Path) -> None:
+    recorded(tmp_path)
+    before = set(empties.devices(bpy.context.scene))
+    bpy.ops.rfgs.import_devices(directory=str(tmp_path))
+    items = {i.name: i for i in set(empties.devices(bpy.context.scene)) - before}
+    assert {name: item.rfgs.role for name, item in items.items()} == {
+        "tx": "TRANSMITTER",
+        "rx": "RECEIVER",
+    }
+    bpy.context.view_layer.update()
+    pose = empties.pose_of(items["rx"], 1.0)
+    np.testing.assert_allclose(pose[:3, 3], [3, 0, 2], atol=1e-6)
+    np.testing.assert_allclose(pose[:3, 0], [-1, 0, 0], atol=1e-6)
+    fields = empties.radio_fields(items["rx"])
+    assert (fields["rx_cols"], fields["num_subcarriers"]) == (3, 57)
+    assert fields["freq_max_hz"] == pytest.approx(5.834e9) and items["rx"].rfgs.radio == "intel"
+
+
+@pytest.mark.parametrize(
+    ("changes", "radio", "message"),
+    [
+        ({}, "wifi", "no radio 'wifi'; it has intel"),
+        ({"devices": {"intel": [{"name": "x"}]}}, "", "damaged pose"),
+        ({"devices": {"intel": ["x"]}}, "", "a device is damaged"),
+        ({"devices": {"intel": []}}, "", "0 devices, expected 1 to 2000"),
+        ({"devices": 3}, "", "sequence.json is damaged"),
+    ],
+)
+def test_damaged_datasets_add_nothing(
+    tmp_path: Path, changes: dict, radio: str, message: str
+) -> None:
+    recorded(tmp_path, **changes)
+    before = len(empties.devices(bpy.context.scene))
+    with pytest.raises(RuntimeError, match=message):
+        bpy.ops.rfgs.import_devices(directory=str(tmp_path), radio=radio)
+    assert len(empties.devices(bpy.context.scene)) == before
+
+
+def test_a_preset_s_name_stays_only_with_the_preset_s_fields(tmp_path: Path) -> None:
+    info = json.loads((recorded(tmp_path) / "lab" / "sequence.json").read_text())
+    rows = info["devices"]["intel"]
+    for fields, label in ((info["radios"]["intel"], "scene"), (dict(RADIO_FIELDS["wifi"]), "wifi")):
+        recorded(tmp_path, radios={"wifi": fields}, devices={"wifi": rows[:1]})
+        before = set(empties.devices(bpy.context.scene))
+        bpy.ops.rfgs.import_devices(directory=str(tmp_path))
+        (item,) = set(empties.devices(bpy.context.scene)) - before
+        assert item.rfgs.radio == label

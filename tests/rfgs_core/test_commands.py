@@ -272,6 +272,8 @@ WRITING: dict[str, tuple[str, ...]] = {
     "demo": (),
     "encode": ("data", "--radio", "wifi"),
     "export": ("run",),
+    "import": ("a.dat",),
+    "inspect": ("a.dat",),
     "predict": ("run", "--tx", "0,0,1"),
     "render": ("run",),
     "study": (),

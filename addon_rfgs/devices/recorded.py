@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Devices of a dataset as Empties: of a simulated one, or of captures of real radios."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+import mathutils
+import numpy as np
+
+from ..command import Command
+from ..errors import AddonError
+from ..path_options import path_setting
+from ..paths.dataset import read_sequence
+from ..reporting import Progress, Undoable, chosen_path
+from ..tables import RADIO_CHOICES, RADIO_DEFAULTS, RADIO_FIELDS
+from . import empties
+
+#: Devices beyond which a dataset is taken for damaged.
+_MOST_DEVICES = 2000
+_ROLES = ("ACCESS_POINT", "TRANSMITTER", "RECEIVER")
+
+
+class RFGS_OT_import_devices(Undoable, bpy.types.Operator):
+    """Add the radio devices of a dataset, also of one that `rfgs import` made of real captures.
+
+    They stand where the dataset has them, each with the band and arrays of its radio
+    """
+
+    bl_label = "Import Devices"
+    command = Command(
+        "devices import", words={"directory": "dataset"}, needs=("directory",), saves=True
+    )
+
+    directory: path_setting("Dataset", "Folder of a dataset, or of one of its sequences")
+    radio: bpy.props.StringProperty(
+        name="Radio",
+        description="Which radio of the dataset; empty takes all",
+        options={"SKIP_SAVE"},
+    )
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[Any]:
+        """Asks for the folder."""
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def work(self, context: bpy.types.Context, _progress: Progress) -> str:
+        """Adds an Empty for each device."""
+        folder, info = read_sequence(chosen_path(self.directory))
+        rows = recorded_devices(folder, info, self.radio)
+        names = [
+            empties.add_device(context.scene, name, role, radio, pose, fields).name
+            for name, role, radio, pose, fields in rows
+        ]
+        radios = ", ".join(dict.fromkeys(row[2] for row in rows))
+        return f"Added {len(names)} devices of {radios}"
+
+
+def recorded_devices(
+    folder: Path, info: dict[str, Any], radio: str
+) -> list[tuple[str, str, str, np.ndarray, dict[str, Any]]]:
+    """Name, role, radio, pose [4, 4] in metres and fields of a sequence's devices.
+
+    Args:
+        folder: The sequence, for messages.
+        info: What its `sequence.json` holds.
+        radio: Which radio; empty takes all.
+
+    Raises:
+        AddonError: There is no such radio, or a device is damaged.
+    """
+    try:
+        radios = {str(name): dict(fields) for name, fields in info["radios"].items()}
+        devices = {str(name): list(rows) for name, rows in info["devices"].items()}
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise AddonError(f"{folder}: sequence.json is damaged; make the dataset anew") from error
+    if radio and radio not in devices:
+        raise AddonError(f"{folder}: no radio {radio!r}; it has {', '.join(devices)}")
+    chosen = {name: rows for name, rows in devices.items() if radio in ("", name)}
+    count = sum(map(len, chosen.values()))
+    if not 0 < count <= _MOST_DEVICES:
+        raise AddonError(f"{folder}: {count} devices, expected 1 to {_MOST_DEVICES}")
+    return [
+        (
+            *_device(folder, row),
+            _label(name, radios.get(name, {})),
+            *_placed(folder, row, radios, name),
+        )
+        for name, rows in chosen.items()
+        for row in rows
+    ]
+
+
+def _device(folder: Path, row: Any) -> tuple[str, str]:
+    """Name and role."""
+    role = row.get("role", _ROLES[0]) if isinstance(row, dict) else None
+    if role not in _ROLES or not isinstance(row.get("name"), str):
+        raise AddonError(f"{folder}: a device is damaged; make the dataset anew")
+    return row["name"][:60], role
+
+
+def _label(name: str, fields: dict[str, Any]) -> str:
+    """Radio that an Empty carries: a preset's name only where the fields are the preset's."""
+    if name not in RADIO_FIELDS:
+        return name
+    own = {key: _plain(value) for key, value in fields.items()}
+    same = all(own.get(key) == _plain(value) for key, value in RADIO_FIELDS[name].items())
+    return name if same else "scene"
+
+
+def _placed(
+    folder: Path, row: dict[str, Any], radios: dict[str, dict[str, Any]], name: str
+) -> tuple[np.ndarray, dict[str, Any]]:
+    """Pose [4, 4] in metres, and the fields that Empties can hold."""
+    try:
+        place = np.array([float(value) for value in row["position_m"]])
+        turn = np.array([float(value) for value in row["quat_wxyz"]])
+    except (KeyError, TypeError, ValueError) as error:
+        raise AddonError(f"{folder}: device {row['name']!r}: damaged pose") from error
+    sound = place.shape == (3,) and turn.shape == (4,) and np.isfinite([*place, *turn]).all()
+    if not sound or not turn.any():
+        raise AddonError(f"{folder}: device {row['name']!r}: damaged pose")
+    pose = np.eye(4)
+    pose[:3, :3] = np.array(mathutils.Quaternion(turn).normalized().to_matrix())
+    pose[:3, 3] = place
+    fields = {
+        key: value
+        for key, value in radios.get(name, {}).items()
+        if key in RADIO_DEFAULTS and _fits(key, value)
+    }
+    return pose, fields
+
+
+def _fits(key: str, value: Any) -> bool:
+    """Whether a field can be set: of a choice one of its values, else of the default's type."""
+    default = RADIO_DEFAULTS[key]
+    if key in RADIO_CHOICES:
+        return value in RADIO_CHOICES[key]
+    if isinstance(default, (list, tuple)):
+        return isinstance(value, list) and len(value) == len(default)
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def _plain(value: Any) -> Any:
+    return list(value) if isinstance(value, tuple) else value

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from dataset_factory.scene.bundle import Bundle
-from rfgs_core.simulate.room import Room, SlabMaterial
+from rfgs_core.simulate.geometry.room import Room, SlabMaterial
 
 
 def room_of(bundle: Bundle) -> Room:

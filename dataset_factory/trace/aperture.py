@@ -13,8 +13,8 @@ from dataset_factory.trace.environment import Environment
 from dataset_factory.trace.people.sight import in_sight
 from rfgs_core.radio import Radio, devices_at, layout
 from rfgs_core.radio.layout import DevicePose
-from rfgs_core.simulate.environment import environment_channel
 from rfgs_core.simulate.paths.path_set import PathSet
+from rfgs_core.simulate.shadow.environment import environment_channel
 from rfgs_core.simulate.shadow.kirchhoff import Shadow, transmission
 from rfgs_core.simulate.surface.direct import PosedPoints, direct_channel
 

@@ -18,7 +18,7 @@ from rfgs_core.radio import Radio
 from rfgs_core.radio.check import too_deep
 from rfgs_core.radio.layout import DevicePose
 from rfgs_core.seeds import sub_seed
-from rfgs_core.simulate.environment import node_frequencies
+from rfgs_core.simulate.shadow.environment import node_frequencies
 from rfgs_core.simulate.shadow.frequencies import fine_grid
 from rfgs_core.simulate.shadow.kirchhoff import Shadow
 

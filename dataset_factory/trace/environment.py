@@ -24,7 +24,6 @@ from rfgs_core.radio.images import DIFFUSE
 from rfgs_core.radio.layout import DevicePose
 from rfgs_core.radio.levels import amplitude_of
 from rfgs_core.radio.sites import centres, measured_pairs, owners
-from rfgs_core.simulate.environment import WIDE_BAND, node_frequencies
 from rfgs_core.simulate.geometry import (
     Faces,
     Sight,
@@ -34,6 +33,7 @@ from rfgs_core.simulate.geometry import (
     specular_paths,
 )
 from rfgs_core.simulate.paths.path_set import PathSet, joined, merged
+from rfgs_core.simulate.shadow.environment import WIDE_BAND, node_frequencies
 from rfgs_core.simulate.surface.movers import Movers
 
 #: Interactions of an environment path; a fourth would change bistatic links by −39 dB.

@@ -21,10 +21,10 @@ from rfgs_core.radio import Radio, frame_samples, layout, pose_span_s
 from rfgs_core.radio.layout import DevicePose
 from rfgs_core.radio.path_table import PathTable
 from rfgs_core.seeds import sub_seed
-from rfgs_core.simulate.environment import environment_channel
 from rfgs_core.simulate.packets import sampled
 from rfgs_core.simulate.paths.path_set import PathSet
 from rfgs_core.simulate.paths.steering import steer
+from rfgs_core.simulate.shadow.environment import environment_channel
 from rfgs_core.simulate.shadow.kirchhoff import Outline, Shadow, transmission
 from rfgs_core.simulate.surface.direct import PosedPoints, direct_channel
 

@@ -48,8 +48,8 @@ def _static(workshop: Workshop, bundle: Bundle) -> list[Row]:
     if workshop.tracer != "sionna":
         return [seed]
     from dataset_factory.trace.environment import Environment
-    from rfgs_core.simulate.environment import environment_channel
     from rfgs_core.simulate.geometry import faces_of
+    from rfgs_core.simulate.shadow.environment import environment_channel
 
     elements = layout(radio, devices)
     finer = partial(faces_of, max_faces=20_000, sample_m=0.1)

@@ -18,17 +18,17 @@ from rfgs_core.radio.reflection import material_permittivity
 from rfgs_core.radio.sites import centres, measured_pairs, owners
 from rfgs_core.radio.tissue import normal_reflection
 from rfgs_core.seeds import sub_seed
-from rfgs_core.simulate.environment import (
+from rfgs_core.simulate.geometry import Sight, Surroundings, specular_paths
+from rfgs_core.simulate.geometry.bvh import Bvh
+from rfgs_core.simulate.geometry.room import Room
+from rfgs_core.simulate.paths.fields import with_fields
+from rfgs_core.simulate.paths.path_set import PathSet
+from rfgs_core.simulate.scatter.people import Arrivals, PeopleChannel
+from rfgs_core.simulate.shadow.environment import (
     environment_channel,
     node_frequencies,
     shadow_channel,
 )
-from rfgs_core.simulate.geometry import Sight, Surroundings, specular_paths
-from rfgs_core.simulate.geometry.bvh import Bvh
-from rfgs_core.simulate.paths.fields import with_fields
-from rfgs_core.simulate.paths.path_set import PathSet
-from rfgs_core.simulate.room import Room
-from rfgs_core.simulate.scatter.people import Arrivals, PeopleChannel
 from rfgs_core.simulate.shadow.frequencies import fine_grid
 from rfgs_core.simulate.shadow.in_view import segments_in_view
 from rfgs_core.simulate.shadow.kirchhoff import (

@@ -24,9 +24,9 @@ from rfgs_core.radio.images import SCATTERING
 from rfgs_core.radio.layout import DevicePose
 from rfgs_core.radio.path_table import PathTable, ends_rad
 from rfgs_core.radio.sites import centres, owners
-from rfgs_core.simulate.environment import WIDE_BAND_NODES, node_frequencies
 from rfgs_core.simulate.paths.path_set import PathSet, empty, merged
 from rfgs_core.simulate.paths.steering import resampled
+from rfgs_core.simulate.shadow.environment import WIDE_BAND_NODES, node_frequencies
 from rfgs_core.simulate.shadow.kirchhoff import Outline, Shadow, transmission
 
 #: Decimals of a delay [s] that are kept: femtoseconds, 0.3 µm.

@@ -19,8 +19,8 @@ from rfgs_core.radio.levels import amplitude_of
 from rfgs_core.radio.reflection import slab
 from rfgs_core.radio.sites import centres, owners, ports
 from rfgs_core.simulate.geometry import SpecularPaths
+from rfgs_core.simulate.geometry.room import Room
 from rfgs_core.simulate.paths.path_set import PathSet
-from rfgs_core.simulate.room import Room
 
 
 def with_fields(

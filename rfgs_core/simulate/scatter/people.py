@@ -10,8 +10,8 @@ import numpy as np
 from rfgs_core.radio import Layout, Radio
 from rfgs_core.radio.layout import DevicePose
 from rfgs_core.radio.sites import measured_pairs, ports
+from rfgs_core.simulate.geometry.room import Room
 from rfgs_core.simulate.geometry.surroundings import Surroundings
-from rfgs_core.simulate.room import Room
 from rfgs_core.simulate.scatter.grid import array_reach, delay_grid, to_subcarriers
 from rfgs_core.simulate.scatter.kernel import spread_facets
 from rfgs_core.simulate.scatter.sites import look_around, tabled_slabs

@@ -11,8 +11,8 @@ from rfgs_core.radio import Layout, Radio
 from rfgs_core.radio.layout import DevicePose, rotation
 from rfgs_core.radio.reflection import slab
 from rfgs_core.radio.sites import centres, owners
+from rfgs_core.simulate.geometry.room import Room
 from rfgs_core.simulate.geometry.surroundings import Surroundings
-from rfgs_core.simulate.room import Room
 from rfgs_core.simulate.scatter.antenna import CODES, Antenna
 from rfgs_core.simulate.scatter.arrivals import Slabs
 from rfgs_core.simulate.sight.mirrors import Mirror, mirror

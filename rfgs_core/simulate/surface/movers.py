@@ -30,6 +30,22 @@ class Movers:
     def __len__(self) -> int:
         return len(self.faces)
 
+    @staticmethod
+    def none() -> Movers:
+        """Nothing that moves."""
+        index = np.zeros(0, dtype=np.int64)
+        small = index.astype(np.int32)
+        corners = np.zeros((0, 3), dtype=np.int64)
+        return Movers(
+            kept=index,
+            rest_vertices=np.zeros((0, 3), dtype=np.float32),
+            faces=corners,
+            material=small,
+            instance=small,
+            segment=small,
+            edges=corners.astype(np.int8),
+        )
+
     def posed(self, vertices: np.ndarray) -> np.ndarray:
         """Their share of all moving vertices [m], shape (V, 3)."""
         return vertices[self.kept]

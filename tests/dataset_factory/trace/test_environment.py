@@ -52,7 +52,7 @@ def test_elements_match_tracing_each_of_them(
     from dataset_factory.trace.environment import Environment
     from dataset_factory.trace.rays.scene import environment_scene
     from rfgs_core.radio.sites import centres
-    from rfgs_core.simulate.environment import environment_channel
+    from rfgs_core.simulate.shadow.environment import environment_channel
 
     radio = replace(preset("wifi"), rx_rows=4, rx_cols=4, own_device_links="excluded")
     upright = [replace(device, quat_wxyz=(1.0, 0.0, 0.0, 0.0)) for device in two_devices]

@@ -13,8 +13,8 @@ from PIL import Image, ImageDraw
 from dataset_factory.verify.closed_forms import fresnel_integral
 from rfgs_core.radio import PRESETS, Layout, Radio, preset
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
-from rfgs_core.simulate.environment import environment_channel, node_frequencies
 from rfgs_core.simulate.paths.path_set import PathSet
+from rfgs_core.simulate.shadow.environment import environment_channel, node_frequencies
 from rfgs_core.simulate.shadow.frequencies import COUNTS, fine_grid, nodes_for
 from rfgs_core.simulate.shadow.kirchhoff import Outline, transmission
 from rfgs_core.simulate.shadow.silhouette import WINDOW

@@ -21,7 +21,7 @@ def test_channel_is_continuous_across_sub_bands(
 ) -> None:
     """Between fine subcarriers a smooth channel bends by (2π δf τ)²; a jump adds itself."""
     from dataset_factory.trace import Tracer
-    from rfgs_core.simulate.environment import node_frequencies
+    from rfgs_core.simulate.shadow.environment import node_frequencies
 
     radio = replace(preset("uwb"), num_subcarriers=60_000, rx_cols=1, own_device_links="excluded")
     bundle = make_bundle(mover=coarse_capsule)

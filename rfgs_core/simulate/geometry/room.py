@@ -11,7 +11,7 @@ import numpy as np
 
 from rfgs_core.errors import RfgsError
 from rfgs_core.radio.materials import MATERIALS
-from rfgs_core.simulate.geometry import Faces, faces_of
+from rfgs_core.simulate.geometry.faces import Faces, faces_of
 
 
 class SlabMaterial(NamedTuple):

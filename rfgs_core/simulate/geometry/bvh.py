@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a straight segment crosses: a bounding volume hierarchy over triangles, in double."""
+"""A bounding volume hierarchy over triangles, in double precision."""
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numba
@@ -16,8 +15,6 @@ SAME_M = 1e-6
 _LEAF = 4
 #: Deepest tree that a traversal has room for.
 _STACK = 64
-#: Triangles reach this far beyond their edges, as a share of them: no ray slips through a seam.
-_SEAM = 1e-9
 
 
 class Bvh(NamedTuple):
@@ -42,51 +39,6 @@ def build_bvh(triangles: Float64[np.ndarray, "triangle 3 3"]) -> Bvh:
     triangles = np.ascontiguousarray(triangles, dtype=np.float64)
     order, low, high, first, count = _built(triangles)
     return Bvh(triangles[order], order, low, high, first, count)
-
-
-@numba.njit(cache=True, nogil=True)
-def new_stack() -> np.ndarray:
-    """Scratch for many calls of `blocked`."""
-    return np.zeros(_STACK, dtype=np.int64)
-
-
-@numba.njit(cache=True, nogil=True)
-def blocked(bvh: Bvh, start: np.ndarray, end: np.ndarray, rim_m: float, stack: np.ndarray) -> bool:
-    """Whether a segment crosses any triangle, as `crossings` tells, looking no further.
-
-    Args:
-        bvh: The triangles.
-        start: Where it starts [m], shape (3,).
-        end: Where it leads to [m], shape (3,).
-        rim_m: What is nearer to either end does not count [m].
-        stack: Scratch, from `new_stack`.
-    """
-    x, y, z = start[0], start[1], start[2]
-    wx, wy, wz = end[0] - x, end[1] - y, end[2] - z
-    length = math.sqrt(wx * wx + wy * wy + wz * wz)
-    if length <= 2.0 * rim_m:
-        return False
-    wx, wy, wz = wx / length, wy / length, wz / length
-    inverse_x, inverse_y, inverse_z = _inverse(wx), _inverse(wy), _inverse(wz)
-    reach = length - rim_m
-    low, high, first, count, corners = bvh.low, bvh.high, bvh.first, bvh.count, bvh.corners
-    stack[0], size = 0, 1
-    while size:
-        size -= 1
-        node = stack[size]
-        near, far = _within(low[node, 0], high[node, 0], x, inverse_x, 0.0, reach)
-        near, far = _within(low[node, 1], high[node, 1], y, inverse_y, near, far)
-        near, far = _within(low[node, 2], high[node, 2], z, inverse_z, near, far)
-        if near > far:
-            continue
-        if count[node] == 0 and len(first) > 1:
-            stack[size], stack[size + 1] = first[node] + 1, first[node]
-            size += 2
-            continue
-        for i in range(first[node], first[node] + count[node]):
-            if rim_m < _hit(corners, i, x, y, z, wx, wy, wz) < reach:
-                return True
-    return False
 
 
 @numba.njit(cache=True, nogil=True)
@@ -159,110 +111,6 @@ def _built(
 
 
 @numba.njit(cache=True, nogil=True)
-def crossings(
-    bvh: Bvh,
-    start: np.ndarray,
-    end: np.ndarray,
-    rim_m: float,
-    at_m: np.ndarray,
-    triangle: np.ndarray,
-) -> int:
-    """Surfaces that a segment crosses, nearest first.
-
-    Args:
-        bvh: The triangles.
-        start: Where it starts [m], shape (3,).
-        end: Where it leads to [m], shape (3,).
-        rim_m: What is nearer to either end does not count [m].
-        at_m: Filled with the distance of each crossing from the start [m].
-        triangle: Filled with the triangle of each, the smallest of several at one place.
-
-    Returns:
-        Number of crossings; more than fit into `at_m` count as one more than that.
-    """
-    x, y, z = start[0], start[1], start[2]
-    wx, wy, wz = end[0] - x, end[1] - y, end[2] - z
-    length = math.sqrt(wx * wx + wy * wy + wz * wz)
-    if length <= 2.0 * rim_m:
-        return 0
-    wx, wy, wz = wx / length, wy / length, wz / length
-    inverse_x, inverse_y, inverse_z = _inverse(wx), _inverse(wy), _inverse(wz)
-    reach = length - rim_m
-    low, high, first, count, corners = bvh.low, bvh.high, bvh.first, bvh.count, bvh.corners
-    stack = np.zeros(_STACK, dtype=np.int64)
-    size, found = 1, 0
-    while size:
-        size -= 1
-        node = stack[size]
-        near, far = _within(low[node, 0], high[node, 0], x, inverse_x, 0.0, reach)
-        near, far = _within(low[node, 1], high[node, 1], y, inverse_y, near, far)
-        near, far = _within(low[node, 2], high[node, 2], z, inverse_z, near, far)
-        if near > far:
-            continue
-        if count[node] == 0 and len(first) > 1:
-            stack[size], stack[size + 1] = first[node] + 1, first[node]
-            size += 2
-            continue
-        for i in range(first[node], first[node] + count[node]):
-            at = _hit(corners, i, x, y, z, wx, wy, wz)
-            if at <= rim_m or at >= reach:
-                continue
-            found = _insert(at, bvh.triangle[i], at_m, triangle, found)
-            if found > len(at_m):
-                return found
-    return found
-
-
-@numba.njit(cache=True, nogil=True)
-def nearest(bvh: Bvh, start: np.ndarray, way: np.ndarray, rim_m: float) -> tuple[float, int]:
-    """Distance of the first triangle that a ray meets [m], and which; infinite and −1 for none.
-
-    Args:
-        bvh: The triangles.
-        start: Where it starts [m], shape (3,).
-        way: Where to, a unit vector, shape (3,).
-        rim_m: What is nearer than this does not count [m].
-    """
-    x, y, z, wx, wy, wz = start[0], start[1], start[2], way[0], way[1], way[2]
-    inverse_x, inverse_y, inverse_z = _inverse(wx), _inverse(wy), _inverse(wz)
-    low, high, first, count, corners = bvh.low, bvh.high, bvh.first, bvh.count, bvh.corners
-    stack = np.zeros(_STACK, dtype=np.int64)
-    size, best, found = 1, np.inf, -1
-    while size:
-        size -= 1
-        node = stack[size]
-        near, far = _within(low[node, 0], high[node, 0], x, inverse_x, 0.0, best)
-        near, far = _within(low[node, 1], high[node, 1], y, inverse_y, near, far)
-        near, far = _within(low[node, 2], high[node, 2], z, inverse_z, near, far)
-        if near > far:
-            continue
-        if count[node] == 0 and len(first) > 1:
-            stack[size], stack[size + 1] = first[node] + 1, first[node]
-            size += 2
-            continue
-        for i in range(first[node], first[node] + count[node]):
-            at = _hit(corners, i, x, y, z, wx, wy, wz)
-            if rim_m < at < best:
-                best, found = at, bvh.triangle[i]
-    return best, found
-
-
-@numba.njit(cache=True, nogil=True, inline="always")
-def _inverse(part: float) -> float:
-    """1 / part, large where there is none."""
-    return 1.0 / part if abs(part) > 1e-15 else 1e15
-
-
-@numba.njit(cache=True, nogil=True, inline="always")
-def _within(
-    low: float, high: float, start: float, inverse: float, near: float, far: float
-) -> tuple[float, float]:
-    """The part of a segment from `near` to `far` that lies between two planes, with a margin."""
-    a, b = (low - SAME_M - start) * inverse, (high + SAME_M - start) * inverse
-    return max(near, min(a, b)), min(far, max(a, b))
-
-
-@numba.njit(cache=True, nogil=True)
 def triangle_at(bvh: Bvh, group: np.ndarray, wanted: int, place: np.ndarray) -> int:
     """Smallest triangle of a group that a place in its plane lies on, rim included; −1 for none.
 
@@ -307,50 +155,3 @@ def _lies_on(corners: np.ndarray, place: np.ndarray) -> bool:
         if over < -SAME_M:
             return False
     return True
-
-
-@numba.njit(cache=True, nogil=True)
-def _insert(at: float, index: int, at_m: np.ndarray, triangle: np.ndarray, found: int) -> int:
-    """Puts a crossing in its place among those found; returns how many there are then."""
-    for i in range(found):
-        if abs(at_m[i] - at) <= SAME_M:
-            triangle[i] = min(triangle[i], index)
-            return found
-    if found == len(at_m):
-        return found + 1
-    place = found
-    while place > 0 and at_m[place - 1] > at:
-        at_m[place], triangle[place] = at_m[place - 1], triangle[place - 1]
-        place -= 1
-    at_m[place], triangle[place] = at, index
-    return found + 1
-
-
-@numba.njit(cache=True, nogil=True, inline="always")
-def _hit(
-    corners: np.ndarray,
-    i: int,
-    x: float,
-    y: float,
-    z: float,
-    wx: float,
-    wy: float,
-    wz: float,
-) -> float:
-    """Distance at which a ray meets triangle i, −1 if not (Möller and Trumbore 1997)."""
-    ax, ay, az = corners[i, 0, 0], corners[i, 0, 1], corners[i, 0, 2]
-    ux, uy, uz = corners[i, 1, 0] - ax, corners[i, 1, 1] - ay, corners[i, 1, 2] - az
-    vx, vy, vz = corners[i, 2, 0] - ax, corners[i, 2, 1] - ay, corners[i, 2, 2] - az
-    px, py, pz = wy * vz - wz * vy, wz * vx - wx * vz, wx * vy - wy * vx
-    det = ux * px + uy * py + uz * pz
-    if det == 0.0:
-        return -1.0
-    sx, sy, sz = x - ax, y - ay, z - az
-    u = (sx * px + sy * py + sz * pz) / det
-    if u < -_SEAM or u > 1.0 + _SEAM:
-        return -1.0
-    qx, qy, qz = sy * uz - sz * uy, sz * ux - sx * uz, sx * uy - sy * ux
-    v = (wx * qx + wy * qy + wz * qz) / det
-    if v < -_SEAM or u + v > 1.0 + _SEAM:
-        return -1.0
-    return (vx * qx + vy * qy + vz * qz) / det

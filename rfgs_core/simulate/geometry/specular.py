@@ -19,8 +19,9 @@ from jaxtyping import Bool
 
 from rfgs_core.radio.images import REFRACTION, SPECULAR
 from rfgs_core.simulate.geometry.beams import Beams, beams, onward
-from rfgs_core.simulate.geometry.bvh import SAME_M, crossings, triangle_at
+from rfgs_core.simulate.geometry.bvh import SAME_M, triangle_at
 from rfgs_core.simulate.geometry.faces import Faces, height, holds, mirrored
+from rfgs_core.simulate.geometry.rays import crossings
 from rfgs_core.simulate.geometry.surroundings import Surroundings
 
 #: Interactions of a path at most.

@@ -10,8 +10,9 @@ import numba
 import numpy as np
 from jaxtyping import Bool, Float64
 
-from rfgs_core.simulate.geometry.bvh import SAME_M, Bvh, build_bvh, crossings
+from rfgs_core.simulate.geometry.bvh import SAME_M, Bvh, build_bvh
 from rfgs_core.simulate.geometry.faces import Faces, height
+from rfgs_core.simulate.geometry.rays import crossings
 
 #: Surfaces in front of a face are counted up to this many.
 MOST_HIDDEN = 2

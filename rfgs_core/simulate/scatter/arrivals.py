@@ -9,8 +9,9 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from rfgs_core.simulate.geometry.bvh import SAME_M, blocked, crossings, new_stack
+from rfgs_core.simulate.geometry.bvh import SAME_M
 from rfgs_core.simulate.geometry.faces import Faces
+from rfgs_core.simulate.geometry.rays import blocked, crossings, new_stack
 from rfgs_core.simulate.scatter.antenna import Antenna, sent_towards
 from rfgs_core.simulate.scatter.kernel import seen_from_centres
 from rfgs_core.simulate.sight.bodies import HIDDEN, UNSURE, Picture, hides

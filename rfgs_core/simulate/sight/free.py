@@ -6,7 +6,8 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from rfgs_core.simulate.geometry.bvh import SAME_M, Bvh, blocked, new_stack
+from rfgs_core.simulate.geometry.bvh import SAME_M, Bvh
+from rfgs_core.simulate.geometry.rays import blocked, new_stack
 
 
 @numba.njit(cache=True, nogil=True)

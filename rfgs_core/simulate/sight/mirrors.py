@@ -9,8 +9,9 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from rfgs_core.simulate.geometry.bvh import SAME_M, blocked, nearest, triangle_at
+from rfgs_core.simulate.geometry.bvh import SAME_M, triangle_at
 from rfgs_core.simulate.geometry.faces import Faces, height, mirrored
+from rfgs_core.simulate.geometry.rays import blocked, nearest
 from rfgs_core.simulate.sight.panorama import Panorama, sees_face
 
 #: Step of the places on a mirror that are looked by way of [m], and most of them along a side.

@@ -13,8 +13,9 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from rfgs_core.simulate.geometry.bvh import SAME_M, Bvh, blocked, nearest
+from rfgs_core.simulate.geometry.bvh import SAME_M, Bvh
 from rfgs_core.simulate.geometry.faces import Faces
+from rfgs_core.simulate.geometry.rays import blocked, nearest
 
 #: Directions along a side of each of six pictures; things narrower than 0.4° may be overlooked.
 SIZE = 256

@@ -17,7 +17,8 @@ from rfgs_core.simulate.geometry import (
     specular_paths,
     surroundings,
 )
-from rfgs_core.simulate.geometry.bvh import build_bvh, crossings
+from rfgs_core.simulate.geometry.bvh import build_bvh
+from rfgs_core.simulate.geometry.rays import crossings
 
 ROOM_M = np.array([4.0, 5.0, 2.6])
 TX = np.array([0.51, 0.83, 1.23])

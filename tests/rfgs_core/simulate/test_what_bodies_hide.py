@@ -9,7 +9,8 @@ import trimesh
 
 from rfgs_core.errors import RfgsError
 from rfgs_core.simulate.geometry import faces_of
-from rfgs_core.simulate.geometry.bvh import blocked, build_bvh, nearest, new_stack, refit
+from rfgs_core.simulate.geometry.bvh import build_bvh, refit
+from rfgs_core.simulate.geometry.rays import blocked, nearest, new_stack
 from rfgs_core.simulate.geometry.room import Room, SlabMaterial, box_room, empty_room
 from rfgs_core.simulate.sight.bodies import HIDDEN, SEEN, hides, picture
 from rfgs_core.simulate.sight.panorama import panorama, sees

@@ -26,10 +26,11 @@ class BenchArgs:
     aside changes by under 1 % over 50 steps; or --gaussians and --steps of your own.
     readers: captures of Intel 5300 beside csiread, and of FeitCSI. real: not speed but how well
     measured data are explained, each part beside a baseline; docs/captures.md names the files.
+    tracers: the fast tracer beside Sionna RT on our scenes, as `rfgs-factory tracers`.
     """
 
     part: tyro.conf.Positional[
-        Literal["propagation", "raster", "blender", "training", "readers", "real"]
+        Literal["propagation", "raster", "blender", "training", "readers", "real", "tracers"]
     ]
     """What to time or judge."""
     data: Path | None = None
@@ -114,6 +115,11 @@ def run(args: BenchArgs) -> int:
     for name, value in (("gaussians", args.gaussians), ("steps", args.steps)):
         if value is not None and value < 1:
             raise RfgsError(f"--{name} {value}: expected at least 1")
+    if args.part == "tracers":
+        from rfgs_core.cli.calls import call
+
+        call("dataset_factory", "tracers", *(["--json", args.json] if args.json else []))
+        return 0
     if args.part in ("propagation", "raster", "blender"):
         sys.stderr.write(f"timing {args.part}; the plain twin takes most of it, about a minute\n")
     result = _bench(args)()

@@ -80,12 +80,10 @@ def _misuse(message: GuiUpdateMessage, controls: Mapping[str, Any]) -> str:
         return "expected one of the page's controls, found another"
     if list(message.updates) != ["value"]:
         return "expected a control's value, found something else of it"
-    value, expected = message.updates["value"], _wanted(control)
+    value, name = message.updates["value"], getattr(control, "label", "a control")
     if getattr(control, "disabled", False):
-        return f"{_name(control)}: it is disabled"
-    return (
-        "" if _fits(control, value) else f"{_name(control)}: expected {expected}, found {value!r}"
-    )
+        return f"{name}: it is disabled"
+    return "" if _fits(control, value) else f"{name}: expected {_wanted(control)}, found {value!r}"
 
 
 def _wanted(control: Any) -> str:

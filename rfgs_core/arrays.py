@@ -12,6 +12,7 @@ import numpy as np
 
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.files import replacing
+from rfgs_core.links import refuse_link
 
 #: Size of each axis: a number, or a name that stands for the same size throughout a file.
 Shape = tuple[int | str, ...]
@@ -53,6 +54,7 @@ def load_arrays(
     Example:
         `load_arrays(path, "train again", {"means": ("M", 3), "power": ("M",), "names": None})`
     """
+    refuse_link(path)
     try:
         stored = np.load(path, allow_pickle=False)
         if isinstance(stored, np.ndarray):

@@ -21,6 +21,7 @@ from rfgs_core.dataset.schema import read_dataset_info
 from rfgs_core.dataset.writer import MANIFEST, listed_files, own_digest
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json, sha256
+from rfgs_core.links import symbolic_links
 from rfgs_core.radio import layout
 
 #: Coordinates of a store that follow from the devices in `sequence.json`.
@@ -31,10 +32,10 @@ LAYOUT_COORDINATES = (
 
 
 def checksum_faults(path: Path) -> list[str]:
-    """Faults of `dataset.json` and the manifest; finds any change of any byte."""
+    """Faults of `dataset.json` and the manifest, and symbolic links; finds any change of a byte."""
     file = path / "dataset.json"
-    faults = _caught(lambda: _info_faults(file))
-    if not faults:
+    faults = [*_link_faults(path), *_caught(lambda: _info_faults(file))]
+    if not any(fault.startswith(f"{file}:") for fault in faults):
         manifest = read_dataset_info(file).manifest_sha256
         faults += _caught(lambda: _manifest_faults(path, manifest))
     return faults
@@ -62,6 +63,11 @@ def validate(path: Path) -> list[str]:
     for name in info.sequences:
         faults += _caught(lambda name=name: _sequence_faults(Sequence(path / name, name), info.has))
     return list(dict.fromkeys(faults))
+
+
+def _link_faults(path: Path) -> Iterator[str]:
+    for link in symbolic_links(path):
+        yield f"{link}: a symbolic link to {link.readlink()}; expected files and folders"
 
 
 def _caught(check: Callable[[], Iterator[str] | list[str]]) -> list[str]:
@@ -102,7 +108,7 @@ def _manifest_faults(path: Path, manifest_sha256: str) -> Iterator[str]:
     for name, digest in tqdm(promised.items(), desc="checksums", unit="file"):
         if name not in present:
             yield f"{path / name}: missing"
-        elif sha256(path / name) != digest:
+        elif not (path / name).is_symlink() and sha256(path / name) != digest:
             yield f"{path / name}: altered (checksum differs from the manifest)"
 
 

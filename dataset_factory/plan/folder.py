@@ -22,6 +22,9 @@ def open_folder(job: Job) -> bool:
         RfgsError: The folder holds something else, or a dataset with other settings.
     """
     file = job.out / "dataset.json"
+    links = [entry for entry in (file, job.work, job.out / "log") if entry.is_symlink()]
+    if links:
+        raise RfgsError(f"{links[0]}: a symbolic link; expected a file or folder of the dataset")
     if file.is_file():
         stored = read_dataset_info(file)
         made_with = {} if stored.manifest_sha256 else stored.versions

@@ -12,6 +12,7 @@ from plyfile import PlyData, PlyElement, PlyParseError
 
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.files import write_bytes
+from rfgs_core.links import refuse_link
 
 
 def write_mesh(
@@ -37,6 +38,7 @@ def read_mesh(
     Raises:
         RfgsFormatError: The file is missing, not a PLY, truncated or not made of triangles.
     """
+    refuse_link(path)
     try:
         ply = PlyData.read(str(path), known_list_len={"face": {"vertex_indices": 3}})
         vertex = ply["vertex"].data

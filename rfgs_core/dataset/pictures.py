@@ -13,6 +13,7 @@ from PIL import Image, UnidentifiedImageError
 
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.files import replacing, write_bytes
+from rfgs_core.links import refuse_link
 
 #: Larger pictures than this many pixels are taken for a decompression bomb.
 MAX_PIXELS = 64_000_000
@@ -64,6 +65,7 @@ def read_exr(path: Path) -> dict[str, Float32[np.ndarray, "h w"]]:
     """
     import OpenEXR
 
+    refuse_link(path)
     if not path.is_file():
         raise RfgsFormatError(f"{path}: no such picture; the dataset is incomplete")
     try:
@@ -81,6 +83,7 @@ def read_exr(path: Path) -> dict[str, Float32[np.ndarray, "h w"]]:
 
 
 def _read_png(path: Path, mode: str) -> np.ndarray:
+    refuse_link(path)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", Image.DecompressionBombWarning)

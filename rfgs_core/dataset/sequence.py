@@ -109,7 +109,7 @@ class Sequence:
 
         Values read this way are not checked against their digests; `Sequence.csi` does that.
         """
-        return open_csi(self.files.csi(self._radio(name)))
+        return open_csi(self.files.csi(self._radio(name)), self._sizes(name))
 
     def coordinates(self, name: str) -> xarray.Dataset:
         """Coordinates of a radio's channels alone; read once, as they are the same at all frames.
@@ -146,11 +146,10 @@ class Sequence:
             RfgsFormatError: The chunk is missing, truncated or altered.
         """
         index, store = self._index(frame), self.files.csi(self._radio(name))
+        links, counts = self._links(name), (self.radio_spec(name).samples_per_frame,)
         if impaired:
-            value = read_impaired(store, index)
-        else:
-            value = read_csi(store, index, self.files.csi_done(name, frame))
-        return self._fitting(name, value, frame, (self.radio_spec(name).samples_per_frame,))
+            return read_impaired(store, index, links, counts)
+        return read_csi(store, index, self.files.csi_done(name, frame), links, counts)
 
     def impairments(self, name: str) -> Impaired:
         """How the impaired channels came about: settings, draws and gains.
@@ -159,7 +158,7 @@ class Sequence:
             RfgsError: There is no such radio, or nothing was impaired.
             RfgsFormatError: What is stored is damaged.
         """
-        return read_draw(self.files.csi(self._radio(name)))
+        return read_draw(self.files.csi(self._radio(name)), self._sizes(name))
 
     def csi_static(self, name: str) -> Complex64[np.ndarray, "tx rx subcarrier"]:
         """Channel without anything that moves, checked against its digest.
@@ -177,8 +176,9 @@ class Sequence:
         Raises:
             RfgsFormatError: The chunk is missing, truncated or altered.
         """
-        value = read_csi(self.files.csi(self._radio(name)), None, self.files.csi_done(name, None))
-        return self._fitting(name, value, None, (1, self.radio_spec(name).samples_per_frame))
+        store, done = self.files.csi(self._radio(name)), self.files.csi_done(name, None)
+        counts = (1, self.radio_spec(name).samples_per_frame)
+        return read_csi(store, None, done, self._links(name), counts)
 
     def paths(self, name: str, frame: int) -> PathTable:
         """The paths behind `csi` of a frame, between centres of sites.
@@ -285,17 +285,24 @@ class Sequence:
             raise RfgsError(f"{self.path}: no camera {name!r}; it holds {', '.join(names)}")
         return name
 
-    def _fitting(
-        self, name: str, value: np.ndarray, frame: int | None, counts: tuple[int, ...]
-    ) -> np.ndarray:
-        """Refuses channels whose shape is not that of the radio with one of `counts` samples."""
-        shape = (*self.layout(name).measured.shape, self.radio_spec(name).num_subcarriers)
-        if value.shape[1:] != shape or len(value) not in counts:
-            raise RfgsFormatError(
-                f"{self.files.csi(name)}: frame {frame}: expected shape {(counts[-1], *shape)}, "
-                f"got {value.shape}"
-            )
-        return value
+    def _links(self, name: str) -> tuple[int, int, int]:
+        """Transmitting and receiving elements of a radio, and its subcarriers."""
+        tx, rx = self.layout(self._radio(name)).measured.shape
+        return tx, rx, self.radio_spec(name).num_subcarriers
+
+    def _sizes(self, name: str) -> dict[str, int]:
+        """How long the dimensions of a radio's store are."""
+        spec, place = self.radio_spec(name), self.layout(name)
+        tx, rx = place.measured.shape
+        devices = 1 + int(max(place.tx_device.max(), place.rx_device.max()))
+        return {
+            "time": len(self.frames) * spec.samples_per_frame,
+            "tx": tx,
+            "rx": rx,
+            "subcarrier": spec.num_subcarriers,
+            "sample": spec.samples_per_frame,
+            **dict.fromkeys(("device", "tx_unit", "rx_unit"), devices),
+        }
 
     def _geometry(self, frame: int) -> dict[str, np.ndarray]:
         self._index(frame)

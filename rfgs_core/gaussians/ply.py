@@ -18,6 +18,7 @@ from plyfile import PlyData, PlyElement, PlyParseError
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.files import replacing
 from rfgs_core.gaussians.model import FEATURE_DIM, Gaussians
+from rfgs_core.links import refuse_link
 
 #: Value of the zeroth spherical harmonic, 1 / (2 √π): rgb = 0.5 + SH_C0 · f_dc.
 SH_C0 = 0.28209479177387814
@@ -169,6 +170,7 @@ def read_ply(path: Path) -> GaussianCloud:
 
 
 def _vertex_table(path: Path) -> np.ndarray:
+    refuse_link(path)
     try:
         with path.open("rb") as stream:
             return PlyData.read(stream)["vertex"].data

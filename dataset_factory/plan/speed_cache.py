@@ -14,6 +14,7 @@ from typing import Any
 from dataset_factory.plan.contents import versions
 from dataset_factory.plan.disk import Space
 from dataset_factory.plan.job import Job
+from rfgs_core.cache import cache_folder
 from rfgs_core.files import read_json, write_json
 
 
@@ -45,5 +46,4 @@ def _file(job: Job) -> Path:
     machine = [platform.node(), platform.processor(), platform.machine(), os.cpu_count()]
     what = [plan, job.workers, job.scheduler, str(job.blender.program), versions(), machine]
     key = hashlib.sha256(json.dumps(what, sort_keys=True, default=str).encode()).hexdigest()
-    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return cache / "rfgs" / "speeds" / f"{key[:32]}.json"
+    return cache_folder("speeds") / f"{key[:32]}.json"

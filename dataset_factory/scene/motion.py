@@ -77,4 +77,4 @@ def read_velocity(bundle: Bundle, frame: int) -> np.ndarray:
     path = frame_file(bundle.path, frame)
     name, shape = "vertex_velocity", bundle.topology.rest_vertices.shape
     remedy = "export the scene again with --velocities"
-    return load_arrays(path, remedy, {name: shape}, others=False)[name].astype(np.float64)
+    return load_arrays(path, remedy, {name: shape})[name].astype(np.float64)

@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import io
+import struct
 import warnings
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +19,10 @@ from rfgs_core.links import refuse_link
 
 #: Larger pictures than this many pixels are taken for a decompression bomb.
 MAX_PIXELS = 64_000_000
+_EXR_DAMAGE = (
+    *(RuntimeError, ValueError, OSError, TypeError, KeyError, MemoryError, OverflowError),
+    *(AttributeError, IndexError),
+)
 
 
 def write_png(path: Path, pixels: UInt8[np.ndarray, "h w c"] | UInt16[np.ndarray, "h w"]) -> None:
@@ -61,7 +67,7 @@ def read_exr(path: Path) -> dict[str, Float32[np.ndarray, "h w"]]:
     """Reads every channel of an EXR file as float32.
 
     Raises:
-        RfgsFormatError: The file is missing, truncated or not an EXR.
+        RfgsFormatError: The file is missing, truncated, too large or not an EXR.
     """
     import OpenEXR
 
@@ -69,17 +75,48 @@ def read_exr(path: Path) -> dict[str, Float32[np.ndarray, "h w"]]:
     if not path.is_file():
         raise RfgsFormatError(f"{path}: no such picture; the dataset is incomplete")
     try:
+        _refuse_large(path, _exr_size(path))
         with OpenEXR.File(str(path), separate_channels=True) as file:
             stored = {
                 name: np.array(channel.pixels, np.float32)
                 for part in file.parts
                 for name, channel in part.channels.items()
             }
-    except (RuntimeError, ValueError, OSError) as error:
+    except RfgsFormatError:
+        raise
+    except _EXR_DAMAGE as error:
         raise RfgsFormatError(f"{path}: damaged or truncated EXR ({error})") from error
     if not stored:
         raise RfgsFormatError(f"{path}: EXR without channels")
     return stored
+
+
+def read_planes(path: Path, names: str) -> list[Float32[np.ndarray, "h w"]]:
+    """Reads channels of an EXR file by their names, a letter each; refused like `read_exr`."""
+    channels = read_exr(path)
+    missing = [name for name in names if name not in channels]
+    if missing:
+        found = ", ".join(channels)
+        raise RfgsFormatError(f"{path}: expected channel {missing[0]!r}, got {found}")
+    return [channels[name] for name in names]
+
+
+def _exr_size(path: Path) -> tuple[int, int]:
+    """Width and height that the header of an EXR file speaks of [px]."""
+    import OpenEXR
+
+    file = OpenEXR.InputFile(str(path))
+    try:
+        window = file.header()["dataWindow"]
+        return window.max.x - window.min.x + 1, window.max.y - window.min.y + 1
+    finally:
+        file.close()
+
+
+def _refuse_large(path: Path, size: tuple[int, int]) -> None:
+    """Refuses more pixels than any picture of ours has."""
+    if not (0 < size[0] and 0 < size[1] and size[0] * size[1] <= MAX_PIXELS):
+        raise RfgsFormatError(f"{path}: picture of {size} pixels is too large")
 
 
 def _read_png(path: Path, mode: str) -> np.ndarray:
@@ -87,17 +124,25 @@ def _read_png(path: Path, mode: str) -> np.ndarray:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", Image.DecompressionBombWarning)
-            with Image.open(path) as image:
-                if image.width * image.height > MAX_PIXELS:
-                    raise RfgsFormatError(f"{path}: picture of {image.size} pixels is too large")
+            # Other formats that Pillow knows are none of ours; some start programs.
+            with Image.open(path, formats=["PNG"]) as image:
+                _refuse_large(path, image.size)
                 return np.asarray(image.convert(mode) if mode else image)
     except FileNotFoundError as error:
         raise RfgsFormatError(f"{path}: no such picture; the dataset is incomplete") from error
+    except RfgsFormatError:
+        raise
     except (
         UnidentifiedImageError,
         Image.DecompressionBombWarning,
         Image.DecompressionBombError,
         SyntaxError,
         OSError,
+        EOFError,
+        MemoryError,
+        OverflowError,
+        ValueError,
+        zlib.error,
+        struct.error,
     ) as error:
         raise RfgsFormatError(f"{path}: damaged or truncated picture ({error})") from error

@@ -9,22 +9,32 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Complex64, Float32, Float64, Int32, UInt8, UInt16
 
-from rfgs_core.arrays import load_arrays
 from rfgs_core.dataset.csi_store import open_csi, read_csi
+from rfgs_core.dataset.geometry_store import (
+    read_geometry,
+    read_segment_velocity,
+    read_topology,
+)
 from rfgs_core.dataset.impaired_store import Impaired, read_draw, read_impaired
 from rfgs_core.dataset.mesh_ply import read_mesh
 from rfgs_core.dataset.names import SequenceFiles
 from rfgs_core.dataset.path_store import read_paths
-from rfgs_core.dataset.pictures import read_exr, read_png_rgba, read_png_u16
-from rfgs_core.dataset.schema import bounds_array, device_pose, radio_from_json, read_sequence_info
+from rfgs_core.dataset.pictures import read_planes, read_png_rgba, read_png_u16
+from rfgs_core.dataset.schema import (
+    bounds_array,
+    check_size,
+    device_pose,
+    radio_from_json,
+    read_sequence_info,
+)
+from rfgs_core.dataset.splits import refuse_beyond
+from rfgs_core.dataset.store_schema import store_sizes
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.radio import DevicePose, Layout, Radio, frame_samples, layout
 from rfgs_core.radio.path_table import PathTable
 
 if TYPE_CHECKING:
     import xarray
-
-_NO_GEOMETRY = "the geometry of this dataset is missing or damaged, make the dataset again"
 
 
 class Sequence:
@@ -61,6 +71,17 @@ class Sequence:
     def splits(self) -> dict[str, Any]:
         """What is held out of training."""
         return self.info.splits
+
+    def held_out(self, radio: str) -> dict[str, Any]:
+        """What is held out of a radio's training, as `splits.radio_split` chooses it.
+
+        Raises:
+            RfgsError: There is no such radio.
+            RfgsFormatError: It names elements, subcarriers or devices that the radio has not.
+        """
+        split = self.splits["rf"][self._radio(radio)]
+        refuse_beyond(f"{self.files.info}: splits.rf.{radio}", split, self._sizes(radio))
+        return split
 
     @property
     def instances(self) -> list[dict[str, Any]]:
@@ -102,7 +123,9 @@ class Sequence:
 
     def layout(self, name: str, sample: int = 0) -> Layout:
         """Every antenna element of the radio, at one of a frame's samples where they move."""
-        return layout(self.radio_spec(name), self.devices(name), sample)
+        spec, devices = self.radio_spec(name), self.devices(name)
+        check_size(self.files.info, spec, 1 if spec.antennas_move else len(devices))
+        return layout(spec, devices, sample)
 
     def radio(self, name: str) -> xarray.Dataset:
         """Channels of a radio with their coordinates, read when used.
@@ -202,8 +225,7 @@ class Sequence:
         Int32[np.ndarray, "face"],
     ]:
         """Vertices [m], triangles and instance id per triangle of what moves."""
-        shapes = {"faces": ("face", 3), "instance": ("face",)}
-        topology = load_arrays(self.files.topology, _NO_GEOMETRY, shapes)
+        topology = read_topology(self.files.topology)
         vertices = self._geometry(frame)["vertices"]
         faces = topology["faces"]
         if faces.size and not 0 <= faces.min() <= faces.max() < len(vertices):
@@ -227,10 +249,8 @@ class Sequence:
         A segment is the skin that follows a joint of `rfgs_core.skeleton` (`segment` of the
         topology); one without skin of its own has the velocity of the joint.
         """
-        file = self.files.geometry(frame)
         self._index(frame)
-        name = "segment_velocity"
-        return load_arrays(file, _NO_GEOMETRY, {name: ("person", 17, 3)}, unknown=(name,))[name]
+        return read_segment_velocity(self.files.geometry(frame))
 
     def people(self, frame: int) -> Int32[np.ndarray, "person"]:
         """Instance id of each person, in the order of `joints`."""
@@ -252,13 +272,12 @@ class Sequence:
     def depth(self, camera: str, frame: int) -> Float32[np.ndarray, "h w"]:
         """Planar depth [m], +inf where nothing was hit."""
         self._index(frame)
-        return _plane(self.files.depth(self._camera(camera), frame), "Z")
+        return read_planes(self.files.depth(self._camera(camera), frame), "Z")[0]
 
     def normal(self, camera: str, frame: int) -> Float32[np.ndarray, "h w 3"]:
         """World normals, zero where nothing was hit."""
         self._index(frame)
-        file = self.files.normal(self._camera(camera), frame)
-        return np.stack([_plane(file, axis) for axis in "XYZ"], axis=-1)
+        return np.stack(read_planes(self.files.normal(self._camera(camera), frame), "XYZ"), axis=-1)
 
     def mask(self, camera: str, frame: int) -> UInt16[np.ndarray, "h w"]:
         """Instance id of each pixel, 0 for everything static."""
@@ -292,26 +311,8 @@ class Sequence:
 
     def _sizes(self, name: str) -> dict[str, int]:
         """How long the dimensions of a radio's store are."""
-        spec, place = self.radio_spec(name), self.layout(name)
-        tx, rx = place.measured.shape
-        devices = 1 + int(max(place.tx_device.max(), place.rx_device.max()))
-        return {
-            "time": len(self.frames) * spec.samples_per_frame,
-            "tx": tx,
-            "rx": rx,
-            "subcarrier": spec.num_subcarriers,
-            "sample": spec.samples_per_frame,
-            **dict.fromkeys(("device", "tx_unit", "rx_unit"), devices),
-        }
+        return store_sizes(len(self.frames), self.radio_spec(name), self.layout(name))
 
     def _geometry(self, frame: int) -> dict[str, np.ndarray]:
         self._index(frame)
-        shapes = {"vertices": ("vertex", 3), "joints": ("person", 17, 3)}
-        return load_arrays(self.files.geometry(frame), _NO_GEOMETRY, shapes, unknown=("joints",))
-
-
-def _plane(path: Path, channel: str) -> Float32[np.ndarray, "h w"]:
-    channels = read_exr(path)
-    if channel not in channels:
-        raise RfgsFormatError(f"{path}: expected channel {channel!r}, got {', '.join(channels)}")
-    return channels[channel]
+        return read_geometry(self.files.geometry(frame))

@@ -17,6 +17,7 @@ import msgspec
 
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.links import refuse_link
+from rfgs_core.radio import Layout, Radio
 from rfgs_core.records import read_record
 
 #: A frame is one chunk, and the codec takes no larger one [bytes].
@@ -155,6 +156,20 @@ def check_store(path: Path, sizes: Mapping[str, int] | None = None) -> None:
             # Those are read here and now; a channel's chunk is looked at when it is read.
             for file in (path / name / "c").rglob("*"):
                 refuse_link(file)
+
+
+def store_sizes(frames: int, radio: Radio, layout: Layout) -> dict[str, int]:
+    """How long the dimensions of a radio's store are."""
+    tx, rx = layout.measured.shape
+    devices = 1 + int(max(layout.tx_device.max(), layout.rx_device.max()))
+    return {
+        "time": frames * radio.samples_per_frame,
+        "tx": tx,
+        "rx": rx,
+        "subcarrier": radio.num_subcarriers,
+        "sample": radio.samples_per_frame,
+        **dict.fromkeys(("device", "tx_unit", "rx_unit"), devices),
+    }
 
 
 def check_array(path: Path, name: str, lengths: dict[str, int] | None = None) -> Array:

@@ -123,7 +123,7 @@ class Scene:
         """
         sequence, name = run.sequence, run.config.radio
         radio, layout = sequence.radio_spec(name), sequence.layout(name)
-        held_out = HeldOut.of(sequence.splits["rf"][name], layout, radio.num_subcarriers)
+        held_out = HeldOut.of(sequence.held_out(name), layout, radio.num_subcarriers)
         grid = Grid.over(sequence.bounds_m)
         voxels = voxel_budget(sequence.instances)
         static = sequence.csi_static(name)

@@ -6,6 +6,7 @@ A mistake is one line: the file, the place in it, what is expected there, and wh
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 from typing import Any, TypeVar
@@ -19,13 +20,12 @@ from rfgs_core.files import read_json
 T = TypeVar("T")
 
 _WORDS = {
-    "`int`": "a whole number",
-    "`float`": "a number",
-    "`str`": "text",
-    "`bool`": "true or false",
-    "`null`": "null",
-    "`array`": "a list",
-    "`object`": "an object",
+    "int": "a whole number",
+    "float": "a number",
+    "str": "text",
+    "bool": "true or false",
+    "array": "a list",
+    "object": "an object",
 }
 #: Longest value that a message shows.
 _SHOWN = 60
@@ -51,13 +51,17 @@ def record(
         value: Objects, lists, numbers, texts, truths and null.
         kind: Any type that msgspec converts to, such as a dataclass.
         remedy: What to do about a mistake; empty for nothing.
-        lax: Take numbers in quotes, too.
+        lax: Take numbers in quotes, too, as long as they are finite.
 
     Raises:
         RfgsFormatError: The value is not of that type.
     """
     try:
-        return msgspec.convert(value, kind, strict=not lax)
+        found = msgspec.convert(value, kind, strict=not lax)
+        # JSON has finite numbers alone; texts may spell others.
+        problem = _strange(msgspec.to_builtins(found)) if lax else ""
+        if not problem:
+            return found
     except (msgspec.ValidationError, OverflowError) as error:
         problem = _problem(str(error), value, kind)
     raise RfgsFormatError(f"{source}: {problem}{f'; {remedy}' if remedy else ''}")
@@ -89,6 +93,15 @@ def _problem(said: str, value: object, kind: Any) -> str:
     return f"{before}expected {expected}, found {shown}"
 
 
+def _strange(value: object, place: str = "") -> str:
+    """Where a number is not finite, in words; empty if all are."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return f"{place}: expected a finite number, found {value}"
+    rows = value.items() if isinstance(value, dict) else ()
+    rows = enumerate(value) if isinstance(value, list | tuple) else rows
+    return next(filter(None, (_strange(part, place or str(key)) for key, part in rows)), "")
+
+
 _UNKNOWN = object()
 
 
@@ -105,10 +118,9 @@ def _found(value: Any, steps: list[str]) -> Any:
 
 
 def _spelt(expected: str) -> str:
-    """Msgspec's words for a type in ours."""
-    for word, ours in _WORDS.items():
-        expected = expected.replace(word, ours)
-    return expected.replace(" | ", " or ").replace("`", "")
+    """The words that msgspec has for a type in ours."""
+    kinds, _, more = expected.lstrip("`").partition("`")
+    return " or ".join(_WORDS.get(kind, kind) for kind in kinds.split(" | ")) + more
 
 
 def _shown(value: object) -> str:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -13,6 +12,7 @@ from dataset_factory.plan.contents import refuse_other_plan
 from dataset_factory.plan.job import Job
 from rfgs_core.dataset.schema import read_dataset_info
 from rfgs_core.errors import RfgsError
+from rfgs_core.locks import alone_in
 
 
 def open_folder(job: Job) -> bool:
@@ -54,11 +54,9 @@ def locked(job: Job) -> Iterator[None]:
     """
     made = [place for place in (job.out, *job.out.absolute().parents) if not place.exists()]
     job.work.mkdir(parents=True, exist_ok=True)
-    with (job.work / "lock").open("w") as stream:
-        try:
-            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            raise RfgsError(f"{job.out}: another rfgs-factory is working on it") from error
+    lock = job.work / "lock"
+    lock.touch()
+    with alone_in(lock, job.out, "rfgs-factory"):
         try:
             yield
         except RfgsError:

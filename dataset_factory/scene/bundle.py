@@ -9,11 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from dataset_factory.scene.room import Room, read_room
+from dataset_factory.scene.bundle_rows import BundleRows
+from dataset_factory.scene.room import Room, room_of_row
 from rfgs_core.arrays import load_arrays
 from rfgs_core.dataset.mesh_ply import read_mesh
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.files import inside, read_json
+from rfgs_core.records import record
 
 SCHEMA = "rfgs-bundle/1"
 NUM_JOINTS = 17
@@ -22,28 +24,6 @@ NUM_JOINTS = 17
 UNSAID, SMOOTH, SHARP = -1, 0, 1
 
 _FRAME_ARRAYS = ("vertices", "joints", "segment_velocity", "person_instance", "action")
-_FIELDS: dict[str, type | tuple[type, ...]] = {
-    "blend_name": str,
-    "blend_sha256": str,
-    "blender_version": str,
-    "fps": (int, float),
-    "frame_start": int,
-    "frame_end": int,
-    "frames": list,
-    "bounds_m": list,
-    "devices": list,
-    "cameras": list,
-    "materials": list,
-    "objects": list,
-    "instances": list,
-}
-_ROWS: dict[str, tuple[str, ...]] = {
-    "devices": ("name", "radio", "role", "position_m", "quat_wxyz"),
-    "cameras": ("name", "width", "height", "fl_x", "fl_y", "cx", "cy", "world_from_camera"),
-    "materials": ("name", "radio_material", "thickness_m", "scattering_coefficient"),
-    "objects": ("id", "name", "class", "instance", "moving", "files"),
-    "instances": ("id", "name", "class", "person"),
-}
 
 
 @dataclass(frozen=True)
@@ -231,7 +211,7 @@ def read_bundle(path: Path) -> Bundle:
     info = read_json(file)
     _check_info(file, info)
     bounds = np.asarray(info["bounds_m"], dtype=np.float64)
-    if bounds.shape != (2, 3) or not np.isfinite(bounds).all() or (bounds[1] < bounds[0]).any():
+    if (bounds[1] < bounds[0]).any():
         raise RfgsFormatError(f"{file}: bounds_m: expected [[min xyz], [max xyz]], got {bounds}")
     topology = _read_topology(path / "topology.npz", info)
     return Bundle(
@@ -246,7 +226,7 @@ def read_bundle(path: Path) -> Bundle:
         bounds_m=bounds,
         frames=[int(frame) for frame in info["frames"]],
         fps=float(info["fps"]),
-        room=read_room(file, info.get("room")),
+        room=room_of_row(info.get("room")),
     )
 
 
@@ -263,19 +243,10 @@ def read_arrays(
 
 
 def _check_info(file: Path, info: Any) -> None:
-    schema = info.get("schema") if isinstance(info, dict) else None
-    if schema != SCHEMA:
-        raise RfgsFormatError(f"{file}: expected schema {SCHEMA!r}, got {schema!r}")
-    for name, kind in _FIELDS.items():
-        if not isinstance(info.get(name), kind):
-            raise RfgsFormatError(f"{file}: field {name!r} is missing or of the wrong type")
-    for table, columns in _ROWS.items():
-        for index, row in enumerate(info[table]):
-            missing = [column for column in columns if column not in row]
-            if missing:
-                raise RfgsFormatError(f"{file}: {table}[{index}] lacks {', '.join(missing)}")
-    if info["fps"] <= 0 or not info["frames"]:
-        raise RfgsFormatError(f"{file}: expected fps > 0 and at least one frame")
+    value = record(file, info, dict[str, Any])
+    if value.get("schema") != SCHEMA:
+        raise RfgsFormatError(f"{file}: expected schema {SCHEMA!r}, got {value.get('schema')!r}")
+    record(file, value, BundleRows)
 
 
 def _read_topology(path: Path, info: dict[str, Any]) -> Topology:

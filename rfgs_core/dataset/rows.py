@@ -18,23 +18,28 @@ MOST_PIXELS = 65_536
 
 _Count = Annotated[int, Meta(ge=0)]
 _Pixels = Annotated[int, Meta(ge=1, le=MOST_PIXELS)]
-_Positive = Annotated[float, Meta(gt=0.0)]
-_Triple = tuple[float, float, float]
+Positive = Annotated[float, Meta(gt=0.0)]
+Triple = tuple[float, float, float]
 _Quadruple = tuple[float, float, float, float]
-_Frame = Annotated[int, Meta(ge=-MOST_FRAMES, le=MOST_FRAMES)]
+Frame = Annotated[int, Meta(ge=-MOST_FRAMES, le=MOST_FRAMES)]
 
 
-class CameraRow(Struct):
+class CameraPose(Struct):
     """A camera: intrinsics [px] and pose."""
 
     name: str
     width: _Pixels
     height: _Pixels
-    fl_x: _Positive
-    fl_y: _Positive
+    fl_x: Positive
+    fl_y: Positive
     cx: float
     cy: float
     world_from_camera: tuple[_Quadruple, _Quadruple, _Quadruple, _Quadruple]
+
+
+class CameraRow(CameraPose, kw_only=True):
+    """A camera of a dataset."""
+
     split: Literal["train", "test"]
 
 
@@ -42,7 +47,7 @@ class DeviceRow(Struct):
     """A device and where it stands."""
 
     name: str
-    position_m: _Triple
+    position_m: Triple
     quat_wxyz: _Quadruple
     role: Role = "ACCESS_POINT"
 
@@ -89,9 +94,9 @@ class Splits(Struct):
 class SequenceRows(Struct):
     """Parts of `sequence.json` that are checked more closely than their types say."""
 
-    frames: Annotated[list[_Frame], Meta(min_length=1)]
-    fps: _Positive
-    bounds_m: tuple[_Triple, _Triple]
+    frames: Annotated[list[Frame], Meta(min_length=1)]
+    fps: Positive
+    bounds_m: tuple[Triple, Triple]
     cameras: list[CameraRow]
     devices: dict[str, list[DeviceRow]]
     radios: dict[str, dict[str, Any]]

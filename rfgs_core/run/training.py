@@ -25,6 +25,8 @@ from rfgs_core.fit.frame import FrameState, start_frame
 from rfgs_core.fit.refine import need_sample_points
 from rfgs_core.fit.stages import fit_frame
 from rfgs_core.gaussians.ply import GaussianCloud, read_ply, write_ply
+from rfgs_core.links import refuse_link
+from rfgs_core.locks import alone_in
 from rfgs_core.measure.observations import need_still_antennas
 from rfgs_core.measure.offsets import Offsets
 from rfgs_core.run.calibration import (
@@ -90,18 +92,28 @@ def train_sequence(
     if encoder_file is not None:
         refuse_other_radios(encoder_file, sequence, radio, config.packets)
     bodies = sum(1 for row in sequence.instances if row["class"] == "person")
-    config = replace(config, bodies=max(bodies, 1))
-    run = _open_or_create(
-        out,
-        RunConfig(
-            dataset=relative_dataset(out, dataset.path),
-            dataset_fingerprint=dataset.fingerprint,
-            sequence=sequence.name,
-            radio=radio,
-            frames=frames,
-            settings=config,
-        ),
+    asked = RunConfig(
+        dataset=relative_dataset(out, dataset.path),
+        dataset_fingerprint=dataset.fingerprint,
+        sequence=sequence.name,
+        radio=radio,
+        frames=frames,
+        settings=replace(config, bodies=max(bodies, 1)),
     )
+    if out.exists() and not out.is_dir():
+        raise RfgsError(f"{out} is a file; expected a folder, choose another --out")
+    refuse_link(out / CONFIG_FILE)
+    out.mkdir(parents=True, exist_ok=True)
+    with alone_in(out, out, "rfgs train"):
+        # The file of a run does not keep every setting: the device is free.
+        return _train(_open_or_create(out, asked), asked.settings, sequence, encoder_file, log)
+
+
+def _train(
+    run: Run, config: TrainConfig, sequence: Sequence, encoder_file: Path | None, log: bool
+) -> Run:
+    """Fits what is missing of a run."""
+    out, radio = run.path, run.config.radio
     if encoder_file is not None and not (out / ENCODER_FILE).exists():
         keep_encoder(encoder_file, out)
     if config.background == "learned" and not (out / BACKGROUND_FILE).exists():
@@ -111,7 +123,7 @@ def train_sequence(
         begin = time.perf_counter()
         # Of a calibrated run the background has no offsets only once a frame is fitted.
         seed = sub_seed(config.seed, sequence.name, radio, "static set")
-        observations = run.observations(frames[0])
+        observations = run.observations(run.frames[0])
         with one_torch_thread():
             write_static_set(out, fit_static_set(observations, config.static_set, seed))
         spent += time.perf_counter() - begin
@@ -221,10 +233,8 @@ def _calibrate(run: Run, frame: int, config: TrainConfig, seed: int) -> None:
 
 def _open_or_create(out: Path, config: RunConfig) -> Run:
     if not (out / CONFIG_FILE).exists():
-        if out.exists() and not out.is_dir():
-            raise RfgsError(f"{out} is a file; expected a folder, choose another --out")
         # Whoever starts a training from elsewhere keeps its log there.
-        if out.exists() and any(entry.name != "log" for entry in out.iterdir()):
+        if any(entry.name != "log" for entry in out.iterdir()):
             raise RfgsError(f"{out} is not empty and not a run; choose another --out")
         config.write(out)
         return Run(out, config)

@@ -19,7 +19,7 @@ from rfgs_core.dataset.csi_store import chunk_file
 from rfgs_core.dataset.impaired_store import has_impaired, impaired_chunk
 from rfgs_core.dataset.schema import read_dataset_info
 from rfgs_core.dataset.writer import MANIFEST, listed_files, own_digest
-from rfgs_core.errors import RfgsError
+from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.files import read_json, sha256
 from rfgs_core.links import symbolic_links
 from rfgs_core.radio import layout
@@ -99,10 +99,11 @@ def _manifest_faults(path: Path, manifest_sha256: str) -> Iterator[str]:
     if sha256(file) != manifest_sha256:
         yield f"{file}: differs from the digest in dataset.json"
         return
-    promised = {}
-    for line in file.read_text("utf-8").splitlines():
-        digest, _, name = line.partition("  ")
-        promised[name] = digest
+    try:
+        lines = file.read_text("utf-8").splitlines()
+    except UnicodeDecodeError as error:
+        raise RfgsFormatError(f"{file}: expected a digest and a name per line ({error})") from error
+    promised = {name: digest for digest, _, name in (line.partition("  ") for line in lines)}
     present = set(listed_files(path))
     yield from (f"{path / name}: not in the manifest" for name in sorted(present - set(promised)))
     for name, digest in tqdm(promised.items(), desc="checksums", unit="file"):

@@ -11,7 +11,7 @@ import numpy as np
 
 from dataset_factory.scene.bundle_rows import BundleRows
 from dataset_factory.scene.room import Room, room_of_row
-from rfgs_core.arrays import load_arrays
+from rfgs_core.arrays import Shape, load_arrays
 from rfgs_core.dataset.mesh_ply import read_mesh
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.files import inside, read_json
@@ -23,7 +23,27 @@ NUM_JOINTS = 17
 #: it, that the surface has an edge there.
 UNSAID, SMOOTH, SHARP = -1, 0, 1
 
-_FRAME_ARRAYS = ("vertices", "joints", "segment_velocity", "person_instance", "action")
+_REMEDY = "export the scene again"
+_FRAME: dict[str, Shape | None] = {
+    "vertices": ("vertex", 3),
+    "joints": ("person", NUM_JOINTS, 3),
+    "segment_velocity": ("person", NUM_JOINTS, 3),
+    "person_instance": ("person",),
+    "action": None,
+}
+_TOPOLOGY: dict[str, Shape | None] = {
+    "faces": ("face", 3),
+    "material": ("face",),
+    "instance": ("face",),
+    "segment": ("face",),
+    "rest_vertices": ("vertex", 3),
+}
+_TYPES = {
+    **dict.fromkeys(("vertices", "rest_vertices", "joints", "segment_velocity"), "f4 f8"),
+    **dict.fromkeys(("faces", "material", "instance", "segment", "person_instance"), "i4 i8"),
+    "edges": "i1",
+    "action": "U",
+}
 
 
 @dataclass(frozen=True)
@@ -119,21 +139,16 @@ class Bundle:
             RfgsFormatError: The file is missing, damaged or does not fit the topology.
         """
         path = frame_file(self.path, frame)
-        arrays = read_arrays(path, _FRAME_ARRAYS)
-        vertices = arrays["vertices"]
+        unknown = ("joints", "segment_velocity")
+        arrays = load_arrays(path, _REMEDY, _FRAME, unknown, types=_TYPES)
+        vertices, people = arrays["vertices"], len(arrays["person_instance"])
         _expect(path, "vertices", vertices, self.topology.rest_vertices.shape)
-        people = len(arrays["person_instance"])
-        labels = {name: arrays[name] for name in ("joints", "segment_velocity")}
-        for name, values in labels.items():
-            known = np.where(unknown_joints(values)[:, None, None], 0.0, values)
-            _expect(path, name, known, (people, NUM_JOINTS, 3))
-        joints, velocity = (values.astype(np.float32) for values in labels.values())
         _expect(path, "action", arrays["action"], (people,))
         return BundleFrame(
             frame=frame,
             vertices=vertices.astype(np.float32),
-            joints=joints,
-            segment_velocity=velocity,
+            joints=arrays["joints"].astype(np.float32),
+            segment_velocity=arrays["segment_velocity"].astype(np.float32),
             person_instance=arrays["person_instance"].astype(np.int32),
             action=arrays["action"].astype(str),
         )
@@ -230,18 +245,6 @@ def read_bundle(path: Path) -> Bundle:
     )
 
 
-def read_arrays(
-    path: Path, names: tuple[str, ...], *, others: bool = False
-) -> dict[str, np.ndarray]:
-    """Reads named arrays of a bundle's `.npz` file, and no others unless asked to.
-
-    Raises:
-        RfgsError: There is no such file.
-        RfgsFormatError: The file is damaged or lacks an array.
-    """
-    return load_arrays(path, "export the scene again", dict.fromkeys(names), others=others)
-
-
 def _check_info(file: Path, info: Any) -> None:
     value = record(file, info, dict[str, Any])
     if value.get("schema") != SCHEMA:
@@ -250,18 +253,13 @@ def _check_info(file: Path, info: Any) -> None:
 
 
 def _read_topology(path: Path, info: dict[str, Any]) -> Topology:
-    names = ("faces", "material", "instance", "segment", "rest_vertices")
-    arrays = read_arrays(path, names, others=True)
+    arrays = load_arrays(path, _REMEDY, _TOPOLOGY, types=_TYPES, others=True)
     faces, vertices = arrays["faces"], arrays["rest_vertices"]
     # Bundles of earlier versions say nothing of edges.
     edges = arrays.get("edges", np.full((len(faces), 3), UNSAID))
     _expect(path, "edges", edges, (len(faces), 3))
     if not np.isin(edges, (UNSAID, SMOOTH, SHARP)).all():
         raise RfgsFormatError(f"{path}: edges: expected {UNSAID}, {SMOOTH} or {SHARP}")
-    _expect(path, "faces", faces, (len(faces), 3))
-    _expect(path, "rest_vertices", vertices, (len(vertices), 3))
-    for name in ("material", "instance", "segment"):
-        _expect(path, name, arrays[name], (len(faces),))
     instances = {row["id"] for row in info["instances"]}
     limits = {"faces": len(vertices), "material": len(info["materials"])}
     for name, limit in limits.items():
@@ -283,5 +281,3 @@ def _read_topology(path: Path, info: dict[str, Any]) -> Topology:
 def _expect(path: Path, name: str, array: np.ndarray, shape: tuple[int, ...]) -> None:
     if array.shape != shape:
         raise RfgsFormatError(f"{path}: {name}: expected shape {shape}, got {array.shape}")
-    if array.dtype.kind == "f" and not np.isfinite(array).all():
-        raise RfgsFormatError(f"{path}: {name}: expected finite numbers")

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from whole_metrics import whole_metrics
 
 from rfgs_core.cli.calls import call
 from rfgs_core.cli.study import StudyArgs, run
 from rfgs_core.errors import RfgsError
-from rfgs_core.evaluate.metrics import SCHEMA
 from rfgs_core.files import write_json
 from rfgs_core.study import CONDITIONS, RADIOS, SCENES, Case, cases, study_table, summarise
 
@@ -42,18 +42,6 @@ def metrics(f10: float, **changes: float) -> dict[str, Any]:
         "gaussians_alone": baseline(None, 1.0, device_gain_mae_db=0.5, delay_profile_corr=0.9),
     }
     return {"geometry": geometry, "people": people, "rf": rf, "baselines": baselines}
-
-
-def whole(metrics: dict[str, Any]) -> dict[str, Any]:
-    """Metrics with everything else that their file holds."""
-    none: dict[str, Any] = {"rf_csi": {}, "image": {}}
-    rows = {name: {**row, **none} for name, row in metrics["baselines"].items()}
-    rest = {key: {} for key in ("conditions", "hardware", "versions", "reasons")}
-    return {
-        "schema": SCHEMA, **metrics, **none, **rest, "baselines": rows, "frames": [],
-        "background": None, "limits": {"range_resolution_m": 0.9, "cross_range_m": 1.6},
-        "trace_depth": 3, "n_gaussians": 40, "train_s": 1.0, "date": "", "verdicts": [],
-    }  # fmt: skip
 
 
 def test_every_case_once_and_seeds_share_a_dataset() -> None:
@@ -148,7 +136,7 @@ def test_a_case_that_fails_is_named_and_the_others_go_on(
     damaged, finished = (Case("two_crossing", "clean", radio, 0) for radio in ("wifi", "mmwave"))
     write_json(tmp_path / damaged.dataset / "dataset.json", {})
     write_json(tmp_path / finished.run / "config.json", {})
-    write_json(tmp_path / finished.run / "metrics.json", whole(metrics(0.8)))
+    write_json(tmp_path / finished.run / "metrics.json", whole_metrics(metrics(0.8)))
     assert run(StudyArgs(tmp_path, ("two_crossing",), ("clean",), ("wifi", "mmwave"), 1)) == 1
     text = (tmp_path / "study.md").read_text()
     assert text in capsys.readouterr().out

@@ -88,6 +88,15 @@ def refuse_place(path: Path) -> None:
         ) from error
 
 
+def sweep(folder: Path, *patterns: str) -> None:
+    """Removes what a killed program has left half-written below a folder; no link is followed."""
+    for entry in [entry for pattern in patterns for entry in folder.rglob(pattern)]:
+        if entry.is_dir() and not entry.is_symlink():
+            shutil.rmtree(entry)
+        else:
+            entry.unlink(missing_ok=True)
+
+
 def write_bytes(path: Path, data: bytes) -> None:
     """Writes `data` to `path` in one step."""
     with replacing(path) as temporary:

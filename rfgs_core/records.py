@@ -6,6 +6,7 @@ A mistake is one line: the file, the place in it, what is expected there, and wh
 
 from __future__ import annotations
 
+import functools
 import math
 import re
 from pathlib import Path
@@ -69,10 +70,15 @@ def record(
 
 def unknown_fields(value: object, kind: Any) -> list[str]:
     """Names in a JSON object that a dataclass or struct has no field of."""
-    known = {field.encode_name for field in _fields(inspect.type_info(kind))}
+    known = _names(kind)
     return (
         sorted(str(name) for name in value if name not in known) if isinstance(value, dict) else []
     )
+
+
+@functools.cache
+def _names(kind: Any) -> frozenset[str]:
+    return frozenset(field.encode_name for field in _fields(inspect.type_info(kind)))
 
 
 def _problem(said: str, value: object, kind: Any) -> str:

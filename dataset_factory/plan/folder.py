@@ -73,12 +73,3 @@ def _take_back(job: Job, made: list[Path]) -> None:
         # Where somebody else keeps something it stays.
         with suppress(OSError):
             place.rmdir()
-
-
-def sweep(out: Path) -> None:
-    """Removes half-written files that a killed run left behind."""
-    for entry in [*out.rglob(".tmp-*"), *out.rglob("*.partial")]:
-        if entry.is_dir():
-            shutil.rmtree(entry)
-        else:
-            entry.unlink(missing_ok=True)

@@ -20,6 +20,7 @@ from rfgs_core.background.static_set import fit_static_set
 from rfgs_core.dataset import Dataset, Sequence
 from rfgs_core.device import need_device
 from rfgs_core.errors import RfgsError
+from rfgs_core.files import sweep
 from rfgs_core.fit.calibrate import calibrate
 from rfgs_core.fit.frame import FrameState, start_frame
 from rfgs_core.fit.refine import need_sample_points
@@ -105,6 +106,7 @@ def train_sequence(
     refuse_link(out / CONFIG_FILE)
     out.mkdir(parents=True, exist_ok=True)
     with alone_in(out, out, "rfgs train"):
+        sweep(out, ".tmp-*")
         # The file of a run does not keep every setting: the device is free.
         return _train(_open_or_create(out, asked), asked.settings, sequence, encoder_file, log)
 

@@ -96,17 +96,10 @@ def text_of(data: bytes, state: random.Random) -> bytes:
     lines = data.decode().splitlines()
     index = state.randrange(len(lines))
     name, colon, old = lines[index].partition(":")
-    strange = state.choice(
-        (*map(str, STRANGE[:27]), *RAW, "&a [*a]", "!!python/object:os.system x")
-    )
-    lines[index] = state.choice(
-        (
-            f"{name}{colon} {strange}",
-            f"{strange}{colon}{old}",
-            "",
-            f"{lines[index]}\n{lines[index]}",
-        )
-    )
+    code = "!!python/object:os.system x"
+    strange = state.choice((*map(str, STRANGE[:27]), *RAW, "&a [*a]", code))
+    twice = f"{lines[index]}\n{lines[index]}"
+    lines[index] = state.choice((f"{name}{colon} {strange}", f"{strange}{colon}{old}", "", twice))
     return "\n".join(lines).encode()
 
 
@@ -175,9 +168,8 @@ def _flagged(data: bytes, state: random.Random) -> bytes:
     changed = bytearray(data)
     at = changed.rfind(b"PK\x01\x02")
     field = state.choice((8, 10, 20, 24, 42))
-    changed[at + field : at + field + 2] = state.choice(
-        (b"\1\0", b"\x0e\0", b"\x0c\0", b"\xff\xff")
-    )
+    other = state.choice((b"\1\0", b"\x0e\0", b"\x0c\0", b"\xff\xff"))
+    changed[at + field : at + field + 2] = other
     return bytes(changed)
 
 

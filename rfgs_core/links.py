@@ -7,7 +7,7 @@ Both kinds of folder are handed around, so what lies in them may come from anywh
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 from rfgs_core.errors import RfgsFormatError
@@ -43,9 +43,16 @@ def refuse_link(path: Path | str) -> None:
         folder = os.path.dirname(folder)
 
 
-def symbolic_links(folder: Path) -> Iterator[Path]:
-    """Every symbolic link below a folder; none is followed."""
+def symbolic_links(folder: Path, without: Collection[str] = ()) -> Iterator[Path]:
+    """Every symbolic link below a folder; none is followed.
+
+    Args:
+        folder: Where to look.
+        without: Names of folders in it that are not looked into.
+    """
     for place, folders, files in os.walk(folder, followlinks=False):
+        if place == str(folder):
+            folders[:] = [name for name in folders if name not in without]
         for name in sorted([*folders, *files]):
             if os.path.islink(os.path.join(place, name)):
                 yield Path(place, name)

@@ -16,9 +16,10 @@ from typing import Annotated, Any, Literal
 import msgspec
 
 from rfgs_core.errors import RfgsFormatError
-from rfgs_core.links import refuse_link
+from rfgs_core.files import read_json
+from rfgs_core.links import refuse_link, symbolic_links
 from rfgs_core.radio import Layout, Radio
-from rfgs_core.records import read_record
+from rfgs_core.records import read_record, record
 
 #: A frame is one chunk, and the codec takes no larger one [bytes].
 LARGEST_CHUNK_BYTES = 2**31 - 2**20
@@ -150,12 +151,12 @@ def check_store(path: Path, sizes: Mapping[str, int] | None = None) -> None:
         found = "; ".join(f"{', '.join(sorted(names))} {word}" for word, names in words if names)
         raise RfgsFormatError(f"{path}: expected the arrays of a radio, found {found}")
     lengths = dict(sizes or {})
+    # Everything else is read here and now; a channel's chunk is looked at when it is read.
+    channels = [name for name, (kind, _) in _ARRAYS.items() if kind == "complex64"]
+    for link in symbolic_links(path, channels):
+        refuse_link(link)
     for name in sorted(known):
-        array = check_array(path, name, lengths)
-        if array.data_type != "complex64":
-            # Those are read here and now; a channel's chunk is looked at when it is read.
-            for file in (path / name / "c").rglob("*"):
-                refuse_link(file)
+        check_array(path, name, lengths, links_known=name not in channels)
 
 
 def store_sizes(frames: int, radio: Radio, layout: Layout) -> dict[str, int]:
@@ -172,20 +173,23 @@ def store_sizes(frames: int, radio: Radio, layout: Layout) -> dict[str, int]:
     }
 
 
-def check_array(path: Path, name: str, lengths: dict[str, int] | None = None) -> Array:
+def check_array(
+    path: Path, name: str, lengths: dict[str, int] | None = None, *, links_known: bool = False
+) -> Array:
     """What `zarr.json` says of an array, compared with the schema.
 
     Args:
         path: Folder of the store.
         name: Which array.
         lengths: How long dimensions are; those that are not known yet are added.
+        links_known: Whether it has been seen already that no link leads out of its folder.
 
     Raises:
         RfgsError: There is no such array.
         RfgsFormatError: It is of another type, shape or codec than the schema says.
     """
     file = path / name / "zarr.json"
-    array = read_record(file, Array)
+    array = record(file, read_json(file, links_known=links_known), Array)
     kind, dimensions = _ARRAYS[name]
     if array.data_type != kind or tuple(array.dimension_names) not in dimensions:
         raise RfgsFormatError(

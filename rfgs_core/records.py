@@ -95,7 +95,8 @@ def _problem(said: str, value: object, kind: Any) -> str:
     found = _found(value, steps)
     wanted = re.fullmatch(r"Expected (.*?)(?:, got (.*))?", text)
     expected = _spelt(wanted[1]) if wanted else _choices(kind, steps) or text
-    shown = _shown(found) if found is not _UNKNOWN else (wanted and wanted[2]) or "something else"
+    told = _spelt(wanted[2]) if wanted and wanted[2] else "something else"
+    shown = _shown(found) if found is not _UNKNOWN else told
     return f"{before}expected {expected}, found {shown}"
 
 

@@ -56,6 +56,13 @@ class RoomRow(Struct):
     seen_m: list[Triple]
 
 
+class Poses(Struct):
+    """Times after each frame at which poses are kept [s]."""
+
+    span_s: float
+    offset_s: list[float]
+
+
 class BundleRows(Struct):
     """All of `bundle.json` that is read."""
 
@@ -73,3 +80,4 @@ class BundleRows(Struct):
     objects: list[SceneObject]
     instances: list[Instance]
     room: RoomRow | None = None
+    poses: list[Poses] = []

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Attacks formats in a process of its own: `attack.py FOLDER COUNT SEED [FORMAT…]` writes JSON."""
+"""Attacks formats in a process of its own: `attack.py FOLDER COUNT SEED [FORMAT…]` writes JSON.
+
+`add-on` in place of formats attacks what the add-on reads, which takes bpy.
+"""
 
 from __future__ import annotations
 
@@ -75,19 +78,27 @@ def _outcome(form: Format, expected: str) -> tuple[str, str]:
         if form.dataset is None or form.name.endswith("manifest"):
             return "plausible", ""
         return ("found", "") if checksum_faults(form.dataset) else ("unnoticed", "")
-    except RfgsError as error:
+    except Exception as error:
+        if not isinstance(error, RfgsError) and type(error).__name__ != "AddonError":
+            return "crash", traceback.format_exc()[-900:]
         text = str(error)
         return ("refused", "") if "\n" not in text and len(text) < 1500 else ("long", text)
     except Hang:
         return "hang", traceback.format_exc()[-600:]
-    except BaseException:
-        return "crash", traceback.format_exc()[-900:]
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
 
 
 def _hang(*_: Any) -> NoReturn:
     raise Hang
+
+
+def _formats(folder: Path, names: list[str]) -> list[Format]:
+    if names != ["add-on"]:
+        return make_all(folder)
+    from addon_formats import make_addon
+
+    return make_addon(folder)
 
 
 def main() -> None:
@@ -97,10 +108,10 @@ def main() -> None:
     warnings.simplefilter("ignore")
     result = {}
     with contextlib.redirect_stderr(io.StringIO()):
-        formats = make_all(Path(folder))
+        formats = _formats(Path(folder), names)
         before = {file for file in Path(folder).parent.rglob("*") if file.is_file()}
         for form in formats:
-            if not names or form.name in names:
+            if not names or names == ["add-on"] or form.name in names:
                 result[form.name] = attack(form, int(count), int(seed))
         after = {file for file in Path(folder).parent.rglob("*") if file.is_file()}
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20

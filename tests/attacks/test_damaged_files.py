@@ -17,9 +17,9 @@ PROGRAM = Path(__file__).with_name("attack.py")
 PEAK_GIB = 1.5
 
 
-def attacked(folder: Path, count: int, seed: int, limit_s: float) -> dict[str, Any]:
+def attacked(folder: Path, count: int, seed: int, limit_s: float, *names: str) -> dict[str, Any]:
     done = subprocess.run(
-        [sys.executable, str(PROGRAM), str(folder / "here"), str(count), str(seed)],
+        [sys.executable, str(PROGRAM), str(folder / "here"), str(count), str(seed), *names],
         capture_output=True,
         text=True,
         timeout=limit_s,
@@ -46,6 +46,12 @@ def check(result: dict[str, Any], count: int) -> None:
 
 def test_some_damage_to_every_format(tmp_path: Path) -> None:
     check(attacked(tmp_path, 8, 1, 300.0), 8)
+
+
+@pytest.mark.parametrize("count", [20, pytest.param(300, marks=pytest.mark.slow)])
+def test_damage_to_what_the_add_on_reads(tmp_path: Path, count: int) -> None:
+    pytest.importorskip("bpy")
+    check(attacked(tmp_path, count, 3, 600.0, "add-on"), count)
 
 
 @pytest.mark.slow

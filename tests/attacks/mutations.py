@@ -198,7 +198,8 @@ def _reshaped(data: bytes, state: random.Random) -> bytes:
     value = np.load(io.BytesIO(data), allow_pickle=False)
     kind = state.randrange(6)
     if kind == 0:
-        value = value.astype(state.choice(("c16", "f2", "i1", "U3", "f8", "?", ">f4")))
+        kinds = ("U3", "S2") if value.dtype.kind == "U" else ("c16", "f2", "i1", "U3", "?", ">f4")
+        value = value.astype(state.choice(kinds))
     elif kind == 1 and value.ndim:
         value = np.concatenate([value, value[:1]])
     elif kind == 2 and value.ndim:

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float, Float32, UInt8, UInt16
 from PIL import Image, UnidentifiedImageError
 
+from rfgs_core.dataset.exr import decode_exr
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.files import replacing, write_bytes
 from rfgs_core.links import refuse_link
@@ -21,7 +22,7 @@ from rfgs_core.links import refuse_link
 MAX_PIXELS = 64_000_000
 _EXR_DAMAGE = (
     *(RuntimeError, ValueError, OSError, TypeError, KeyError, MemoryError, OverflowError),
-    *(AttributeError, IndexError),
+    *(AttributeError, IndexError, struct.error, zlib.error),
 )
 
 
@@ -64,10 +65,13 @@ def write_exr(path: Path, channels: dict[str, Float[np.ndarray, "h w"]]) -> None
 
 
 def read_exr(path: Path) -> dict[str, Float32[np.ndarray, "h w"]]:
-    """Reads every channel of an EXR file as float32.
+    """Reads every channel of an EXR file as float32, of any kind, as Blender writes them.
+
+    Only for files that a program of ours has just made: a damaged header ends the library, and the
+    process with it. Those of a dataset are for `read_planes`.
 
     Raises:
-        RfgsFormatError: The file is missing, truncated, too large or not an EXR.
+        RfgsFormatError: The file is missing, truncated or not an EXR.
     """
     import OpenEXR
 
@@ -75,15 +79,12 @@ def read_exr(path: Path) -> dict[str, Float32[np.ndarray, "h w"]]:
     if not path.is_file():
         raise RfgsFormatError(f"{path}: no such picture; the dataset is incomplete")
     try:
-        _refuse_large(path, _exr_size(path))
         with OpenEXR.File(str(path), separate_channels=True) as file:
             stored = {
                 name: np.array(channel.pixels, np.float32)
                 for part in file.parts
                 for name, channel in part.channels.items()
             }
-    except RfgsFormatError:
-        raise
     except _EXR_DAMAGE as error:
         raise RfgsFormatError(f"{path}: damaged or truncated EXR ({error})") from error
     if not stored:
@@ -92,25 +93,23 @@ def read_exr(path: Path) -> dict[str, Float32[np.ndarray, "h w"]]:
 
 
 def read_planes(path: Path, names: str) -> list[Float32[np.ndarray, "h w"]]:
-    """Reads channels of an EXR file by their names, a letter each; refused like `read_exr`."""
-    channels = read_exr(path)
+    """Reads channels of an EXR file of a dataset, by their names, a letter each.
+
+    Raises:
+        RfgsFormatError: The file is missing, truncated, too large or not such an EXR.
+    """
+    refuse_link(path)
+    try:
+        channels = decode_exr(path.read_bytes(), MAX_PIXELS)
+    except FileNotFoundError as error:
+        raise RfgsFormatError(f"{path}: no such picture; the dataset is incomplete") from error
+    except _EXR_DAMAGE as error:
+        raise RfgsFormatError(f"{path}: damaged or truncated EXR ({error})") from error
     missing = [name for name in names if name not in channels]
     if missing:
         found = ", ".join(channels)
         raise RfgsFormatError(f"{path}: expected channel {missing[0]!r}, got {found}")
     return [channels[name] for name in names]
-
-
-def _exr_size(path: Path) -> tuple[int, int]:
-    """Width and height that the header of an EXR file speaks of [px]."""
-    import OpenEXR
-
-    file = OpenEXR.InputFile(str(path))
-    try:
-        window = file.header()["dataWindow"]
-        return window.max.x - window.min.x + 1, window.max.y - window.min.y + 1
-    finally:
-        file.close()
 
 
 def _refuse_large(path: Path, size: tuple[int, int]) -> None:

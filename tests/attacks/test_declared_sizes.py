@@ -16,7 +16,7 @@ import pytest
 
 from rfgs_core.arrays import load_arrays
 from rfgs_core.dataset import open_dataset
-from rfgs_core.dataset.pictures import read_exr, write_exr
+from rfgs_core.dataset.pictures import read_planes, write_exr
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.gaussians.ply import read_ply
 from rfgs_core.radio.files import read_radio
@@ -82,4 +82,4 @@ def test_the_window_of_an_exr(tmp_path: Path) -> None:
     window, data = struct.pack("<4i", 0, 0, 3, 3), file.read_bytes()
     file.write_bytes(data.replace(window, struct.pack("<4i", 0, 0, 99_999, 99_999)))
     with pytest.raises(RfgsFormatError, match="too large"):
-        read_exr(file)
+        read_planes(file, "Z")

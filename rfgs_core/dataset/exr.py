@@ -71,7 +71,9 @@ def _chunk(data: bytes, offset: int, line: int, size: int, zipped: bool) -> byte
         return packed
     unpacker = zlib.decompressobj()
     plain = unpacker.decompress(packed, size) if zipped else b""
-    if len(plain) != size:
+    # Only now does it look at the checksum behind.
+    plain += unpacker.decompress(unpacker.unconsumed_tail, 1) if zipped else b""
+    if len(plain) != size or not unpacker.eof:
         raise ValueError(f"the chunk of line {line} holds {len(plain)} bytes, expected {size}")
     # Differences of neighbours around 128; then bytes of even places before those of odd ones.
     steps = np.frombuffer(plain, np.uint8).astype(np.uint64)

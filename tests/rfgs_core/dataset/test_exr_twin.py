@@ -31,7 +31,7 @@ def test_both_readers_give_the_same_values(kind: type, shape: tuple, tmp_path: P
 
 def test_every_damaged_byte_is_refused_or_read(tmp_path: Path) -> None:
     file = tmp_path / "a.exr"
-    write_exr(file, {"Z": np.random.default_rng(1).normal(size=(20, 9)).astype(np.float32)})
+    write_exr(file, {"Z": np.arange(20 * 90, dtype=np.float32).reshape(20, 90)})
     whole, refused = file.read_bytes(), 0
     for position in range(len(whole)):
         damaged = bytearray(whole)

@@ -35,10 +35,8 @@ def need_phases(config: TrainConfig) -> None:
     """Refuses a static set of a radio that reports no phases.
 
     Raises:
-        RfgsError: Gaussians are asked for that cannot be fitted, or a negative number of them.
+        RfgsError: Gaussians are asked for that cannot be fitted.
     """
-    if config.static_set < 0:
-        raise RfgsError(f"--static-set {config.static_set}: expected at least 0")
     if config.static_set and config.observe != "complex":
         raise RfgsError(
             f"--static-set {config.static_set}: expected the phases that --observe complex "

@@ -33,7 +33,7 @@ def read_overrides(path: Path | None) -> Overrides:
         return Overrides()
     try:
         values = json.loads(path.read_text("utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise AddonError(f"{path}: expected a JSON file of overrides ({error})") from error
     if not isinstance(values, dict):
         raise AddonError(f"{path}: expected keys and values, got {type(values).__name__}")

@@ -38,7 +38,10 @@ _UNITS = {
 
 
 #: What Zarr, its codecs and xarray say of damaged files.
-_DAMAGE = (OSError, ValueError, KeyError, TypeError, RuntimeError, IndexError, MemoryError)
+_DAMAGE = (
+    *(OSError, ValueError, KeyError, TypeError, RuntimeError, IndexError, MemoryError),
+    AttributeError,
+)
 
 
 @dataclass(frozen=True)

@@ -104,6 +104,17 @@ class _Keys(_Strict):
     configuration: _Separator
 
 
+class _Attributes(_Strict, rename={"fill_value": "_FillValue"}):
+    """What is said of an array beside its values; xarray reads more out of other names."""
+
+    units: str = ""
+    fill_value: str | float | int | bool | None = None
+    coordinates: str = ""
+    impairments: str = ""
+    seed: int = 0
+    sha256: list[str] = []
+
+
 class Array(_Strict):
     """What `zarr.json` says of an array."""
 
@@ -190,6 +201,7 @@ def check_array(
     """
     file = path / name / "zarr.json"
     array = record(file, read_json(file, links_known=links_known), Array)
+    record(f"{file}: attributes", array.attributes, _Attributes)
     kind, dimensions = _ARRAYS[name]
     if array.data_type != kind or tuple(array.dimension_names) not in dimensions:
         raise RfgsFormatError(

@@ -75,8 +75,10 @@ def _outcome(form: Format, expected: str) -> tuple[str, str]:
         if found == expected:
             return "same", ""
         # Checksums tell what no reader can: another value that could be right.
-        if form.dataset is None or form.name.endswith("manifest"):
+        if form.dataset is None:
             return "plausible", ""
+        if form.name.endswith("manifest"):
+            return "found", ""
         return ("found", "") if checksum_faults(form.dataset) else ("unnoticed", "")
     except Exception as error:
         if not isinstance(error, RfgsError) and type(error).__name__ != "AddonError":

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-
 #: Messages show what was found; what is longer than this was no name or number [characters].
 _LONGEST = 1200
 

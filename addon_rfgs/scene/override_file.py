@@ -59,7 +59,9 @@ def _numbers(label: str, value: Any, count: int) -> tuple[float, ...]:
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and np.isfinite(value)
+    # Whole numbers may have any length in JSON; NumPy takes none beyond 64 bits.
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return number and -1e300 < value < 1e300
 
 
 def _positive(label: str, value: Any) -> float:

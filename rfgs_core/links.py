@@ -43,19 +43,20 @@ def refuse_link(path: Path | str) -> None:
         folder = os.path.dirname(folder)
 
 
-def symbolic_links(folder: Path, without: Collection[str] = ()) -> Iterator[Path]:
+def symbolic_links(folder: Path | str, without: Collection[str] = ()) -> Iterator[Path]:
     """Every symbolic link below a folder; none is followed.
 
     Args:
         folder: Where to look.
         without: Names of folders in it that are not looked into.
     """
-    for place, folders, files in os.walk(folder, followlinks=False):
-        if place == str(folder):
-            folders[:] = [name for name in folders if name not in without]
-        for name in sorted([*folders, *files]):
-            if os.path.islink(os.path.join(place, name)):
-                yield Path(place, name)
+    with os.scandir(folder) as entries:
+        rows = sorted(entries, key=lambda entry: entry.name)
+    for entry in rows:
+        if entry.is_symlink():
+            yield Path(entry.path)
+        elif entry.name not in without and entry.is_dir():
+            yield from symbolic_links(entry.path)
 
 
 def _is_marked(folder: str) -> bool:

@@ -3,9 +3,16 @@
 
 from __future__ import annotations
 
+#: Messages show what was found; what is longer than this was no name or number [characters].
+_LONGEST = 1200
+
 
 class AddonError(Exception):
     """A mistake in the scene, a file or the arguments; the message says what to do."""
+
+    def __str__(self) -> str:
+        text = super().__str__()
+        return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} …"
 
 
 def disk_message(error: OSError) -> str:

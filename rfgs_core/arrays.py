@@ -3,29 +3,43 @@
 
 from __future__ import annotations
 
+import io
+import math
+import struct
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Collection, Mapping
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.files import replacing
+from rfgs_core.links import refuse_link
 
 #: Size of each axis: a number, or a name that stands for the same size throughout a file.
 Shape = tuple[int | str, ...]
 
+#: What zipfile, zlib and NumPy say of damaged files.
 _DAMAGE = (
-    *(OSError, ValueError, EOFError, MemoryError, NotImplementedError),
-    *(zipfile.BadZipFile, zlib.error),
+    *(OSError, ValueError, EOFError, MemoryError, NotImplementedError, RuntimeError, KeyError),
+    *(TypeError, IndexError, ArithmeticError, AttributeError, SyntaxError),
+    *(zipfile.BadZipFile, zlib.error, struct.error, tokenize.TokenError),
 )
+#: Arrays of one file take no more than this, or so many times what the file takes [bytes].
+_MOST_BYTES, _MOST_PACKED = 2**28, 32
+_SINGLE = b"\x93NUMPY"
 
 
 def save_arrays(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
     """Writes arrays in one step; equal arrays give equal bytes."""
-    with replacing(path) as temporary, temporary.open("wb") as stream:
-        np.savez(stream, **arrays)  # type: ignore[arg-type]
+    # In memory first: an archive that a full disk cuts short complains once more when it is freed.
+    stream = io.BytesIO()
+    np.savez(stream, **arrays)  # type: ignore[arg-type]
+    with replacing(path) as temporary:
+        temporary.write_bytes(stream.getbuffer())
 
 
 def load_arrays(
@@ -34,7 +48,8 @@ def load_arrays(
     shapes: Mapping[str, Shape | None] | None = None,
     unknown: Collection[str] = (),
     *,
-    others: bool = True,
+    types: Mapping[str, str] | None = None,
+    others: bool = False,
 ) -> dict[str, np.ndarray]:
     """Reads the arrays of a file.
 
@@ -42,8 +57,9 @@ def load_arrays(
         path: The file.
         remedy: What to do about a missing or damaged file, for the message.
         shapes: Arrays that must be there. Those with a shape must have it and hold finite
-            numbers; None leaves both open.
+            numbers; None leaves both open. Without `shapes` every array is read.
         unknown: Arrays in which a whole row may be NaN, for what is not known.
+        types: NumPy's names of the types that arrays may have, with spaces between.
         others: Also read arrays that `shapes` does not name.
 
     Raises:
@@ -53,13 +69,14 @@ def load_arrays(
     Example:
         `load_arrays(path, "train again", {"means": ("M", 3), "power": ("M",), "names": None})`
     """
+    refuse_link(path)
     try:
-        stored = np.load(path, allow_pickle=False)
-        if isinstance(stored, np.ndarray):
-            raise RfgsFormatError(f"{path}: expected named arrays, found a single one; {remedy}")
-        with stored:
-            wanted = [name for name in stored.files if others or name in (shapes or {})]
-            arrays = {name: stored[name] for name in wanted}
+        with path.open("rb") as stream:
+            if stream.read(len(_SINGLE)) == _SINGLE:
+                raise RfgsFormatError(
+                    f"{path}: expected named arrays, found a single one; {remedy}"
+                )
+            arrays = _read(stream, None if others or shapes is None else shapes)
     except FileNotFoundError as error:
         raise RfgsError(f"{path}: no such file; {remedy}") from error
     except RfgsFormatError:
@@ -67,10 +84,61 @@ def load_arrays(
     except _DAMAGE as error:
         raise RfgsFormatError(f"{path}: damaged ({error}); {remedy}") from error
     known = {name: _without_unknown(arrays[name]) for name in unknown if name in arrays}
-    problem = _misfit({**arrays, **known}, shapes or {})
+    problem = _misfit({**arrays, **known}, shapes or {}) or _mistyped(arrays, types or {})
     if problem:
         raise RfgsFormatError(f"{path}: {problem}; {remedy}")
     return arrays
+
+
+def _read(stream: BinaryIO, wanted: Collection[str] | None) -> dict[str, np.ndarray]:
+    """Arrays of an archive by name; those of `wanted`, or all.
+
+    Raises:
+        ValueError: The archive says more of itself than its size can hold, or something else than
+            its arrays do.
+    """
+    size = stream.seek(0, 2)
+    with zipfile.ZipFile(stream) as archive:
+        named = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
+        if len(named) != len(archive.infolist()):
+            raise ValueError("an array stands in it twice")
+        chosen = {name: info for name, info in named.items() if wanted is None or name in wanted}
+        total = sum(info.file_size for info in chosen.values())
+        most = max(_MOST_BYTES, _MOST_PACKED * size)
+        if total > most:
+            raise ValueError(f"its arrays say that they take {total} bytes, expected up to {most}")
+        return {name: _member(archive, info) for name, info in chosen.items()}
+
+
+def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> np.ndarray:
+    """One array, once its header has been found to agree with its size."""
+    if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        raise ValueError(f"{info.filename}: packed in another way than NumPy does")
+    with archive.open(info) as member:
+        version = np.lib.format.read_magic(member)
+        header = {
+            (1, 0): np.lib.format.read_array_header_1_0,
+            (2, 0): np.lib.format.read_array_header_2_0,
+        }
+        shape, _, dtype = header[version](member)
+        if any(length < 0 for length in shape) or dtype.hasobject:
+            raise ValueError(f"{info.filename}: expected numbers or text, found {dtype} {shape}")
+        if member.tell() + math.prod(shape) * dtype.itemsize != info.file_size:
+            raise ValueError(f"{info.filename}: {dtype} {shape} does not fit its size")
+    with archive.open(info) as member:
+        return np.lib.format.read_array(member, allow_pickle=False)
+
+
+def _mistyped(arrays: Mapping[str, np.ndarray], types: Mapping[str, str]) -> str:
+    """Which array has another type than it should, in words; empty if none has."""
+    for name, kinds in types.items():
+        if name not in arrays:
+            continue
+        found, expected = arrays[name].dtype, [np.dtype(kind) for kind in kinds.split()]
+        # Text has a type for every length; `U` stands for them all.
+        if found not in expected and (found.kind, kinds) != ("U", "U"):
+            return f"{name}: expected {' or '.join(map(str, expected))}, got {found}"
+    return ""
 
 
 def _without_unknown(values: np.ndarray) -> np.ndarray:

@@ -3,9 +3,19 @@
 
 from __future__ import annotations
 
+#: Messages show what was found; what is longer than this was no name or number [characters].
+_LONGEST = 1200
+
 
 class RfgsError(Exception):
-    """A mistake in the input or the machine's set-up: the message says what to do."""
+    """A mistake in the input or the machine's set-up: the message says what to do.
+
+    It is one line of printable text, whatever the names and values in it hold.
+    """
+
+    def __str__(self) -> str:
+        text = "".join(char if char.isprintable() else "?" for char in super().__str__())
+        return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} …"
 
 
 class RfgsFormatError(RfgsError, ValueError):

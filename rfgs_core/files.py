@@ -15,7 +15,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from rfgs_core.errors import RfgsError, RfgsFormatError
+from rfgs_core.links import refuse_link
+
+#: Objects of Python take some thirty times the bytes that the file has.
+LARGEST_JSON_BYTES = 2**25
 
 
 @contextmanager
@@ -23,7 +29,11 @@ def replacing(path: Path) -> Iterator[Path]:
     """Yields a temporary name beside `path`; renames it to `path` if the block succeeds.
 
     The temporary name keeps the suffix, so that writers which look at it still work.
+
+    Raises:
+        RfgsFormatError: `path` leads out of its dataset or run.
     """
+    refuse_link(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".tmp-{uuid.uuid4().hex[:8]}-{path.name}")
     try:
@@ -39,7 +49,9 @@ def replacing_folder(path: Path) -> Iterator[Path]:
 
     Raises:
         OSError: `path` has appeared meanwhile and is no empty folder.
+        RfgsFormatError: `path` leads out of its dataset or run.
     """
+    refuse_link(path)
     temporary = path.with_name(f".tmp-{uuid.uuid4().hex[:8]}-{path.name}")
     temporary.mkdir(parents=True)
     try:
@@ -59,8 +71,9 @@ def refuse_place(path: Path) -> None:
         path: File or folder that shall be written.
 
     Raises:
-        RfgsError: Nothing can be made there.
+        RfgsError: Nothing can be made there, or it leads out of its dataset or run.
     """
+    refuse_link(path)
     try:
         near = next(place for place in (path, *path.absolute().parents) if place.exists())
         # A file that is there already is replaced, by one that is written beside it.
@@ -73,6 +86,15 @@ def refuse_place(path: Path) -> None:
         raise RfgsError(
             f"{path}: nothing can be made there ({error.strerror}); choose another place"
         ) from error
+
+
+def sweep(folder: Path, *patterns: str) -> None:
+    """Removes what a killed program has left half-written below a folder; no link is followed."""
+    for entry in [entry for pattern in patterns for entry in folder.rglob(pattern)]:
+        if entry.is_dir() and not entry.is_symlink():
+            shutil.rmtree(entry)
+        else:
+            entry.unlink(missing_ok=True)
 
 
 def write_bytes(path: Path, data: bytes) -> None:
@@ -91,23 +113,34 @@ def write_json(path: Path, value: Any) -> None:
     write_text(path, json.dumps(value, indent=1, sort_keys=True, allow_nan=False) + "\n")
 
 
-def read_json(path: Path) -> Any:
+def read_json(path: Path, *, links_known: bool = False) -> Any:
     """Reads a JSON file.
+
+    Args:
+        path: The file.
+        links_known: Whether it has been seen already that no link leads out of its folder.
 
     Raises:
         RfgsError: The file does not exist.
-        RfgsFormatError: The file is not JSON.
+        RfgsFormatError: The file is not JSON, which knows no NaN and no infinity.
     """
+    if not links_known:
+        refuse_link(path)
     try:
-        return json.loads(path.read_text("utf-8"))
+        if path.stat().st_size > LARGEST_JSON_BYTES:
+            raise RfgsFormatError(f"{path}: larger than any JSON file of ours; expected JSON")
+        return msgspec.json.decode(path.read_bytes())
     except FileNotFoundError as error:
         raise RfgsError(f"{path}: no such file") from error
+    except RfgsFormatError:
+        raise
     except (ValueError, RecursionError) as error:
         raise RfgsFormatError(f"{path}: expected JSON, got something else ({error})") from error
 
 
 def sha256(path: Path) -> str:
     """Hexadecimal SHA-256 of a file's bytes."""
+    refuse_link(path)
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 

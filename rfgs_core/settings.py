@@ -90,6 +90,22 @@ class TrainOptions:
             raise RfgsError(f"--temporal {self.temporal}: expected at least 0")
 
 
+#: What numbers may be; beyond these something else was meant.
+_LIMITS: dict[str, tuple[float, float]] = {
+    "seed": (-(2**63), 2**64),
+    "static_set": (0, 10**7),
+    "num_gaussians": (1, 10**7),
+    "iterations": (0, 10**9),
+    "bodies": (1, 10**4),
+    "solver_steps": (0, 10**6),
+    "batch_entries": (1, 2**31),
+    "batch_points": (1, 2**31),
+    "grid_side": (1, 1024),
+    "refine_levels": (0, 64),
+    "unexplained": (0.0, 1.0),
+}
+
+
 @dataclass(frozen=True, kw_only=True)
 class TrainConfig(TrainOptions):
     """Settings of the fit of one frame; saved as JSON beside every result."""
@@ -126,10 +142,12 @@ class TrainConfig(TrainOptions):
             RfgsError: One is out of range, or two do not go together.
         """
         super().__post_init__()
-        if self.iterations < 0:
-            raise RfgsError(f"--iterations {self.iterations}: expected at least 0")
-        if self.num_gaussians < 1:
-            raise RfgsError(f"--gaussians {self.num_gaussians}: expected at least 1")
+        for name, (least, most) in _LIMITS.items():
+            value = getattr(self, name)
+            if not least <= value <= most:
+                option = {"num_gaussians": "gaussians"}.get(name, name)
+                bounds = f"at least {least}" if value < least else f"at most {most}"
+                raise RfgsError(f"--{option.replace('_', '-')} {value}: expected {bounds}")
 
     @staticmethod
     def chosen(

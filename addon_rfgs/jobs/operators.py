@@ -15,7 +15,7 @@ from ..gaussians.operators import import_shown
 from ..reporting import Progress, Reporting, Undoable, chosen_path
 from . import following
 from .checking import CHECK
-from .plans import KINDS, TrainPlan
+from .plans import KINDS, TrainPlan, with_blender
 from .preferences import InEnvironment, blender_program
 from .queue import ACTIVE, DONE, RUNNING, WAITING, Job
 from .record import read_record
@@ -208,7 +208,8 @@ class RFGS_OT_resume_job(_OnJob, InEnvironment, bpy.types.Operator):
 
     def work(self, _context: bpy.types.Context, progress: Progress) -> str:
         """Puts the same job at the end of the list."""
-        return start(self.job().plan, self.interpreter(), progress)
+        plan = with_blender(self.job().plan, blender_program())
+        return start(plan, self.interpreter(), progress)
 
 
 class RFGS_OT_forget_job(_OnJob, bpy.types.Operator):

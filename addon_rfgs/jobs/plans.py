@@ -2,13 +2,14 @@
 """What jobs do: their settings, the command line each becomes, and whether its work is done.
 
 A job is kept on disk by its settings, never by its command line: what lies in a folder may come
-from anywhere, and only these commands are ever run.
+from anywhere, and only these commands are ever run. Programs are no such settings: Blender, like
+Python, is the one of the user's preferences whenever a job starts.
 """
 
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -16,6 +17,8 @@ from ..errors import AddonError
 
 #: Largest JSON file that is read [bytes].
 _LARGEST_JSON = 4_000_000
+#: Settings that name a program.
+_PROGRAMS = ("blender",)
 
 
 @dataclass(frozen=True)
@@ -129,8 +132,14 @@ KINDS: dict[str, type[Plan]] = {kind.kind: kind for kind in (GeneratePlan, Train
 
 
 def plan_to_json(plan: Plan) -> dict[str, Any]:
-    """The plan as JSON."""
-    return {"kind": plan.kind, "settings": asdict(plan)}
+    """The plan as JSON, without the programs that it runs."""
+    settings = {name: value for name, value in asdict(plan).items() if name not in _PROGRAMS}
+    return {"kind": plan.kind, "settings": settings}
+
+
+def with_blender(plan: Plan, blender: str) -> Plan:
+    """A plan that was kept, with the program that opens its file; others need none."""
+    return replace(plan, blender=blender) if isinstance(plan, GeneratePlan) else plan
 
 
 def plan_of_json(value: Any, file: Path) -> Plan:
@@ -145,7 +154,8 @@ def plan_of_json(value: Any, file: Path) -> Plan:
     """
     try:
         kind = KINDS[value["kind"]]
-        settings = dict(value["settings"])
+        # Earlier versions kept a program there, which is not for a folder to name.
+        settings = {k: v for k, v in dict(value["settings"]).items() if k not in _PROGRAMS}
         known = {spec.name: type(spec.default) for spec in fields(kind)}
         for name, text in settings.items():
             expected = known[name] if known[name] in (int, bool) else str

@@ -47,6 +47,7 @@ def write_record(record: Record) -> None:
         AddonError: Nothing can be written there.
     """
     file = record_file(record.plan)
+    _refuse_link(file)
     row = {"schema": SCHEMA, "pid": record.pid, "born": record.born, **plan_to_json(record.plan)}
     try:
         write_json(file, row)
@@ -91,6 +92,17 @@ def remembered(listed: Path) -> list[Path]:
     rows = rows if isinstance(rows, list) else []
     files = [Path(row) for row in rows[:_MOST] if isinstance(row, str) and "\0" not in row]
     return [file for file in files if file.is_absolute() and file.is_file()]
+
+
+def _refuse_link(file: Path) -> None:
+    """Refuses a log folder, record or log that is a link: it would be written where that leads.
+
+    Raises:
+        AddonError: It is one.
+    """
+    for place in (file.parent, file, file.with_suffix(".log")):
+        if place.is_symlink():
+            raise AddonError(f"{place}: a symbolic link; replace it by a folder or file of its own")
 
 
 def _read(file: Path) -> Any:

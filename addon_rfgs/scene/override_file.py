@@ -33,7 +33,7 @@ def read_overrides(path: Path | None) -> Overrides:
         return Overrides()
     try:
         values = json.loads(path.read_text("utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise AddonError(f"{path}: expected a JSON file of overrides ({error})") from error
     if not isinstance(values, dict):
         raise AddonError(f"{path}: expected keys and values, got {type(values).__name__}")
@@ -59,7 +59,9 @@ def _numbers(label: str, value: Any, count: int) -> tuple[float, ...]:
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and np.isfinite(value)
+    # Whole numbers may have any length in JSON; NumPy takes none beyond 64 bits.
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return number and -1e300 < value < 1e300
 
 
 def _positive(label: str, value: Any) -> float:

@@ -19,8 +19,9 @@ from rfgs_core.dataset.csi_store import chunk_file
 from rfgs_core.dataset.impaired_store import has_impaired, impaired_chunk
 from rfgs_core.dataset.schema import read_dataset_info
 from rfgs_core.dataset.writer import MANIFEST, listed_files, own_digest
-from rfgs_core.errors import RfgsError
+from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.files import read_json, sha256
+from rfgs_core.links import symbolic_links
 from rfgs_core.radio import layout
 
 #: Coordinates of a store that follow from the devices in `sequence.json`.
@@ -31,10 +32,10 @@ LAYOUT_COORDINATES = (
 
 
 def checksum_faults(path: Path) -> list[str]:
-    """Faults of `dataset.json` and the manifest; finds any change of any byte."""
+    """Faults of `dataset.json` and the manifest, and symbolic links; finds any change of a byte."""
     file = path / "dataset.json"
-    faults = _caught(lambda: _info_faults(file))
-    if not faults:
+    faults = [*_link_faults(path), *_caught(lambda: _info_faults(file))]
+    if not any(fault.startswith(f"{file}:") for fault in faults):
         manifest = read_dataset_info(file).manifest_sha256
         faults += _caught(lambda: _manifest_faults(path, manifest))
     return faults
@@ -62,6 +63,11 @@ def validate(path: Path) -> list[str]:
     for name in info.sequences:
         faults += _caught(lambda name=name: _sequence_faults(Sequence(path / name, name), info.has))
     return list(dict.fromkeys(faults))
+
+
+def _link_faults(path: Path) -> Iterator[str]:
+    for link in symbolic_links(path):
+        yield f"{link}: a symbolic link to {link.readlink()}; expected files and folders"
 
 
 def _caught(check: Callable[[], Iterator[str] | list[str]]) -> list[str]:
@@ -93,16 +99,17 @@ def _manifest_faults(path: Path, manifest_sha256: str) -> Iterator[str]:
     if sha256(file) != manifest_sha256:
         yield f"{file}: differs from the digest in dataset.json"
         return
-    promised = {}
-    for line in file.read_text("utf-8").splitlines():
-        digest, _, name = line.partition("  ")
-        promised[name] = digest
+    try:
+        lines = file.read_text("utf-8").splitlines()
+    except UnicodeDecodeError as error:
+        raise RfgsFormatError(f"{file}: expected a digest and a name per line ({error})") from error
+    promised = {name: digest for digest, _, name in (line.partition("  ") for line in lines)}
     present = set(listed_files(path))
     yield from (f"{path / name}: not in the manifest" for name in sorted(present - set(promised)))
     for name, digest in tqdm(promised.items(), desc="checksums", unit="file"):
         if name not in present:
             yield f"{path / name}: missing"
-        elif sha256(path / name) != digest:
+        elif not (path / name).is_symlink() and sha256(path / name) != digest:
             yield f"{path / name}: altered (checksum differs from the manifest)"
 
 

@@ -11,13 +11,10 @@ from __future__ import annotations
 import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from dataset_factory.make.generate import generate
-from dataset_factory.plan.disk import Space
 from dataset_factory.plan.job import Job
-from dataset_factory.plan.speed import Speed
-from dataset_factory.plan.speed_cache import recalled
+from dataset_factory.plan.speed_cache import Recalled, recalled
 from rfgs_core.errors import RfgsError
 from rfgs_core.frames import parse_frames
 
@@ -69,19 +66,17 @@ def estimate(job: Job, known_frames: str) -> Estimate:
     return _scaled(known, len(frames), found is None)
 
 
-def _scaled(known: dict[str, Any], frames: int, measured_now: bool) -> Estimate:
+def _scaled(known: Recalled, frames: int, measured_now: bool) -> Estimate:
     seconds = {}
-    for name, row in known["speeds"].items():
-        speed = Speed(**row)
+    for name, speed in known.speeds.items():
         if name == "render":
             # Blender starts once more for the empty room.
-            pictures = known["cameras"] * (frames + 1)
+            pictures = known.cameras * (frames + 1)
             seconds[name] = speed.seconds(pictures) + speed.start_s
         else:
             seconds[name] = speed.seconds(frames + 1 if name.startswith("trace") else frames)
-    seconds["write"] = known["rest_s"] * frames
-    room = Space(**known["space"])
-    return Estimate(frames, known["cameras"], seconds, room.bytes(frames), measured_now)
+    seconds["write"] = known.rest_s * frames
+    return Estimate(frames, known.cameras, seconds, known.space.bytes(frames), measured_now)
 
 
 def _measure(job: Job, frames: list[int]) -> None:

@@ -15,7 +15,7 @@ from dataset_factory.make.render import render
 from dataset_factory.make.sequence import describe_sequence, write_geometry
 from dataset_factory.plan.contents import versions
 from dataset_factory.plan.disk import refuse_small_disk, space
-from dataset_factory.plan.folder import locked, open_folder, sweep
+from dataset_factory.plan.folder import locked, open_folder
 from dataset_factory.plan.job import Job
 from dataset_factory.plan.progress import progress_bar
 from dataset_factory.plan.speed_cache import remember
@@ -36,7 +36,7 @@ from rfgs_core.dataset.writer import (
     write_transforms,
 )
 from rfgs_core.errors import RfgsError
-from rfgs_core.files import read_json, write_json
+from rfgs_core.files import read_json, sweep, write_json
 from rfgs_core.radio import DevicePose, frame_samples, layout, pose_span_s
 from rfgs_core.radio.check import too_far
 from rfgs_core.radio.impairments import impairments_from_json
@@ -65,7 +65,7 @@ def generate(job: Job) -> bool:
     begun = (job.out / "dataset.json").exists()
     logger.info("%s: %s", job.out, "continuing" if begun else "a new dataset")
     with locked(job):
-        sweep(job.out)
+        sweep(job.out, ".tmp-*", "*.partial")
         info = DatasetInfo(versions(), asdict(job.plan), job.plan.seed, _contents(job), [job.name])
         with job.stage("export"):
             bundle = _export(job)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -13,6 +12,7 @@ from dataset_factory.plan.contents import refuse_other_plan
 from dataset_factory.plan.job import Job
 from rfgs_core.dataset.schema import read_dataset_info
 from rfgs_core.errors import RfgsError
+from rfgs_core.locks import alone_in
 
 
 def open_folder(job: Job) -> bool:
@@ -22,6 +22,9 @@ def open_folder(job: Job) -> bool:
         RfgsError: The folder holds something else, or a dataset with other settings.
     """
     file = job.out / "dataset.json"
+    links = [entry for entry in (file, job.work, job.out / "log") if entry.is_symlink()]
+    if links:
+        raise RfgsError(f"{links[0]}: a symbolic link; expected a file or folder of the dataset")
     if file.is_file():
         stored = read_dataset_info(file)
         made_with = {} if stored.manifest_sha256 else stored.versions
@@ -51,11 +54,9 @@ def locked(job: Job) -> Iterator[None]:
     """
     made = [place for place in (job.out, *job.out.absolute().parents) if not place.exists()]
     job.work.mkdir(parents=True, exist_ok=True)
-    with (job.work / "lock").open("w") as stream:
-        try:
-            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            raise RfgsError(f"{job.out}: another rfgs-factory is working on it") from error
+    lock = job.work / "lock"
+    lock.touch()
+    with alone_in(lock, job.out, "rfgs-factory"):
         try:
             yield
         except RfgsError:
@@ -72,12 +73,3 @@ def _take_back(job: Job, made: list[Path]) -> None:
         # Where somebody else keeps something it stays.
         with suppress(OSError):
             place.rmdir()
-
-
-def sweep(out: Path) -> None:
-    """Removes half-written files that a killed run left behind."""
-    for entry in [*out.rglob(".tmp-*"), *out.rglob("*.partial")]:
-        if entry.is_dir():
-            shutil.rmtree(entry)
-        else:
-            entry.unlink(missing_ok=True)

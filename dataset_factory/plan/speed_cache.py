@@ -7,14 +7,16 @@ import hashlib
 import json
 import os
 import platform
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 from dataset_factory.plan.contents import versions
 from dataset_factory.plan.disk import Space
 from dataset_factory.plan.job import Job
-from rfgs_core.files import read_json, write_json
+from dataset_factory.plan.speed import Speed
+from rfgs_core.cache import cache_folder
+from rfgs_core.files import write_json
+from rfgs_core.records import read_record
 
 
 def remember(job: Job, frames: int, cameras: int, space: Space) -> None:
@@ -24,19 +26,27 @@ def remember(job: Job, frames: int, cameras: int, space: Space) -> None:
     if not stages <= set(job.speeds):
         return
     rest = sum(job.seconds.get(name, 0.0) for name in ("impair", "finish")) / frames
-    value = {
-        "speeds": {name: asdict(speed) for name, speed in job.speeds.items()},
-        "rest_s": rest,
-        "cameras": cameras,
-        "space": asdict(space),
-    }
-    write_json(_file(job), value)
+    write_json(_file(job), asdict(Recalled(job.speeds, rest, cameras, space)))
 
 
-def recalled(job: Job) -> dict[str, Any] | None:
+@dataclass(frozen=True)
+class Recalled:
+    """What is remembered of a job."""
+
+    speeds: dict[str, Speed]
+    """Speed of each stage."""
+    rest_s: float
+    """Time that everything else takes for a frame [s]."""
+    cameras: int
+    """Cameras that were rendered."""
+    space: Space
+    """Disk that it took."""
+
+
+def recalled(job: Job) -> Recalled | None:
     """What is remembered of jobs like this one; None if nothing is."""
     file = _file(job)
-    return read_json(file) if file.is_file() else None
+    return read_record(file, Recalled, "delete it") if file.is_file() else None
 
 
 def _file(job: Job) -> Path:
@@ -45,5 +55,4 @@ def _file(job: Job) -> Path:
     machine = [platform.node(), platform.processor(), platform.machine(), os.cpu_count()]
     what = [plan, job.workers, job.scheduler, str(job.blender.program), versions(), machine]
     key = hashlib.sha256(json.dumps(what, sort_keys=True, default=str).encode()).hexdigest()
-    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return cache / "rfgs" / "speeds" / f"{key[:32]}.json"
+    return cache_folder("speeds") / f"{key[:32]}.json"

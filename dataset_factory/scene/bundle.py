@@ -9,38 +9,38 @@ from typing import Any
 
 import numpy as np
 
-from dataset_factory.scene.room import Room, read_room
-from rfgs_core.arrays import load_arrays
+from dataset_factory.scene.bundle_rows import BundleRows
+from dataset_factory.scene.room import Room, room_of_row
+from rfgs_core.arrays import Shape, load_arrays
 from rfgs_core.dataset.mesh_ply import read_mesh
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.files import inside, read_json
+from rfgs_core.records import record
 from rfgs_core.simulate.surface.edges import SHARP, SMOOTH, UNSAID
 
 SCHEMA = "rfgs-bundle/1"
 NUM_JOINTS = 17
 
-_FRAME_ARRAYS = ("vertices", "joints", "segment_velocity", "person_instance", "action")
-_FIELDS: dict[str, type | tuple[type, ...]] = {
-    "blend_name": str,
-    "blend_sha256": str,
-    "blender_version": str,
-    "fps": (int, float),
-    "frame_start": int,
-    "frame_end": int,
-    "frames": list,
-    "bounds_m": list,
-    "devices": list,
-    "cameras": list,
-    "materials": list,
-    "objects": list,
-    "instances": list,
+_REMEDY = "export the scene again"
+_FRAME: dict[str, Shape | None] = {
+    "vertices": ("vertex", 3),
+    "joints": ("person", NUM_JOINTS, 3),
+    "segment_velocity": ("person", NUM_JOINTS, 3),
+    "person_instance": ("person",),
+    "action": None,
 }
-_ROWS: dict[str, tuple[str, ...]] = {
-    "devices": ("name", "radio", "role", "position_m", "quat_wxyz"),
-    "cameras": ("name", "width", "height", "fl_x", "fl_y", "cx", "cy", "world_from_camera"),
-    "materials": ("name", "radio_material", "thickness_m", "scattering_coefficient"),
-    "objects": ("id", "name", "class", "instance", "moving", "files"),
-    "instances": ("id", "name", "class", "person"),
+_TOPOLOGY: dict[str, Shape | None] = {
+    "faces": ("face", 3),
+    "material": ("face",),
+    "instance": ("face",),
+    "segment": ("face",),
+    "rest_vertices": ("vertex", 3),
+}
+_TYPES = {
+    **dict.fromkeys(("vertices", "rest_vertices", "joints", "segment_velocity"), "f4 f8"),
+    **dict.fromkeys(("faces", "material", "instance", "segment", "person_instance"), "i4 i8"),
+    "edges": "i1",
+    "action": "U",
 }
 
 
@@ -137,21 +137,16 @@ class Bundle:
             RfgsFormatError: The file is missing, damaged or does not fit the topology.
         """
         path = frame_file(self.path, frame)
-        arrays = read_arrays(path, _FRAME_ARRAYS)
-        vertices = arrays["vertices"]
+        unknown = ("joints", "segment_velocity")
+        arrays = load_arrays(path, _REMEDY, _FRAME, unknown, types=_TYPES)
+        vertices, people = arrays["vertices"], len(arrays["person_instance"])
         _expect(path, "vertices", vertices, self.topology.rest_vertices.shape)
-        people = len(arrays["person_instance"])
-        labels = {name: arrays[name] for name in ("joints", "segment_velocity")}
-        for name, values in labels.items():
-            known = np.where(unknown_joints(values)[:, None, None], 0.0, values)
-            _expect(path, name, known, (people, NUM_JOINTS, 3))
-        joints, velocity = (values.astype(np.float32) for values in labels.values())
         _expect(path, "action", arrays["action"], (people,))
         return BundleFrame(
             frame=frame,
             vertices=vertices.astype(np.float32),
-            joints=joints,
-            segment_velocity=velocity,
+            joints=arrays["joints"].astype(np.float32),
+            segment_velocity=arrays["segment_velocity"].astype(np.float32),
             person_instance=arrays["person_instance"].astype(np.int32),
             action=arrays["action"].astype(str),
         )
@@ -229,7 +224,7 @@ def read_bundle(path: Path) -> Bundle:
     info = read_json(file)
     _check_info(file, info)
     bounds = np.asarray(info["bounds_m"], dtype=np.float64)
-    if bounds.shape != (2, 3) or not np.isfinite(bounds).all() or (bounds[1] < bounds[0]).any():
+    if (bounds[1] < bounds[0]).any():
         raise RfgsFormatError(f"{file}: bounds_m: expected [[min xyz], [max xyz]], got {bounds}")
     topology = _read_topology(path / "topology.npz", info)
     return Bundle(
@@ -244,51 +239,25 @@ def read_bundle(path: Path) -> Bundle:
         bounds_m=bounds,
         frames=[int(frame) for frame in info["frames"]],
         fps=float(info["fps"]),
-        room=read_room(file, info.get("room")),
+        room=room_of_row(info.get("room")),
     )
 
 
-def read_arrays(
-    path: Path, names: tuple[str, ...], *, others: bool = False
-) -> dict[str, np.ndarray]:
-    """Reads named arrays of a bundle's `.npz` file, and no others unless asked to.
-
-    Raises:
-        RfgsError: There is no such file.
-        RfgsFormatError: The file is damaged or lacks an array.
-    """
-    return load_arrays(path, "export the scene again", dict.fromkeys(names), others=others)
-
-
 def _check_info(file: Path, info: Any) -> None:
-    schema = info.get("schema") if isinstance(info, dict) else None
-    if schema != SCHEMA:
-        raise RfgsFormatError(f"{file}: expected schema {SCHEMA!r}, got {schema!r}")
-    for name, kind in _FIELDS.items():
-        if not isinstance(info.get(name), kind):
-            raise RfgsFormatError(f"{file}: field {name!r} is missing or of the wrong type")
-    for table, columns in _ROWS.items():
-        for index, row in enumerate(info[table]):
-            missing = [column for column in columns if column not in row]
-            if missing:
-                raise RfgsFormatError(f"{file}: {table}[{index}] lacks {', '.join(missing)}")
-    if info["fps"] <= 0 or not info["frames"]:
-        raise RfgsFormatError(f"{file}: expected fps > 0 and at least one frame")
+    value = record(file, info, dict[str, Any])
+    if value.get("schema") != SCHEMA:
+        raise RfgsFormatError(f"{file}: expected schema {SCHEMA!r}, got {value.get('schema')!r}")
+    record(file, value, BundleRows)
 
 
 def _read_topology(path: Path, info: dict[str, Any]) -> Topology:
-    names = ("faces", "material", "instance", "segment", "rest_vertices")
-    arrays = read_arrays(path, names, others=True)
+    arrays = load_arrays(path, _REMEDY, _TOPOLOGY, types=_TYPES, others=True)
     faces, vertices = arrays["faces"], arrays["rest_vertices"]
     # Bundles of earlier versions say nothing of edges.
     edges = arrays.get("edges", np.full((len(faces), 3), UNSAID))
     _expect(path, "edges", edges, (len(faces), 3))
     if not np.isin(edges, (UNSAID, SMOOTH, SHARP)).all():
         raise RfgsFormatError(f"{path}: edges: expected {UNSAID}, {SMOOTH} or {SHARP}")
-    _expect(path, "faces", faces, (len(faces), 3))
-    _expect(path, "rest_vertices", vertices, (len(vertices), 3))
-    for name in ("material", "instance", "segment"):
-        _expect(path, name, arrays[name], (len(faces),))
     instances = {row["id"] for row in info["instances"]}
     limits = {"faces": len(vertices), "material": len(info["materials"])}
     for name, limit in limits.items():
@@ -310,5 +279,3 @@ def _read_topology(path: Path, info: dict[str, Any]) -> Topology:
 def _expect(path: Path, name: str, array: np.ndarray, shape: tuple[int, ...]) -> None:
     if array.shape != shape:
         raise RfgsFormatError(f"{path}: {name}: expected shape {shape}, got {array.shape}")
-    if array.dtype.kind == "f" and not np.isfinite(array).all():
-        raise RfgsFormatError(f"{path}: {name}: expected finite numbers")

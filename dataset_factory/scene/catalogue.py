@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rfgs_core.errors import RfgsError, RfgsFormatError
-from rfgs_core.files import inside, read_json, sha256
+from rfgs_core.files import inside, sha256
+from rfgs_core.records import read_record
 
 #: First bytes of a Blender file: plain, Zstandard or gzip.
 MAGIC = (b"BLENDER", b"\x28\xb5\x2f\xfd", b"\x1f\x8b")
@@ -33,6 +34,19 @@ class Scene:
     """Interactions that a path needs to show what moves there."""
 
 
+@dataclass(frozen=True)
+class _Row:
+    """A scene as the list has it."""
+
+    name: str
+    file: str
+    description: str
+    fps: float
+    frame_start: int
+    frame_end: int
+    depth: int = DEFAULT_DEPTH
+
+
 def catalogue_file() -> Path:
     """The list of scenes in the installed source tree."""
     return Path(__file__).resolve().parents[2] / "blender_scenes" / "catalogue.json"
@@ -45,21 +59,17 @@ def catalogue() -> list[Scene]:
         RfgsError: The list is missing or damaged.
     """
     file = catalogue_file()
-    rows = read_json(file)
-    try:
-        return [
-            Scene(
-                name=row["name"],
-                blend=inside(file.parent, row["file"]),
-                description=row["description"],
-                fps=row["fps"],
-                frames=f"{row['frame_start']}:{row['frame_end']}",
-                depth=row.get("depth", DEFAULT_DEPTH),
-            )
-            for row in rows
-        ]
-    except (TypeError, KeyError) as error:
-        raise RfgsFormatError(f"{file}: expected rows with {error}") from error
+    return [
+        Scene(
+            name=row.name,
+            blend=inside(file.parent, row.file),
+            description=row.description,
+            fps=row.fps,
+            frames=f"{row.frame_start}:{row.frame_end}",
+            depth=row.depth,
+        )
+        for row in read_record(file, list[_Row])
+    ]
 
 
 def find_scene(name: str) -> Scene:

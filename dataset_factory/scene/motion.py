@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from dataset_factory.scene.bundle import Bundle, frame_file, read_arrays
+from dataset_factory.scene.bundle import Bundle, frame_file
 from rfgs_core.arrays import load_arrays
 from rfgs_core.errors import RfgsFormatError
 
@@ -55,16 +55,15 @@ def read_motion(bundle: Bundle, frame: int, span_s: float) -> Motion:
             f"export it with --span {span_s!r}"
         )
     path = frame_file(bundle.path, frame)
-    arrays = read_arrays(path, ("vertices", "pose_offset_s", "pose_vertices"))
+    poses = {"vertices": ("vertex", 3), "pose_offset_s": ("pose",)}
+    poses["pose_vertices"] = ("pose", *poses["vertices"])
+    arrays = load_arrays(path, "export the scene again", poses)
     wanted = np.array(rows[0]["offset_s"], dtype=np.float64)
     index = np.searchsorted(arrays["pose_offset_s"], wanted)
     known = np.append(arrays["pose_offset_s"], np.inf)[index]
-    shape = (len(arrays["pose_offset_s"]), *arrays["vertices"].shape)
-    if not np.array_equal(known, wanted) or arrays["pose_vertices"].shape != shape:
+    if not np.array_equal(known, wanted):
         raise RfgsFormatError(f"{path}: poses differ from those that bundle.json promises")
     vertices = np.concatenate([arrays["vertices"][None], arrays["pose_vertices"][index]])
-    if not np.isfinite(vertices).all():
-        raise RfgsFormatError(f"{path}: pose_vertices: expected finite numbers")
     return Motion(np.concatenate([[0.0], wanted]), vertices)
 
 
@@ -77,4 +76,4 @@ def read_velocity(bundle: Bundle, frame: int) -> np.ndarray:
     path = frame_file(bundle.path, frame)
     name, shape = "vertex_velocity", bundle.topology.rest_vertices.shape
     remedy = "export the scene again with --velocities"
-    return load_arrays(path, remedy, {name: shape}, others=False)[name].astype(np.float64)
+    return load_arrays(path, remedy, {name: shape})[name].astype(np.float64)

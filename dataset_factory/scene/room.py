@@ -5,13 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numba import njit
-
-from rfgs_core.errors import RfgsFormatError
 
 
 @dataclass(frozen=True)
@@ -38,28 +35,15 @@ class Room:
         return not sees_any(place_m, self.seen_m[near], triangles)
 
 
-def read_room(file: Path, row: dict[str, Any] | None) -> Room | None:
-    """The room of a bundle; None where nothing stands still.
-
-    Args:
-        file: `bundle.json`, for messages.
-        row: Its entry `room`.
-
-    Raises:
-        RfgsFormatError: The entry is damaged.
-    """
+def room_of_row(row: dict[str, Any] | None) -> Room | None:
+    """The room of a bundle, from the entry `room` of its JSON; None where nothing stands still."""
     if row is None:
         return None
-    try:
-        shapes = {"box_m": (2, 3), "stand_m": (3,), "seen_m": (-1, 3)}
-        values = {
-            name: np.asarray(row[name], dtype=np.float64).reshape(shape)
-            for name, shape in shapes.items()
-        }
-    except (TypeError, KeyError, ValueError) as error:
-        raise RfgsFormatError(f"{file}: room: expected box_m, stand_m and seen_m") from error
-    if not all(np.isfinite(value).all() for value in values.values()):
-        raise RfgsFormatError(f"{file}: room: expected finite numbers")
+    shapes = {"box_m": (2, 3), "stand_m": (3,), "seen_m": (-1, 3)}
+    values = {
+        name: np.asarray(row[name], dtype=np.float64).reshape(shape)
+        for name, shape in shapes.items()
+    }
     return Room(**values)
 
 

@@ -30,6 +30,7 @@ from rfgs_core.dataset.csi_store import write_csi
 from rfgs_core.dataset.names import SequenceFiles
 from rfgs_core.dataset.schema import SequenceInfo, device_pose
 from rfgs_core.files import write_bytes
+from rfgs_core.links import refuse_link
 
 if TYPE_CHECKING:
     from distributed import Future
@@ -62,6 +63,7 @@ def _workers(job: Job, tasks: int) -> Iterator[Workers]:
             yield workers
         return
     count, log = min(job.workers, tasks), job.out / "log"
+    refuse_link(log)
     log.mkdir(parents=True, exist_ok=True)
     for old in log.glob("worker*.log"):
         old.unlink()

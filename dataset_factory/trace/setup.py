@@ -7,9 +7,8 @@ Call `prepare` before anything imports drjit, mitsuba or sionna.
 from __future__ import annotations
 
 import os
-import tempfile
-from pathlib import Path
 
+from rfgs_core.cache import cache_folder
 from rfgs_core.llvm import use_llvm
 
 #: Kernels differ from frame to frame, so an unlimited cache would fill the disk [bytes].
@@ -24,10 +23,11 @@ def prepare(threads: int | None = None) -> None:
 
     Raises:
         MissingToolError: No usable LLVM library.
+        RfgsError: The user's cache cannot be written.
     """
     use_llvm()
-    cache = Path(os.environ.get("XDG_CACHE_HOME", tempfile.gettempdir())) / "rfgs-drjit"
-    os.environ.setdefault("DRJIT_CACHE_DIR", str(cache))
+    if "DRJIT_CACHE_DIR" not in os.environ:
+        os.environ["DRJIT_CACHE_DIR"] = str(cache_folder("drjit"))
     os.environ.setdefault("DRJIT_CACHE_MAXSIZE", str(CACHE_LIMIT_BYTES))
     if threads is None:
         return

@@ -14,7 +14,7 @@ from dataset_factory.verify.description import Camera, Description, Part, room, 
 from dataset_factory.verify.rasteriser import Raster, raster
 from dataset_factory.verify.workshop import Workshop
 from rfgs_core.dataset.names import SequenceFiles
-from rfgs_core.dataset.pictures import read_exr, read_png_u16
+from rfgs_core.dataset.pictures import read_planes, read_png_u16
 
 #: Largest error of depth [mm] and of normals [deg] off edges; least overlap of masks.
 DEPTH_MM, NORMAL_DEG, OVERLAP = 5.0, 1.0, 0.99
@@ -55,9 +55,8 @@ def verify(workshop: Workshop) -> Group:
     for row, camera in zip(bundle.cameras, SCENE.cameras, strict=True):
         for frame in FRAMES:
             true = raster(bundle, camera, frame, SIZE_PX)
-            depth = read_exr(files.depth(row["name"], frame))["Z"]
-            planes = read_exr(files.normal(row["name"], frame))
-            normal = np.stack([planes[axis] for axis in "XYZ"], axis=-1)
+            (depth,) = read_planes(files.depth(row["name"], frame), "Z")
+            normal = np.stack(read_planes(files.normal(row["name"], frame), "XYZ"), axis=-1)
             mask = read_png_u16(files.mask(row["name"], frame))
             depth_mm.append(1e3 * np.abs(depth - true.depth)[true.inner])
             normal_deg.append(_angle_deg(normal, true)[true.inner])

@@ -40,7 +40,7 @@ def run(args: AblateArgs) -> int:
     from rfgs_core.errors import RfgsError
     from rfgs_core.files import write_text
     from rfgs_core.frames import chosen_frames
-    from rfgs_core.report.compare import read_metrics
+    from rfgs_core.report.metrics_file import read_metrics
     from rfgs_core.run import open_run
     from rfgs_core.study.ablation import VARIANTS, ablation_row, ablation_table
 

@@ -30,9 +30,9 @@ def run(args: CompareArgs) -> int:
         comparison_rows,
         differences,
         markdown_comparison,
-        read_metrics,
         text_comparison,
     )
+    from rfgs_core.report.metrics_file import read_metrics
     from rfgs_core.report.page import comparison_page
 
     if args.out is not None and args.out.suffix not in (".md", ".html"):

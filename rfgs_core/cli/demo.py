@@ -46,10 +46,11 @@ class Stages:
     """Runs stages once, remembers how long each took, and says which are already done."""
 
     def __init__(self, out: Path) -> None:
-        from rfgs_core.files import read_json
+        from rfgs_core.records import read_record
 
         self._path = out / "timings.json"
-        self.seconds: dict[str, float] = read_json(self._path) if self._path.exists() else {}
+        known = self._path.exists()
+        self.seconds = read_record(self._path, dict[str, float]) if known else {}
 
     def run(self, name: str, done: Path, work: Callable[[], None]) -> None:
         """Runs `work` unless `done` exists and the stage was timed, that is, finished."""
@@ -83,10 +84,10 @@ def refuse_other_settings(args: DemoArgs) -> None:
         RfgsError: The folder holds such a demo.
     """
     from rfgs_core.errors import RfgsError
-    from rfgs_core.files import read_json
+    from rfgs_core.records import read_record
 
     path, asked = args.out / _SETTINGS, _asked(args)
-    found = read_json(path) if path.exists() else asked
+    found = read_record(path, dict[str, Any]) if path.exists() else asked
     differing = [name for name, value in asked.items() if found.get(name) != value]
     if differing:
         raise RfgsError(

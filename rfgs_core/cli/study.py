@@ -45,7 +45,7 @@ def run(args: StudyArgs) -> int:
     from rfgs_core.cli.calls import call
     from rfgs_core.errors import RfgsError
     from rfgs_core.files import write_json, write_text
-    from rfgs_core.report.compare import read_metrics
+    from rfgs_core.report.metrics_file import read_metrics
     from rfgs_core.study import cases, study_table, summarise
 
     chosen = cases(args.scenes, args.conditions, args.radios, args.seeds)

@@ -13,8 +13,7 @@ import tyro
 from rfgs_core.view.selection import ColorMode
 
 if TYPE_CHECKING:
-    from viser import ViserServer
-
+    from rfgs_core.view.page_server import PageServer
     from rfgs_core.view.viewer import Viewer
 
 
@@ -69,7 +68,7 @@ def run(args: ViewArgs) -> int:
     return 0
 
 
-def _serve(viewer: Viewer, server: ViserServer, open_page: bool) -> int:
+def _serve(viewer: Viewer, server: PageServer, open_page: bool) -> int:
     import webbrowser
 
     from rfgs_core.view.server import address

@@ -4,23 +4,26 @@
 from __future__ import annotations
 
 import hashlib
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Complex64
 
+from rfgs_core.dataset.store_schema import LARGEST_CHUNK_BYTES, Array, check_array, check_store
 from rfgs_core.errors import RfgsError, RfgsFormatError
-from rfgs_core.files import read_json, replacing_folder, write_json
+from rfgs_core.files import replacing_folder, write_json
+from rfgs_core.links import refuse_link
 from rfgs_core.radio import FrameSamples, Layout, Radio
+from rfgs_core.records import read_record
 
 if TYPE_CHECKING:
     import xarray
 
 DIMENSIONS = ("time", "tx", "rx", "subcarrier")
-
-#: A frame is one chunk, and the codec takes no larger one [bytes].
-LARGEST_CHUNK_BYTES = 2**31 - 2**20
 
 _UNITS = {
     "csi": "1",
@@ -32,6 +35,20 @@ _UNITS = {
     "tx_slant_deg": "degree",
     "rx_slant_deg": "degree",
 }
+
+
+#: What Zarr, its codecs and xarray say of damaged files.
+_DAMAGE = (
+    *(OSError, ValueError, KeyError, TypeError, RuntimeError, IndexError, MemoryError),
+    AttributeError,
+)
+
+
+@dataclass(frozen=True)
+class _Marker:
+    """What a frame's marker holds."""
+
+    sha256: str
 
 
 def create_csi(
@@ -89,7 +106,10 @@ def write_csi(path: Path, index: int | None, value: np.ndarray, marker: Path) ->
     """
     import zarr
 
-    array = zarr.open_array(str(path / ("csi_static" if index is None else "csi")), mode="r+")
+    refuse_link(chunk_file(path, index))
+    array = zarr.open_array(
+        str(path / ("csi_static" if index is None else "csi")), mode="r+", zarr_format=3
+    )
     count = 1 if array.ndim == 3 else int(array.chunks[0])
     value = value.reshape(-1, *value.shape[-3:])
     expected = (count, *array.shape[-3:])
@@ -105,7 +125,12 @@ def write_csi(path: Path, index: int | None, value: np.ndarray, marker: Path) ->
 
 
 def read_csi(
-    path: Path, index: int | None, marker: Path | None
+    path: Path,
+    index: int | None,
+    marker: Path | None,
+    links: tuple[int, int, int],
+    counts: tuple[int, ...],
+    name: str = "",
 ) -> Complex64[np.ndarray, "sample tx rx subcarrier"]:
     """Reads one frame's channel and checks it against its marker.
 
@@ -113,40 +138,55 @@ def read_csi(
         path: The store.
         index: Which frame of the store; None reads the static channel.
         marker: Marker to check against; None checks only that the chunk is whole.
+        links: Transmitting and receiving elements, and subcarriers, that it must hold.
+        counts: How many samples a frame may have.
+        name: Array to read; empty for `csi`, or `csi_static` for the static channel.
 
     Returns:
         All samples of the frame; one for a static channel of antennas that stand still.
 
     Raises:
-        RfgsFormatError: The chunk is missing, truncated or altered; the message names its file.
+        RfgsFormatError: The array is none of the schema, or its chunk is missing, truncated or
+            altered; the message names its file.
     """
     import zarr
 
-    name = "csi_static" if index is None else "csi"
-    try:
-        array = zarr.open_array(str(path / name), mode="r")
-    except (FileNotFoundError, ValueError, KeyError, TypeError) as error:
-        raise RfgsFormatError(f"{path / name}: damaged or missing array ({error})") from error
-    if array.dtype != np.complex64 or array.ndim not in ((3, 4) if index is None else (4,)):
-        raise RfgsFormatError(f"{path / name}: expected complex64 (…, tx, rx, subcarrier)")
-    file = chunk_file(path, index)
+    name = name or ("csi_static" if index is None else "csi")
+    lengths: dict[str, int] = dict(zip(DIMENSIONS[1:], links, strict=True))
+    count = _samples(path / name, check_array(path, name, lengths), counts)
+    file = chunk_file(path, index, name)
+    refuse_link(file)
     if not file.is_file():
         raise RfgsFormatError(f"{file}: no such chunk; this frame was never finished")
-    count = int(array.chunks[0])
     try:
+        array = zarr.open_array(str(path / name), mode="r", zarr_format=3)
         which = ... if index is None else slice(index * count, (index + 1) * count)
         value = np.asarray(array[which])
-    except (RuntimeError, ValueError, OSError, IndexError) as error:
+    except _DAMAGE as error:
         raise RfgsFormatError(f"{file}: truncated or damaged CSI chunk ({error})") from error
+    if value.size != count * math.prod(links):
+        raise RfgsFormatError(f"{path / name}: holds no frame {index}; expected one per frame")
     if marker is not None and _recorded(marker) != digest(value):
         raise RfgsFormatError(f"{file}: CSI chunk differs from the digest in {marker}")
-    return value.reshape(-1, *value.shape[-3:])
+    return value.reshape(-1, *links)
 
 
-def chunk_file(path: Path, index: int | None) -> Path:
+def _samples(path: Path, array: Array, counts: tuple[int, ...]) -> int:
+    """Samples in a chunk: one frame, all of its links."""
+    *leading, tx, rx, subcarriers = array.chunk
+    count = leading[0] if leading else 1
+    if [tx, rx, subcarriers] != array.shape[-3:] or count not in counts:
+        raise RfgsFormatError(
+            f"{path}: expected a chunk of {' or '.join(map(str, counts))} samples of "
+            f"{array.shape[-3:]}, found {array.chunk}"
+        )
+    return count
+
+
+def chunk_file(path: Path, index: int | None, name: str = "csi") -> Path:
     """File that holds one frame's channel, or the static one for None."""
     if index is not None:
-        return path / "csi" / "c" / str(index) / "0" / "0" / "0"
+        return path / name / "c" / str(index) / "0" / "0" / "0"
     chunk = path / "csi_static" / "c" / "0" / "0" / "0"
     # Antennas that move within a frame give the static channel one axis more.
     return chunk / "0" if chunk.is_dir() else chunk
@@ -157,21 +197,26 @@ def digest(value: np.ndarray) -> str:
     return hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()
 
 
-def open_csi(path: Path) -> xarray.Dataset:
+def open_csi(path: Path, sizes: Mapping[str, int] | None = None) -> xarray.Dataset:
     """Opens a store; channels are read when used.
+
+    Args:
+        path: Folder of the store.
+        sizes: How long its dimensions are, as far as that is known from elsewhere.
 
     Raises:
         RfgsFormatError: It is missing, or its metadata or a coordinate is damaged.
     """
     import xarray
 
+    check_store(path, sizes)
     name = ""
     try:
         data = xarray.open_zarr(path, consolidated=False, chunks=None, zarr_format=3)
         # Coordinates are small; reading them now finds damage here, not deep in a caller.
         for name in data.coords:
             data[name].load()
-    except (OSError, ValueError, KeyError, TypeError, RuntimeError) as error:
+    except _DAMAGE as error:
         raise RfgsFormatError(f"{path / str(name)}: damaged or missing ({error})") from error
     return data
 
@@ -179,8 +224,7 @@ def open_csi(path: Path) -> xarray.Dataset:
 def _recorded(marker: Path) -> str:
     if not marker.is_file():
         raise RfgsFormatError(f"{marker}: no such marker; this frame was never finished")
-    value = read_json(marker)
-    return str(value.get("sha256")) if isinstance(value, dict) else ""
+    return read_record(marker, _Marker).sha256
 
 
 def _create(

@@ -6,18 +6,21 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any
 
+import msgspec
 import numpy as np
 from jaxtyping import Complex64, Float64
 
-from rfgs_core.dataset.csi_store import digest
+from rfgs_core.dataset.csi_store import chunk_file, digest, read_csi
+from rfgs_core.dataset.store_schema import check_array, check_store
 from rfgs_core.errors import RfgsError, RfgsFormatError
+from rfgs_core.links import refuse_link
 from rfgs_core.radio.impairments import Draw, Impairments, impairments_from_json
+from rfgs_core.records import record
 
 IMPAIRED = "csi_impaired"
 _TEMPORARY = f".tmp-{IMPAIRED}"
@@ -62,6 +65,7 @@ def impaired_folders(path: Path) -> list[Path]:
 def remove_impaired(path: Path) -> None:
     """Removes impaired channels and what was drawn for them; the clean ones stay."""
     for folder in impaired_folders(path):
+        refuse_link(folder)
         shutil.rmtree(folder, ignore_errors=True)
 
 
@@ -73,6 +77,7 @@ def writing_impaired(path: Path) -> Iterator[ImpairedWriter]:
         path: The store, which holds all clean channels and no impaired ones.
     """
     temporary = path / _TEMPORARY
+    refuse_link(temporary)
     shutil.rmtree(temporary, ignore_errors=True)
     try:
         writer = ImpairedWriter(path, temporary)
@@ -89,7 +94,8 @@ class ImpairedWriter:
     def __init__(self, path: Path, temporary: Path) -> None:
         import zarr
 
-        clean = zarr.open_array(str(path / "csi"), mode="r")
+        check_array(path, "csi")
+        clean = zarr.open_array(str(path / "csi"), mode="r", zarr_format=3)
         self._samples = int(clean.chunks[0])
         self._group = zarr.open_group(str(temporary), mode="w", zarr_format=3)
         self._array = self._group.create_array(
@@ -131,33 +137,40 @@ class ImpairedWriter:
         )
 
 
-def read_impaired(path: Path, index: int) -> Complex64[np.ndarray, "sample tx rx subcarrier"]:
+def read_impaired(
+    path: Path, index: int, links: tuple[int, int, int], counts: tuple[int, ...]
+) -> Complex64[np.ndarray, "sample tx rx subcarrier"]:
     """Impaired channels of one frame, checked against the digest written with them.
+
+    Args:
+        path: The store.
+        index: Which frame of the store.
+        links: Transmitting and receiving elements, and subcarriers, that it must hold.
+        counts: How many samples a frame may have.
 
     Raises:
         RfgsError: The store holds no impaired channels.
         RfgsFormatError: The chunk is missing, truncated or altered.
     """
-    array = _open(path, IMPAIRED)
-    file = impaired_chunk(path, index)
-    count = int(array.chunks[0])
-    try:
-        value = np.asarray(array[index * count : (index + 1) * count])
-    except (RuntimeError, ValueError, OSError, IndexError) as error:
-        raise RfgsFormatError(f"{file}: truncated or damaged CSI chunk ({error})") from error
-    digests = array.attrs.get("sha256")
-    if not isinstance(digests, list) or len(digests) <= index or digests[index] != digest(value):
+    digests = _about(path).sha256
+    value = read_csi(path, index, None, links, counts, IMPAIRED)
+    if len(digests) <= index or digests[index] != digest(value):
+        file = impaired_chunk(path, index)
         raise RfgsFormatError(f"{file}: CSI chunk differs from the digest in {IMPAIRED}")
     return value
 
 
 def impaired_chunk(path: Path, index: int) -> Path:
     """File that holds one frame's impaired channels."""
-    return path / IMPAIRED / "c" / str(index) / "0" / "0" / "0"
+    return chunk_file(path, index, IMPAIRED)
 
 
-def read_draw(path: Path) -> Impaired:
+def read_draw(path: Path, sizes: Mapping[str, int]) -> Impaired:
     """What was drawn for a store's impaired channels.
+
+    Args:
+        path: The store.
+        sizes: How long its dimensions are.
 
     Raises:
         RfgsError: The store holds no impaired channels.
@@ -165,29 +178,36 @@ def read_draw(path: Path) -> Impaired:
     """
     import zarr
 
-    attributes: dict[str, Any] = dict(_open(path, IMPAIRED).attrs)
+    about = _about(path)
+    check_store(path, sizes)
     values = {}
-    for name in _ARRAYS:
+    for name in (*_ARRAYS, "time_s"):
         try:
-            values[name] = np.asarray(_open(path, name)[...])
-        except (RuntimeError, ValueError, OSError) as error:
+            array = zarr.open_array(str(path / name), mode="r", zarr_format=3)
+            values[name] = np.asarray(array[...])
+        except (RuntimeError, ValueError, OSError, MemoryError) as error:
             raise RfgsFormatError(f"{path / name}: truncated or damaged ({error})") from error
-    values["time_s"] = np.asarray(zarr.open_array(str(path / "time_s"), mode="r")[...])
     try:
-        settings = impairments_from_json(json.loads(str(attributes["impairments"])))
-        seed = int(attributes["seed"])
-    except (KeyError, ValueError, TypeError, RfgsError) as error:
+        settings = impairments_from_json(msgspec.json.decode(about.impairments))
+    except (ValueError, RfgsError) as error:
         raise RfgsFormatError(f"{path / IMPAIRED}: damaged settings ({error})") from error
     gain_db = values.pop("gain_db")
-    return Impaired(settings, seed, Draw(**values), gain_db)
+    return Impaired(settings, about.seed, Draw(**values), gain_db)
 
 
-def _open(path: Path, name: str) -> Any:
-    import zarr
+@dataclass(frozen=True)
+class _About:
+    """Attributes of the impaired channels."""
 
+    impairments: str
+    """Their settings as JSON."""
+    seed: int
+    sha256: list[str]
+    """Digest of each frame."""
+
+
+def _about(path: Path) -> _About:
     if not has_impaired(path):
         raise RfgsError(f"{path}: holds no impaired channels; add them with: rfgs-factory impair")
-    try:
-        return zarr.open_array(str(path / name), mode="r")
-    except (FileNotFoundError, ValueError, KeyError, TypeError) as error:
-        raise RfgsFormatError(f"{path / name}: damaged or missing array ({error})") from error
+    array = check_array(path, IMPAIRED)
+    return record(path / IMPAIRED / "zarr.json", array.attributes, _About)

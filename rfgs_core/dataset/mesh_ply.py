@@ -8,10 +8,13 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float32, Int32
-from plyfile import PlyData, PlyElement, PlyParseError
+from plyfile import PlyData, PlyElement
 
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.files import write_bytes
+from rfgs_core.ply_file import read_elements
+
+_WHAT = "a triangle mesh in PLY"
 
 
 def write_mesh(
@@ -35,17 +38,16 @@ def read_mesh(
     """Reads a triangle mesh.
 
     Raises:
-        RfgsFormatError: The file is missing, not a PLY, truncated or not made of triangles.
+        RfgsError: There is no such file.
+        RfgsFormatError: It is not a PLY, truncated or not made of triangles.
     """
+    ply = read_elements(path, _WHAT, {"face": {"vertex_indices": 3}})
     try:
-        ply = PlyData.read(str(path), known_list_len={"face": {"vertex_indices": 3}})
         vertex = ply["vertex"].data
         vertices = np.stack([vertex[axis] for axis in "xyz"], axis=1).astype(np.float32)
         faces = np.asarray(ply["face"].data["vertex_indices"], np.int32).reshape(-1, 3)
-    except FileNotFoundError as error:
-        raise RfgsFormatError(f"{path}: no such file; the folder is incomplete") from error
-    except (PlyParseError, KeyError, ValueError, TypeError, MemoryError, OSError) as error:
-        raise RfgsFormatError(f"{path}: expected a triangle mesh in PLY ({error})") from error
+    except (KeyError, ValueError, TypeError, MemoryError) as error:
+        raise RfgsFormatError(f"{path}: expected {_WHAT} ({error})") from error
     if faces.size and not 0 <= faces.min() <= faces.max() < len(vertices):
         raise RfgsFormatError(f"{path}: expected triangles of existing vertices")
     return vertices, faces

@@ -6,8 +6,6 @@ from __future__ import annotations
 from dataclasses import fields
 from pathlib import Path
 
-import numpy as np
-
 from rfgs_core.arrays import load_arrays
 from rfgs_core.dataset.writer import write_arrays
 from rfgs_core.errors import RfgsFormatError
@@ -41,11 +39,8 @@ def read_paths(path: Path) -> PathTable:
         RfgsError: There is no such file.
         RfgsFormatError: It is damaged, or an array has another shape or type.
     """
-    arrays = load_arrays(path, _REMEDY, _SHAPES, others=False)
-    for name, values in arrays.items():
-        expected = np.dtype(_TYPES.get(name, "f4"))
-        if values.dtype != expected:
-            raise RfgsFormatError(f"{path}: {name}: expected {expected}, got {values.dtype}")
+    types = {name: _TYPES.get(name, "f4") for name in _SHAPES}
+    arrays = load_arrays(path, _REMEDY, _SHAPES, types=types)
     if arrays["vertices"].shape[1] != arrays["kind"].shape[1] + 2:
         raise RfgsFormatError(f"{path}: vertices: expected two more than bounces")
     return PathTable(**arrays)

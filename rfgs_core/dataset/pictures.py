@@ -4,18 +4,26 @@
 from __future__ import annotations
 
 import io
+import struct
 import warnings
+import zlib
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float, Float32, UInt8, UInt16
 from PIL import Image, UnidentifiedImageError
 
+from rfgs_core.dataset.exr import decode_exr
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.files import replacing, write_bytes
+from rfgs_core.links import refuse_link
 
 #: Larger pictures than this many pixels are taken for a decompression bomb.
 MAX_PIXELS = 64_000_000
+_EXR_DAMAGE = (
+    *(RuntimeError, ValueError, OSError, TypeError, KeyError, MemoryError, OverflowError),
+    *(AttributeError, IndexError, struct.error, zlib.error),
+)
 
 
 def write_png(path: Path, pixels: UInt8[np.ndarray, "h w c"] | UInt16[np.ndarray, "h w"]) -> None:
@@ -57,13 +65,17 @@ def write_exr(path: Path, channels: dict[str, Float[np.ndarray, "h w"]]) -> None
 
 
 def read_exr(path: Path) -> dict[str, Float32[np.ndarray, "h w"]]:
-    """Reads every channel of an EXR file as float32.
+    """Reads every channel of an EXR file as float32, of any kind, as Blender writes them.
+
+    Only for files that a program of ours has just made: a damaged header ends the library, and the
+    process with it. Those of a dataset are for `read_planes`.
 
     Raises:
         RfgsFormatError: The file is missing, truncated or not an EXR.
     """
     import OpenEXR
 
+    refuse_link(path)
     if not path.is_file():
         raise RfgsFormatError(f"{path}: no such picture; the dataset is incomplete")
     try:
@@ -73,28 +85,63 @@ def read_exr(path: Path) -> dict[str, Float32[np.ndarray, "h w"]]:
                 for part in file.parts
                 for name, channel in part.channels.items()
             }
-    except (RuntimeError, ValueError, OSError) as error:
+    except _EXR_DAMAGE as error:
         raise RfgsFormatError(f"{path}: damaged or truncated EXR ({error})") from error
     if not stored:
         raise RfgsFormatError(f"{path}: EXR without channels")
     return stored
 
 
+def read_planes(path: Path, names: str) -> list[Float32[np.ndarray, "h w"]]:
+    """Reads channels of an EXR file of a dataset, by their names, a letter each.
+
+    Raises:
+        RfgsFormatError: The file is missing, truncated, too large or not such an EXR.
+    """
+    refuse_link(path)
+    try:
+        channels = decode_exr(path.read_bytes(), MAX_PIXELS)
+    except FileNotFoundError as error:
+        raise RfgsFormatError(f"{path}: no such picture; the dataset is incomplete") from error
+    except _EXR_DAMAGE as error:
+        raise RfgsFormatError(f"{path}: damaged or truncated EXR ({error})") from error
+    missing = [name for name in names if name not in channels]
+    if missing:
+        found = ", ".join(channels)
+        raise RfgsFormatError(f"{path}: expected channel {missing[0]!r}, got {found}")
+    return [channels[name] for name in names]
+
+
+def _refuse_large(path: Path, size: tuple[int, int]) -> None:
+    """Refuses more pixels than any picture of ours has."""
+    if not (0 < size[0] and 0 < size[1] and size[0] * size[1] <= MAX_PIXELS):
+        raise RfgsFormatError(f"{path}: picture of {size} pixels is too large")
+
+
 def _read_png(path: Path, mode: str) -> np.ndarray:
+    refuse_link(path)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", Image.DecompressionBombWarning)
-            with Image.open(path) as image:
-                if image.width * image.height > MAX_PIXELS:
-                    raise RfgsFormatError(f"{path}: picture of {image.size} pixels is too large")
+            # Other formats that Pillow knows are none of ours; some start programs.
+            with Image.open(path, formats=["PNG"]) as image:
+                _refuse_large(path, image.size)
                 return np.asarray(image.convert(mode) if mode else image)
     except FileNotFoundError as error:
         raise RfgsFormatError(f"{path}: no such picture; the dataset is incomplete") from error
+    except RfgsFormatError:
+        raise
     except (
         UnidentifiedImageError,
         Image.DecompressionBombWarning,
         Image.DecompressionBombError,
         SyntaxError,
         OSError,
+        EOFError,
+        MemoryError,
+        OverflowError,
+        ValueError,
+        zlib.error,
+        struct.error,
     ) as error:
         raise RfgsFormatError(f"{path}: damaged or truncated picture ({error})") from error

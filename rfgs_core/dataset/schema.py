@@ -4,19 +4,21 @@
 from __future__ import annotations
 
 import re
-from dataclasses import MISSING, asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float64
 
+from rfgs_core.dataset.pictures import MAX_PIXELS
+from rfgs_core.dataset.rows import DeviceRow, SequenceRows
+from rfgs_core.dataset.store_schema import LARGEST_CHUNK_BYTES
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.files import read_json
 from rfgs_core.radio import DevicePose, Radio
 from rfgs_core.radio.antennas import PATTERNS, POLARIZATIONS
-from rfgs_core.radio.layout import Role
-from rfgs_core.radio.presets import OwnLinks
+from rfgs_core.records import record, unknown_fields
 
 DATASET_SCHEMA = "rfgs-dataset/1"
 SEQUENCE_SCHEMA = "rfgs-sequence/1"
@@ -37,16 +39,9 @@ CONTENTS = (
 #: Outer surface of an adult that sets the size of a predicted point set [m²].
 PERSON_SURFACE_M2 = 1.6
 
+#: More rows, columns, subcarriers or samples than this are none of a radio's.
+_MOST = 2**24
 _NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]*")
-_TYPES: dict[str, type | tuple[type, ...]] = {
-    "bool": bool,
-    "int": int,
-    "float": (int, float),
-    "str": str,
-    "list": list,
-    "dict": dict,
-    "tuple": (list, tuple),
-}
 
 
 @dataclass(frozen=True)
@@ -120,7 +115,8 @@ def read_dataset_info(path: Path) -> DatasetInfo:
         RfgsError: The file does not exist or is of a newer schema.
         RfgsFormatError: The file does not keep to its schema.
     """
-    info = DatasetInfo(**_fields(path, DatasetInfo, DATASET_SCHEMA))
+    value = _of_schema(path, DATASET_SCHEMA)
+    info = record(path, value, DatasetInfo)
     for name in info.sequences:
         check_name(path, name)
     unknown = sorted(set(info.has) - set(CONTENTS))
@@ -136,28 +132,21 @@ def read_sequence_info(path: Path) -> SequenceInfo:
         RfgsError: The file does not exist or is of a newer schema.
         RfgsFormatError: The file does not keep to its schema.
     """
-    info = SequenceInfo(**_fields(path, SequenceInfo, SEQUENCE_SCHEMA))
-    if not all(isinstance(row, dict) for row in (*info.cameras, *info.radios.values())):
-        raise RfgsFormatError(f"{path}: cameras and radios: expected JSON objects")
-    for name in [*info.radios, *(row.get("name") for row in info.cameras)]:
+    value = _of_schema(path, SEQUENCE_SCHEMA)
+    rows = record(path, value, SequenceRows)
+    info = record(path, value, SequenceInfo)
+    for name in [*info.radios, *(row.name for row in rows.cameras)]:
         check_name(path, name)
-    whole = all(type(frame) is int for frame in info.frames)
-    if not whole or not info.frames or sorted(set(info.frames)) != info.frames or info.fps <= 0:
+    if sorted(set(info.frames)) != info.frames:
         raise RfgsFormatError(f"{path}: expected ascending frame numbers and fps > 0")
-    if not _are_bounds(info.bounds_m):
+    if not (np.diff(bounds_array(info), axis=0) > 0.0).all():
         raise RfgsFormatError(f"{path}: bounds_m: expected [[min xyz], [max xyz]]")
-    if set(info.radios) != set(info.devices):
-        raise RfgsFormatError(f"{path}: radios and devices name different radios")
+    if not set(info.radios) == set(info.devices) == set(rows.splits.rf):
+        raise RfgsFormatError(f"{path}: radios, devices and splits.rf name different radios")
+    for row in rows.cameras:
+        if row.width * row.height > MAX_PIXELS:
+            raise RfgsFormatError(f"{path}: camera {row.name!r}: expected up to {MAX_PIXELS} px")
     return info
-
-
-def _are_bounds(rows: list[Any]) -> bool:
-    """Whether a JSON list is minimum and maximum of a box."""
-    try:
-        low, high = np.asarray(rows, dtype=np.float64).reshape(2, 3)
-    except (TypeError, ValueError):
-        return False
-    return bool(np.isfinite([low, high]).all() and (low < high).all())
 
 
 def check_name(path: Path, name: Any) -> None:
@@ -179,32 +168,37 @@ def radio_from_json(path: Path, values: dict[str, Any]) -> Radio:
     Raises:
         RfgsFormatError: A field is missing, unknown, of another type or impossible.
     """
-    fixed: dict[str, Any] = {
-        key: tuple(v) if isinstance(v, list) else v for key, v in values.items()
-    }
-    links = get_args(OwnLinks)
-    for spec in fields(Radio):
-        kind = str(spec.type).partition("[")[0]
-        value = fixed.get(spec.name, spec.default)
-        fits = value in links if kind == "OwnLinks" else isinstance(value, _TYPES.get(kind, object))
-        if spec.name in fixed and not fits:
-            raise RfgsFormatError(
-                f"{path}: radio {fixed.get('name')!r}: {spec.name}: expected "
-                f"{' or '.join(links) if kind == 'OwnLinks' else spec.type}, got {value!r}"
-            )
-    try:
-        radio = Radio(**fixed)
-    except TypeError as error:
-        raise RfgsFormatError(f"{path}: radios: {error}") from error
+    source = f"{path}: radio {values.get('name')!r}"
+    unknown = unknown_fields(values, Radio)
+    if unknown:
+        raise RfgsFormatError(f"{source}: unknown field {unknown[0]!r}")
+    radio: Radio = record(source, values, Radio)
     counts = ("num_subcarriers", "tx_rows", "tx_cols", "rx_rows", "rx_cols", "samples_per_frame")
-    wrong = [name for name in counts if getattr(radio, name) < 1]
+    wrong = [name for name in counts if not 1 <= getattr(radio, name) <= _MOST]
     wrong += [] if 0.0 < radio.freq_min_hz < radio.freq_max_hz else ["freq_max_hz"]
     wrong += [] if radio.pattern in PATTERNS else ["pattern"]
     wrong += [] if radio.polarization in POLARIZATIONS else ["polarization"]
     if wrong:
         value = getattr(radio, wrong[0])
-        raise RfgsFormatError(f"{path}: radio {radio.name!r}: {wrong[0]}: {value!r} is impossible")
+        raise RfgsFormatError(f"{source}: {wrong[0]}: {value!r} is impossible")
     return radio
+
+
+def check_size(path: Path, radio: Radio, devices: int) -> None:
+    """Refuses a radio whose channel no frame could hold, before any of it is laid out.
+
+    Raises:
+        RfgsFormatError: It is larger than a chunk of the store.
+    """
+    ports = len(radio.slants_deg) * devices
+    tx, rx = radio.tx_rows * radio.tx_cols * ports, radio.rx_rows * radio.rx_cols * ports
+    values = radio.samples_per_frame * tx * rx * radio.num_subcarriers
+    if values * np.dtype(np.complex64).itemsize > LARGEST_CHUNK_BYTES:
+        raise RfgsFormatError(
+            f"{path}: radio {radio.name!r}: {radio.samples_per_frame} samples of {tx} x {rx} "
+            f"elements and {radio.num_subcarriers} subcarriers; expected at most "
+            f"{LARGEST_CHUNK_BYTES / 2**30:.0f} GiB per frame"
+        )
 
 
 def device_pose(values: dict[str, Any]) -> DevicePose:
@@ -213,20 +207,10 @@ def device_pose(values: dict[str, Any]) -> DevicePose:
     Raises:
         RfgsFormatError: A field is missing, or the numbers are no position and rotation.
     """
-    try:
-        x, y, z = (float(value) for value in values["position_m"])
-        w, i, j, k = (float(value) for value in values["quat_wxyz"])
-        name = str(values["name"])
-    except (KeyError, TypeError, ValueError) as error:
-        raise RfgsFormatError(
-            f"device {values!r}: expected name, position_m [m] and quat_wxyz ({error})"
-        ) from error
-    if not np.isfinite([x, y, z, w, i, j, k]).all() or not np.any([w, i, j, k]):
-        raise RfgsFormatError(f"device {name!r}: expected finite numbers and a rotation")
-    role = values.get("role", "ACCESS_POINT")
-    if role not in get_args(Role):
-        raise RfgsFormatError(f"device {name!r}: role: expected {' or '.join(get_args(Role))}")
-    return DevicePose(name, (x, y, z), (w, i, j, k), role)
+    row: DeviceRow = record("device", values, DeviceRow)
+    if not any(row.quat_wxyz):
+        raise RfgsFormatError(f"device {row.name!r}: expected finite numbers and a rotation")
+    return DevicePose(row.name, row.position_m, row.quat_wxyz, row.role)
 
 
 def bounds_array(info: SequenceInfo) -> Float64[np.ndarray, "2 3"]:
@@ -234,25 +218,10 @@ def bounds_array(info: SequenceInfo) -> Float64[np.ndarray, "2 3"]:
     return np.asarray(info.bounds_m, dtype=np.float64)
 
 
-def _fields(path: Path, kind: type, schema: str) -> dict[str, Any]:
-    value = read_json(path)
-    if not isinstance(value, dict):
-        raise RfgsFormatError(f"{path}: expected a JSON object")
+def _of_schema(path: Path, schema: str) -> dict[str, Any]:
+    value = record(path, read_json(path), dict[str, Any])
     check_schema(path, value.get("schema"), schema)
-    known = {}
-    for spec in fields(kind):
-        if spec.name not in value:
-            if spec.default is not MISSING or spec.default_factory is not MISSING:
-                continue
-            raise RfgsFormatError(f"{path}: field {spec.name!r} is missing")
-        expected = _TYPES[str(spec.type).partition("[")[0]]
-        if not isinstance(value[spec.name], expected):
-            raise RfgsFormatError(
-                f"{path}: field {spec.name!r}: expected {spec.type}, got "
-                f"{type(value[spec.name]).__name__}"
-            )
-        known[spec.name] = value[spec.name]
-    return known
+    return value
 
 
 def check_schema(path: Path, found: Any, expected: str) -> None:

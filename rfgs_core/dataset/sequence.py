@@ -9,22 +9,32 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Complex64, Float32, Float64, Int32, UInt8, UInt16
 
-from rfgs_core.arrays import load_arrays
 from rfgs_core.dataset.csi_store import open_csi, read_csi
+from rfgs_core.dataset.geometry_store import (
+    read_geometry,
+    read_segment_velocity,
+    read_topology,
+)
 from rfgs_core.dataset.impaired_store import Impaired, read_draw, read_impaired
 from rfgs_core.dataset.mesh_ply import read_mesh
 from rfgs_core.dataset.names import SequenceFiles
 from rfgs_core.dataset.path_store import read_paths
-from rfgs_core.dataset.pictures import read_exr, read_png_rgba, read_png_u16
-from rfgs_core.dataset.schema import bounds_array, device_pose, radio_from_json, read_sequence_info
+from rfgs_core.dataset.pictures import read_planes, read_png_rgba, read_png_u16
+from rfgs_core.dataset.schema import (
+    bounds_array,
+    check_size,
+    device_pose,
+    radio_from_json,
+    read_sequence_info,
+)
+from rfgs_core.dataset.splits import refuse_beyond
+from rfgs_core.dataset.store_schema import store_sizes
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.radio import DevicePose, Layout, Radio, frame_samples, layout
 from rfgs_core.radio.path_table import PathTable
 
 if TYPE_CHECKING:
     import xarray
-
-_NO_GEOMETRY = "the geometry of this dataset is missing or damaged, make the dataset again"
 
 
 class Sequence:
@@ -61,6 +71,17 @@ class Sequence:
     def splits(self) -> dict[str, Any]:
         """What is held out of training."""
         return self.info.splits
+
+    def held_out(self, radio: str) -> dict[str, Any]:
+        """What is held out of a radio's training, as `splits.radio_split` chooses it.
+
+        Raises:
+            RfgsError: There is no such radio.
+            RfgsFormatError: It names elements, subcarriers or devices that the radio has not.
+        """
+        split = self.splits["rf"][self._radio(radio)]
+        refuse_beyond(f"{self.files.info}: splits.rf.{radio}", split, self._sizes(radio))
+        return split
 
     @property
     def instances(self) -> list[dict[str, Any]]:
@@ -102,14 +123,16 @@ class Sequence:
 
     def layout(self, name: str, sample: int = 0) -> Layout:
         """Every antenna element of the radio, at one of a frame's samples where they move."""
-        return layout(self.radio_spec(name), self.devices(name), sample)
+        spec, devices = self.radio_spec(name), self.devices(name)
+        check_size(self.files.info, spec, 1 if spec.antennas_move else len(devices))
+        return layout(spec, devices, sample)
 
     def radio(self, name: str) -> xarray.Dataset:
         """Channels of a radio with their coordinates, read when used.
 
         Values read this way are not checked against their digests; `Sequence.csi` does that.
         """
-        return open_csi(self.files.csi(self._radio(name)))
+        return open_csi(self.files.csi(self._radio(name)), self._sizes(name))
 
     def coordinates(self, name: str) -> xarray.Dataset:
         """Coordinates of a radio's channels alone; read once, as they are the same at all frames.
@@ -146,11 +169,10 @@ class Sequence:
             RfgsFormatError: The chunk is missing, truncated or altered.
         """
         index, store = self._index(frame), self.files.csi(self._radio(name))
+        links, counts = self._links(name), (self.radio_spec(name).samples_per_frame,)
         if impaired:
-            value = read_impaired(store, index)
-        else:
-            value = read_csi(store, index, self.files.csi_done(name, frame))
-        return self._fitting(name, value, frame, (self.radio_spec(name).samples_per_frame,))
+            return read_impaired(store, index, links, counts)
+        return read_csi(store, index, self.files.csi_done(name, frame), links, counts)
 
     def impairments(self, name: str) -> Impaired:
         """How the impaired channels came about: settings, draws and gains.
@@ -159,7 +181,7 @@ class Sequence:
             RfgsError: There is no such radio, or nothing was impaired.
             RfgsFormatError: What is stored is damaged.
         """
-        return read_draw(self.files.csi(self._radio(name)))
+        return read_draw(self.files.csi(self._radio(name)), self._sizes(name))
 
     def csi_static(self, name: str) -> Complex64[np.ndarray, "tx rx subcarrier"]:
         """Channel without anything that moves, checked against its digest.
@@ -177,8 +199,9 @@ class Sequence:
         Raises:
             RfgsFormatError: The chunk is missing, truncated or altered.
         """
-        value = read_csi(self.files.csi(self._radio(name)), None, self.files.csi_done(name, None))
-        return self._fitting(name, value, None, (1, self.radio_spec(name).samples_per_frame))
+        store, done = self.files.csi(self._radio(name)), self.files.csi_done(name, None)
+        counts = (1, self.radio_spec(name).samples_per_frame)
+        return read_csi(store, None, done, self._links(name), counts)
 
     def paths(self, name: str, frame: int) -> PathTable:
         """The paths behind `csi` of a frame, between centres of sites.
@@ -202,8 +225,7 @@ class Sequence:
         Int32[np.ndarray, "face"],
     ]:
         """Vertices [m], triangles and instance id per triangle of what moves."""
-        shapes = {"faces": ("face", 3), "instance": ("face",)}
-        topology = load_arrays(self.files.topology, _NO_GEOMETRY, shapes)
+        topology = read_topology(self.files.topology)
         vertices = self._geometry(frame)["vertices"]
         faces = topology["faces"]
         if faces.size and not 0 <= faces.min() <= faces.max() < len(vertices):
@@ -227,10 +249,8 @@ class Sequence:
         A segment is the skin that follows a joint of `rfgs_core.skeleton` (`segment` of the
         topology); one without skin of its own has the velocity of the joint.
         """
-        file = self.files.geometry(frame)
         self._index(frame)
-        name = "segment_velocity"
-        return load_arrays(file, _NO_GEOMETRY, {name: ("person", 17, 3)}, unknown=(name,))[name]
+        return read_segment_velocity(self.files.geometry(frame))
 
     def people(self, frame: int) -> Int32[np.ndarray, "person"]:
         """Instance id of each person, in the order of `joints`."""
@@ -252,13 +272,12 @@ class Sequence:
     def depth(self, camera: str, frame: int) -> Float32[np.ndarray, "h w"]:
         """Planar depth [m], +inf where nothing was hit."""
         self._index(frame)
-        return _plane(self.files.depth(self._camera(camera), frame), "Z")
+        return read_planes(self.files.depth(self._camera(camera), frame), "Z")[0]
 
     def normal(self, camera: str, frame: int) -> Float32[np.ndarray, "h w 3"]:
         """World normals, zero where nothing was hit."""
         self._index(frame)
-        file = self.files.normal(self._camera(camera), frame)
-        return np.stack([_plane(file, axis) for axis in "XYZ"], axis=-1)
+        return np.stack(read_planes(self.files.normal(self._camera(camera), frame), "XYZ"), axis=-1)
 
     def mask(self, camera: str, frame: int) -> UInt16[np.ndarray, "h w"]:
         """Instance id of each pixel, 0 for everything static."""
@@ -285,26 +304,15 @@ class Sequence:
             raise RfgsError(f"{self.path}: no camera {name!r}; it holds {', '.join(names)}")
         return name
 
-    def _fitting(
-        self, name: str, value: np.ndarray, frame: int | None, counts: tuple[int, ...]
-    ) -> np.ndarray:
-        """Refuses channels whose shape is not that of the radio with one of `counts` samples."""
-        shape = (*self.layout(name).measured.shape, self.radio_spec(name).num_subcarriers)
-        if value.shape[1:] != shape or len(value) not in counts:
-            raise RfgsFormatError(
-                f"{self.files.csi(name)}: frame {frame}: expected shape {(counts[-1], *shape)}, "
-                f"got {value.shape}"
-            )
-        return value
+    def _links(self, name: str) -> tuple[int, int, int]:
+        """Transmitting and receiving elements of a radio, and its subcarriers."""
+        tx, rx = self.layout(self._radio(name)).measured.shape
+        return tx, rx, self.radio_spec(name).num_subcarriers
+
+    def _sizes(self, name: str) -> dict[str, int]:
+        """How long the dimensions of a radio's store are."""
+        return store_sizes(len(self.frames), self.radio_spec(name), self.layout(name))
 
     def _geometry(self, frame: int) -> dict[str, np.ndarray]:
         self._index(frame)
-        shapes = {"vertices": ("vertex", 3), "joints": ("person", 17, 3)}
-        return load_arrays(self.files.geometry(frame), _NO_GEOMETRY, shapes, unknown=("joints",))
-
-
-def _plane(path: Path, channel: str) -> Float32[np.ndarray, "h w"]:
-    channels = read_exr(path)
-    if channel not in channels:
-        raise RfgsFormatError(f"{path}: expected channel {channel!r}, got {', '.join(channels)}")
-    return channels[channel]
+        return read_geometry(self.files.geometry(frame))

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool
 
+from rfgs_core.errors import RfgsFormatError
 from rfgs_core.radio import Layout, Radio
 from rfgs_core.seeds import sub_seed
 
@@ -64,6 +65,29 @@ def radio_split(radio: Radio, layout: Layout, seed: int) -> dict[str, list[Any]]
         "subcarriers": list(range(first, max(last, first + 1))) if subcarriers >= 8 else [],
         "device_pairs": held.tolist() if len(pairs) > 1 else [],
     }
+
+
+def refuse_beyond(source: str, split: Mapping[str, Any], sizes: Mapping[str, int]) -> None:
+    """Refuses a radio's split that names elements, subcarriers or devices beyond its last.
+
+    Args:
+        source: Where the split stands, for the message.
+        split: As `radio_split` chooses it.
+        sizes: Receiving elements (`rx`), subcarriers and devices of the radio.
+
+    Raises:
+        RfgsFormatError: It does.
+    """
+    pairs = [device for pair in split["device_pairs"] for device in pair]
+    for name, indices, axis in (
+        ("rx_elements", split["rx_elements"], "rx"),
+        ("subcarriers", split["subcarriers"], "subcarrier"),
+        ("device_pairs", pairs, "device"),
+    ):
+        if max(indices, default=0) >= sizes[axis]:
+            raise RfgsFormatError(
+                f"{source}.{name}: expected indices below {sizes[axis]}, found {max(indices)}"
+            )
 
 
 @dataclass(frozen=True)

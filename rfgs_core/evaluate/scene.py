@@ -125,7 +125,7 @@ class Scene:
         sequence, name = run.sequence, run.config.radio
         radio = sequence.radio_spec(name)
         layout = whole_layout(sequence, name, coherent=False)
-        held_out = HeldOut.of(sequence.splits["rf"][name], layout, radio.num_subcarriers)
+        held_out = HeldOut.of(sequence.held_out(name), layout, radio.num_subcarriers)
         grid = Grid.over(sequence.bounds_m)
         voxels = voxel_budget(sequence.instances)
         static = whole_static(sequence, name)

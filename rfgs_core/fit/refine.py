@@ -243,6 +243,8 @@ def _resume(
         checkpoint,
         "delete it to start this frame over",
         {**GAUSSIAN_SHAPES, "edited": (), "origin": ("M",), "finished_steps": ()},
+        types={**dict.fromkeys(GAUSSIAN_SHAPES, "f4"), "origin": "i8", "finished_steps": "i8"},
+        others=True,
     )
     mark, device = "density.", start.means.device
     memory = {

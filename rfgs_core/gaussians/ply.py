@@ -13,11 +13,12 @@ from pathlib import Path
 import numpy as np
 import torch
 from jaxtyping import Float32
-from plyfile import PlyData, PlyElement, PlyParseError
+from plyfile import PlyData, PlyElement
 
-from rfgs_core.errors import RfgsError, RfgsFormatError
+from rfgs_core.errors import RfgsFormatError
 from rfgs_core.files import replacing
 from rfgs_core.gaussians.model import FEATURE_DIM, Gaussians
+from rfgs_core.ply_file import count_rows, read_elements
 
 #: Value of the zeroth spherical harmonic, 1 / (2 √π): rgb = 0.5 + SH_C0 · f_dc.
 SH_C0 = 0.28209479177387814
@@ -25,6 +26,7 @@ SH_C0 = 0.28209479177387814
 #: Extra property: power a Gaussian reflects [dB], absent in files of other programs.
 POWER_PROPERTY = "rf_power_db"
 
+_WHAT = "a PLY of Gaussians"
 _COLUMNS = {
     "means": ("x", "y", "z"),
     "normals": ("nx", "ny", "nz"),
@@ -168,16 +170,21 @@ def read_ply(path: Path) -> GaussianCloud:
     return cloud
 
 
+def count_ply(path: Path) -> int:
+    """How many Gaussians a PLY says that it holds; its header alone is read.
+
+    Raises:
+        RfgsError: The file does not exist.
+        RfgsFormatError: It is no PLY with vertices.
+    """
+    return count_rows(path, "vertex", _WHAT)
+
+
 def _vertex_table(path: Path) -> np.ndarray:
-    try:
-        with path.open("rb") as stream:
-            return PlyData.read(stream)["vertex"].data
-    except FileNotFoundError as error:
-        raise RfgsError(f"{path}: no such file; expected a PLY of Gaussians") from error
-    except KeyError as error:
-        raise RfgsFormatError(f"{path}: expected a PLY with an element 'vertex'") from error
-    except (PlyParseError, ValueError, TypeError, IndexError, EOFError, MemoryError) as error:
-        raise RfgsFormatError(f"{path}: not a whole PLY file ({error})") from error
+    data = read_elements(path, _WHAT)
+    if "vertex" not in data:
+        raise RfgsFormatError(f"{path}: expected {_WHAT}, with an element 'vertex'")
+    return data["vertex"].data
 
 
 def _check(cloud: GaussianCloud, path: Path) -> None:

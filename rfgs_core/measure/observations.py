@@ -137,7 +137,7 @@ def visible_channel(
             )
         # The links that exist are those the channels were stored with.
         elements = replace(elements, measured=data["measured"].values.copy())
-    split = HeldOut.of(sequence.splits["rf"][radio], elements, data.sizes["subcarrier"])
+    split = HeldOut.of(sequence.held_out(radio), elements, data.sizes["subcarrier"])
     links, subcarriers = split.links, split.subcarriers
     count = 1 if packets == "first" else None
     csi = whole_packets(sequence, radio, frame, channel, count)

@@ -32,6 +32,8 @@ HEAD_SHAPES: dict[str, Shape] = {
     "gamma_scale_m": (),
     "rho_logit": (),
 }
+#: Their types.
+HEAD_TYPES = {"directions": "f4", "gamma_scale_m": "f8", "rho_logit": "f8"}
 
 
 def dimming(cosine: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:

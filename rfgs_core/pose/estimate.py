@@ -106,11 +106,6 @@ def headings_of(
 def _clouds(run: Run, frame: int, floor_m: float) -> list[Cloud]:
     """Moving Gaussians of a frame, one cloud per body."""
     attributes = run.attributes(frame)
-    if "body" not in attributes:
-        raise RfgsError(
-            f"{run.path}: frame {frame} does not say which Gaussian belongs to which body; train "
-            "this run again"
-        )
     body, means = attributes["body"], run.moving(frame).means.numpy().astype(np.float64)
     power = power_of(attributes["rf_power_db"].astype(np.float64))
     clouds = []

@@ -3,11 +3,10 @@
 
 from __future__ import annotations
 
-import math
 import re
 from dataclasses import MISSING, Field, asdict, fields
 from pathlib import Path
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Any
 
 import yaml
 
@@ -16,14 +15,17 @@ from rfgs_core.files import read_json
 from rfgs_core.radio.antennas import PATTERNS, POLARIZATIONS
 from rfgs_core.radio.layout import NEAREST_ANTENNAS_M, DevicePose, layout, nearest_m
 from rfgs_core.radio.presets import PRESETS, Radio, preset
+from rfgs_core.records import record
 from rfgs_core.yaml_file import read_yaml
 
 SUFFIXES = (".json", ".yaml", ".yml")
 #: Elements per device beyond which something else was meant.
 MOST_ELEMENTS = 4096
+MOST_DEVICES = 1024
+#: The same of subcarriers, and of samples per frame.
+MOST_SAMPLES = 2**20
 
 _NAME = re.compile(r"[A-Za-z0-9_-]+")
-_HINTS = get_type_hints(Radio)
 
 
 def read_radio(path: Path) -> Radio:
@@ -66,7 +68,8 @@ def checked_radio(source: str, values: dict[str, Any]) -> Radio:
     missing = [name for name, spec in known.items() if name not in values and _needed(spec)]
     if missing:
         raise RfgsError(f"{source}: field {missing[0]!r} is missing; give it, or `like: PRESET`")
-    radio = Radio(**{name: _converted(source, name, value) for name, value in values.items()})
+    # YAML takes 60e9, without a point, for text.
+    radio: Radio = record(source, values, Radio, lax=True)
     if radio.name in PRESETS and radio != preset(radio.name):
         raise RfgsError(f"{source}: name: {radio.name!r} is a preset's name; choose another")
     for problem in radio_problems(radio):
@@ -136,6 +139,11 @@ def _aperture_problems(radio: Radio) -> list[str]:
 
 def _antenna_problems(radio: Radio) -> list[str]:
     """Problems of arrays whose fields are fine one by one."""
+    most = {"num_devices": MOST_DEVICES, "num_subcarriers": MOST_SAMPLES}
+    most["samples_per_frame"] = MOST_SAMPLES
+    for name, limit in most.items():
+        if getattr(radio, name) > limit:
+            return [f"{name}: {getattr(radio, name)}: expected at most {limit}"]
     if max(radio.tx_rows * radio.tx_cols, radio.rx_rows * radio.rx_cols) > MOST_ELEMENTS:
         return [f"tx_rows … rx_cols: more than {MOST_ELEMENTS} elements in one array"]
     if radio.own_device_links == "excluded":
@@ -155,47 +163,8 @@ def _mapping(path: Path) -> dict[str, Any]:
     if path.suffix.lower() not in SUFFIXES:
         raise RfgsError(f"{path}: expected a radio in a file ending in {', '.join(SUFFIXES)}")
     value = read_json(path) if path.suffix.lower() == ".json" else read_yaml(path)
-    if not isinstance(value, dict):
-        raise RfgsError(f"{path}: expected fields and values, got {type(value).__name__}")
-    return value
+    return record(path, value, dict[str, Any])
 
 
 def _needed(spec: Field) -> bool:
     return spec.default is MISSING and spec.default_factory is MISSING
-
-
-def _converted(source: str, name: str, value: Any) -> Any:
-    """A value as the type its field has."""
-    kind = _HINTS[name]
-    if get_origin(kind) is Literal:
-        if value not in get_args(kind):
-            choices = " or ".join(get_args(kind))
-            raise RfgsError(f"{source}: {name}: expected {choices}, got {value!r}")
-        return value
-    if get_origin(kind) is tuple:
-        arguments = get_args(kind)
-        any_number = arguments[-1] is Ellipsis
-        if not isinstance(value, (list, tuple)) or not (any_number or len(value) == len(arguments)):
-            count = "" if any_number else f"{len(arguments)} "
-            raise RfgsError(f"{source}: {name}: expected a list of {count}numbers, got {value!r}")
-        return tuple(_number(source, name, part) for part in value)
-    if kind is float:
-        return _number(source, name, value)
-    if kind is bool and not isinstance(value, bool):
-        raise RfgsError(f"{source}: {name}: expected true or false, got {value!r}")
-    if kind is int and (isinstance(value, bool) or not isinstance(value, int)):
-        raise RfgsError(f"{source}: {name}: expected a whole number, got {value!r}")
-    if kind is str and not isinstance(value, str):
-        raise RfgsError(f"{source}: {name}: expected text, got {value!r}")
-    return value
-
-
-def _number(source: str, name: str, value: Any) -> float:
-    """A finite number; one in quotes is taken too."""
-    try:
-        number = math.nan if isinstance(value, bool) else float(value)
-    except (TypeError, ValueError, OverflowError):
-        number = math.nan
-    if not math.isfinite(number):
-        raise RfgsError(f"{source}: {name}: expected a finite number, got {value!r}")
-    return number

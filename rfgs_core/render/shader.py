@@ -64,7 +64,8 @@ class Shader:
             RfgsError: The file does not exist.
             RfgsFormatError: It is damaged, or its matrices have other shapes or are not finite.
         """
-        arrays = load_arrays(path, "fit the shader again with `rfgs train`", _SHAPES)
+        remedy, types = "fit the shader again with `rfgs train`", dict.fromkeys(_SHAPES, "f4")
+        arrays = load_arrays(path, remedy, _SHAPES, types=types)
         return Shader(
             **{name: torch.from_numpy(arrays[name].astype(np.float32)) for name in _SHAPES}
         )

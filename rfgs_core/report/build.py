@@ -22,7 +22,7 @@ from rfgs_core.figures.shapes import shape_chart
 from rfgs_core.figures.style import BASELINE, file_uri, picture_uri
 from rfgs_core.files import write_text
 from rfgs_core.render.view import pictures_of
-from rfgs_core.report.compare import read_metrics
+from rfgs_core.report.metrics_file import read_metrics
 from rfgs_core.report.page import (
     Card,
     Page,

@@ -4,12 +4,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
-from rfgs_core.errors import RfgsError, RfgsFormatError
-from rfgs_core.evaluate.metrics import SCHEMA
-from rfgs_core.files import read_json
 from rfgs_core.report.tables import GROUPS, align, show
 
 #: Conditions that must agree for a comparison to mean anything.
@@ -22,25 +18,6 @@ CONDITIONS = (
     "impairments",
     *("observe", "packets", "background"),
 )
-
-
-def read_metrics(run: Path) -> dict[str, Any]:
-    """Metrics of a run.
-
-    Raises:
-        RfgsError: The folder is no run, or it has not been evaluated.
-        RfgsFormatError: The metrics are damaged or of another version.
-    """
-    if not (run / "config.json").is_file():
-        raise RfgsError(f"{run}: not a run; expected a folder with config.json")
-    if not (run / "metrics.json").is_file():
-        raise RfgsError(f"{run}: not evaluated yet; run `rfgs eval {run}` first")
-    metrics = read_json(run / "metrics.json")
-    if not isinstance(metrics, dict) or metrics.get("schema") != SCHEMA:
-        raise RfgsFormatError(
-            f"{run / 'metrics.json'}: expected schema {SCHEMA}; run `rfgs eval {run}` again"
-        )
-    return metrics
 
 
 def differences(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[str]:

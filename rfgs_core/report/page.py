@@ -9,6 +9,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from rfgs_core.links import refuse_link
 from rfgs_core.report.tables import Table
 
 
@@ -153,4 +154,5 @@ def duration(seconds: float) -> str:
 
 def image_file(path: Path) -> bytes | None:
     """Bytes of a picture, None where there is none."""
+    refuse_link(path)
     return path.read_bytes() if path.is_file() else None

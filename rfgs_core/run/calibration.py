@@ -65,7 +65,8 @@ def read_calibration(run: Path, frame: int) -> Calibration:
         RfgsFormatError: The file is damaged.
     """
     remedy = "run the same `rfgs train` again, without the file if it is damaged"
-    arrays = load_arrays(calibration_path(run, frame), remedy, _SHAPES)
+    path, types = calibration_path(run, frame), dict.fromkeys(_SHAPES, "f8")
+    arrays = load_arrays(path, remedy, _SHAPES, types=types)
     return Calibration(
         capture=Offsets(arrays["capture_phase_rad"], arrays["capture_delay_s"]),
         drift=Offsets(arrays["drift_phase_rad"], arrays["drift_delay_s"]),

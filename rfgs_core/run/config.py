@@ -5,10 +5,11 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Any
 
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.files import read_json, write_json
+from rfgs_core.records import record
 from rfgs_core.settings import TrainConfig
 
 #: Schema of `config.json`.
@@ -69,31 +70,37 @@ class RunConfig:
         path = run / CONFIG_FILE
         if not path.exists():
             raise RfgsError(f"{run} is not a run: it has no {CONFIG_FILE}; `rfgs train` makes one")
-        stored = read_json(path)
-        if not isinstance(stored, dict) or stored.get("schema") != SCHEMA:
-            found = stored.get("schema") if isinstance(stored, dict) else type(stored).__name__
+        stored = record(path, read_json(path), dict[str, Any])
+        if stored.get("schema") != SCHEMA:
             raise RfgsFormatError(
-                f"{path}: expected schema {SCHEMA}, found {found}; "
+                f"{path}: expected schema {SCHEMA}, found {stored.get('schema')}; "
                 "use the version of rfgs that made it, or train again"
             )
         _need_entries(path, stored)
         own = {name: stored[name] for name in (*_OWN, "train_s") if name in stored}
         settings = {name: stored[name] for name in _SETTINGS}
-        without = tuple(settings.pop("without"))
-        return RunConfig(**own, settings=TrainConfig(**settings, without=without))
+        try:
+            config: RunConfig = record(path, {**own, "settings": settings}, RunConfig, _REMEDY)
+        except RfgsFormatError as error:
+            # In the file, everything stands on one level.
+            raise RfgsFormatError(str(error).replace(": settings.", ": ", 1)) from error
+        except RfgsError as error:
+            raise RfgsFormatError(f"{path}: {error}; {_REMEDY}") from error
+        if not config.frames or sorted(set(config.frames)) != config.frames:
+            raise RfgsFormatError(
+                f"{path}: frames: expected a list of ascending numbers, found {config.frames[:9]}; "
+                f"{_REMEDY}"
+            )
+        return config
 
 
+_REMEDY = "train again"
 _OWN = tuple(field.name for field in fields(RunConfig) if field.name not in ("settings", "train_s"))
 _SETTINGS = tuple(field.name for field in fields(TrainConfig) if field.name not in _NOT_KEPT)
-_TYPES: dict[type, tuple[tuple[type, ...], str]] = {
-    str: ((str,), "a text"),
-    int: ((int,), "a whole number"),
-    float: ((int, float), "a number"),
-}
 
 
 def _need_entries(path: Path, stored: dict[str, Any]) -> None:
-    """Refuses entries that are missing, unknown or of another type.
+    """Refuses entries that are missing or unknown.
 
     Raises:
         RfgsFormatError: There are such; they are named.
@@ -107,23 +114,3 @@ def _need_entries(path: Path, stored: dict[str, Any]) -> None:
             f"{path}: expected the entries of this version of rfgs, found {found}; use the "
             "version that made the run, or train again"
         )
-    hints = {**get_type_hints(RunConfig), **get_type_hints(TrainConfig)}
-    for name, value in stored.items():
-        expected = _complaint(name, value, hints.get(name))
-        if expected is not None:
-            raise RfgsFormatError(
-                f"{path}: {name}: expected {expected}, found {value!r}; train again"
-            )
-
-
-def _complaint(name: str, value: object, hint: Any) -> str | None:
-    """What an entry should have been; None where it is."""
-    if name == "frames":
-        fine = isinstance(value, list) and value and all(type(number) is int for number in value)
-        return None if fine else "a list of numbers"
-    if get_origin(hint) is Literal:
-        return None if value in get_args(hint) else f"one of {', '.join(get_args(hint))}"
-    if get_origin(hint) is tuple:
-        return None if isinstance(value, list) else "a list"
-    kinds, words = _TYPES.get(hint, ((object,), ""))
-    return None if type(value) in kinds or object in kinds else words

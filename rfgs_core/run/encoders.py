@@ -15,6 +15,7 @@ from rfgs_core.encode.learned.signature import RadioSignature
 from rfgs_core.encode.path_features import PathFeatures
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import sha256, write_bytes
+from rfgs_core.links import refuse_link
 from rfgs_core.radio.path_table import PathTable
 from rfgs_core.run.config import RunConfig
 from rfgs_core.settings import Packets, TrainConfig
@@ -45,6 +46,7 @@ def with_encoder(config: TrainConfig, text: str) -> tuple[TrainConfig, Path | No
 
 def keep_encoder(file: Path, out: Path) -> None:
     """Copies a learned encoder into a run, so that both stay together."""
+    refuse_link(file)
     write_bytes(out / ENCODER_FILE, file.read_bytes())
 
 

@@ -18,10 +18,10 @@ from rfgs_core.dataset import Sequence, open_dataset
 from rfgs_core.dataset.observed import Observed
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.gaussians import FEATURE_DIM, Gaussians
-from rfgs_core.gaussians.ply import read_ply
+from rfgs_core.gaussians.ply import count_ply, read_ply
 from rfgs_core.measure.observations import Kept, Observations, Reported, observe
 from rfgs_core.model.channel import Channel
-from rfgs_core.model.head import HEAD_SHAPES, RadioHead
+from rfgs_core.model.head import HEAD_SHAPES, HEAD_TYPES, RadioHead
 from rfgs_core.model.reflectivity import fitted_reflectivities
 from rfgs_core.model.unseen_pairs import levelled
 from rfgs_core.radio.levels import power_of
@@ -33,7 +33,14 @@ from rfgs_core.threads import one_torch_thread
 #: What a learned background is kept in.
 BACKGROUND_FILE = "background.npz"
 _REMEDY = "train this run again"
-_ATTRIBUTES: dict[str, Shape] = {"features": ("M", FEATURE_DIM), "rf_power_db": ("M",)}
+_ATTRIBUTES: dict[str, Shape] = {
+    "features": ("M", FEATURE_DIM),
+    "gamma": ("M", 1),
+    "rf_power_db": ("M",),
+    "track_id": ("M",),
+    "body": ("M",),
+}
+_TYPES = {"features": "f4", "gamma": "c8", "rf_power_db": "f4", "track_id": "i8", "body": "i8"}
 
 
 @dataclass(frozen=True)
@@ -97,7 +104,8 @@ class Run:
         if self.config.settings.background == "empty_room":
             return None
         shapes = {"empty": ("tx", "rx", "entry")}
-        return load_arrays(self.path / BACKGROUND_FILE, _REMEDY, shapes)["empty"]
+        types = {"empty": "c8 f4"}
+        return load_arrays(self.path / BACKGROUND_FILE, _REMEDY, shapes, types=types)["empty"]
 
     def ply_path(self, frame: int) -> Path:
         """Moving Gaussians of a frame."""
@@ -135,7 +143,14 @@ class Run:
                 if known
                 else f"{self.path} holds no frame {frame}; it has {self.frames}"
             )
-        return load_arrays(path, _REMEDY, _ATTRIBUTES)
+        arrays = load_arrays(path, _REMEDY, _ATTRIBUTES, types=_TYPES)
+        count = count_ply(self.ply_path(frame))
+        if count != len(arrays["features"]):
+            raise RfgsFormatError(
+                f"{self.ply_path(frame)}: holds {count} Gaussians, but there are features of "
+                f"{len(arrays['features'])}; {_REMEDY}"
+            )
+        return arrays
 
     def gaussians(self, frame: int) -> Gaussians:
         """Static Gaussians, then the moving ones of a frame."""
@@ -144,13 +159,7 @@ class Run:
     def moving(self, frame: int) -> Gaussians:
         """Moving Gaussians of a frame with their features."""
         features = self.attributes(frame)["features"]
-        cloud = read_ply(self.ply_path(frame))
-        if len(cloud) != len(features):
-            raise RfgsFormatError(
-                f"{self.ply_path(frame)}: holds {len(cloud)} Gaussians, but there are features of "
-                f"{len(features)}; {_REMEDY}"
-            )
-        return cloud.to_gaussians(features)
+        return read_ply(self.ply_path(frame)).to_gaussians(features)
 
     def bodies(self, frame: int) -> Bodies | None:
         """Where the bodies of a frame are and how they hold themselves; None without checkpoint.
@@ -162,13 +171,15 @@ class Run:
         if not path.exists():
             return None
         shapes = {"axes_xy": ("body", 2), "knees_rad": ("body",)}
-        stored = load_arrays(path, _REMEDY, shapes, ("knees_rad",), others=False)
+        types = dict.fromkeys(shapes, "f8")
+        stored = load_arrays(path, _REMEDY, shapes, ("knees_rad",), types=types)
         return Bodies(stored["axes_xy"], stored["knees_rad"])
 
     @property
     def head(self) -> RadioHead:
         """Decodes reflectivities from features."""
-        stored = load_arrays(self.path / "radio_head.npz", _REMEDY, HEAD_SHAPES)
+        file = self.path / "radio_head.npz"
+        stored = load_arrays(file, _REMEDY, HEAD_SHAPES, types=HEAD_TYPES)
         return RadioHead.of_arrays(stored)
 
     def predict(self, frame: int) -> Complex64[np.ndarray, "tx rx subcarrier"]:

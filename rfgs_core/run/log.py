@@ -6,6 +6,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from rfgs_core.links import refuse_link
+
 #: Takes the number of finished steps of a frame and values by name.
 Scalars = Callable[[int, Mapping[str, float]], None]
 
@@ -19,6 +21,7 @@ class TrainingLog:
     def __init__(self, folder: Path | None) -> None:
         self._writer = None
         if folder is not None:
+            refuse_link(folder)
             from torch.utils.tensorboard import SummaryWriter
 
             self._writer = SummaryWriter(str(folder))

@@ -12,7 +12,7 @@ from rfgs_core.background.static_set import StaticSet
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.gaussians import FEATURE_DIM, Gaussians
 from rfgs_core.gaussians.ply import GaussianCloud, cloud_of, read_ply, write_ply
-from rfgs_core.model.head import HEAD_SHAPES, RadioHead
+from rfgs_core.model.head import HEAD_SHAPES, HEAD_TYPES, RadioHead
 from rfgs_core.settings import TrainConfig
 
 #: Decodes the features of the static set; written last.
@@ -22,6 +22,7 @@ _SHAPES: dict[str, Shape] = {
     "gamma": ("M", 1),
     "rf_power_db": ("M",),
 }
+_TYPES = {"features": "f4", "gamma": "c8", "rf_power_db": "f4"}
 _REMEDY = f"delete {HEAD_FILE} and run the same `rfgs train` again"
 
 
@@ -34,10 +35,8 @@ def need_phases(config: TrainConfig) -> None:
     """Refuses a static set of a radio that reports no phases.
 
     Raises:
-        RfgsError: Gaussians are asked for that cannot be fitted, or a negative number of them.
+        RfgsError: Gaussians are asked for that cannot be fitted.
     """
-    if config.static_set < 0:
-        raise RfgsError(f"--static-set {config.static_set}: expected at least 0")
     if config.static_set and config.observe != "complex":
         raise RfgsError(
             f"--static-set {config.static_set}: expected the phases that --observe complex "
@@ -72,9 +71,10 @@ def read_static_set(run: Path) -> StaticSet:
         RfgsError: A file is missing.
         RfgsFormatError: A file is damaged, or they do not belong together.
     """
-    head = RadioHead.of_arrays(load_arrays(run / HEAD_FILE, _REMEDY, HEAD_SHAPES))
+    stored = load_arrays(run / HEAD_FILE, _REMEDY, HEAD_SHAPES, types=HEAD_TYPES)
+    head = RadioHead.of_arrays(stored)
     path = static_ply(run).with_suffix(".features.npz")
-    features = load_arrays(path, _REMEDY, _SHAPES)["features"]
+    features = load_arrays(path, _REMEDY, _SHAPES, types=_TYPES)["features"]
     cloud = static_cloud(run)
     if len(cloud) != len(features):
         raise RfgsFormatError(

@@ -4,41 +4,38 @@
 from __future__ import annotations
 
 import time
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import torch
 from tqdm import tqdm
 
-from rfgs_core.arrays import Shape, load_arrays, save_arrays
+from rfgs_core.arrays import save_arrays
 from rfgs_core.background.learned import (
     learned_background,
     need_enough_frames,
     without_movers,
 )
 from rfgs_core.background.static_set import fit_static_set
-from rfgs_core.bodies.tracks import Tracks
 from rfgs_core.dataset import Dataset, Sequence
 from rfgs_core.device import need_device
 from rfgs_core.errors import RfgsError
+from rfgs_core.files import sweep
 from rfgs_core.fit.calibrate import calibrate
 from rfgs_core.fit.frame import FrameState, start_frame
-from rfgs_core.fit.parameters import GAUSSIAN_SHAPES
 from rfgs_core.fit.refine import need_sample_points
 from rfgs_core.fit.stages import fit_frame
-from rfgs_core.gaussians import Gaussians
-from rfgs_core.gaussians.ply import GaussianCloud, cloud_of, read_ply, write_ply
+from rfgs_core.gaussians.ply import GaussianCloud, read_ply, write_ply
+from rfgs_core.links import refuse_link
+from rfgs_core.locks import alone_in
 from rfgs_core.measure.offsets import Offsets
-from rfgs_core.model.head import HEAD_SHAPES, RadioHead
-from rfgs_core.radio.levels import decibels
 from rfgs_core.run.calibration import (
     calibration_path,
     need_shared_links,
     read_calibration,
     write_calibration,
 )
+from rfgs_core.run.checkpoint import finished_frame, partial_path, store_frame
 from rfgs_core.run.config import CONFIG_FILE, RunConfig
 from rfgs_core.run.encoders import (
     ENCODER_FILE,
@@ -49,7 +46,6 @@ from rfgs_core.run.encoders import (
 from rfgs_core.run.folder import (
     BACKGROUND_FILE,
     Run,
-    checkpoint_path,
     open_run,
     relative_dataset,
 )
@@ -58,27 +54,11 @@ from rfgs_core.run.static import (
     has_static_set,
     need_phases,
     static_cloud,
-    static_ply,
     write_static_set,
 )
 from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import TrainConfig
 from rfgs_core.threads import one_torch_thread
-
-_CHECKPOINT: dict[str, Shape] = {
-    **GAUSSIAN_SHAPES,
-    "power": ("M",),
-    "axes_xy": ("body", 2),
-    "velocity_xy": ("body", 2),
-    "time_s": (),
-    "knees_rad": ("body",),
-    "track_id": ("M",),
-    "next_track": (),
-    **{f"head.{name}": shape for name, shape in HEAD_SHAPES.items()},
-}
-
-#: Velocities are not known in a first frame, and who stands has no knees that point anywhere.
-_MAY_BE_NAN = ("velocity_xy", "knees_rad")
 
 
 def train_sequence(
@@ -112,18 +92,29 @@ def train_sequence(
     if encoder_file is not None:
         refuse_other_radios(encoder_file, sequence, radio, config.packets)
     bodies = sum(1 for row in sequence.instances if row["class"] == "person")
-    config = replace(config, bodies=max(bodies, 1))
-    run = _open_or_create(
-        out,
-        RunConfig(
-            dataset=relative_dataset(out, dataset.path),
-            dataset_fingerprint=dataset.fingerprint,
-            sequence=sequence.name,
-            radio=radio,
-            frames=frames,
-            settings=config,
-        ),
+    asked = RunConfig(
+        dataset=relative_dataset(out, dataset.path),
+        dataset_fingerprint=dataset.fingerprint,
+        sequence=sequence.name,
+        radio=radio,
+        frames=frames,
+        settings=replace(config, bodies=max(bodies, 1)),
     )
+    if out.exists() and not out.is_dir():
+        raise RfgsError(f"{out} is a file; expected a folder, choose another --out")
+    refuse_link(out / CONFIG_FILE)
+    out.mkdir(parents=True, exist_ok=True)
+    with alone_in(out, out, "rfgs train"):
+        sweep(out, ".tmp-*")
+        # The file of a run does not keep every setting: the device is free.
+        return _train(_open_or_create(out, asked), asked.settings, sequence, encoder_file, log)
+
+
+def _train(
+    run: Run, config: TrainConfig, sequence: Sequence, encoder_file: Path | None, log: bool
+) -> Run:
+    """Fits what is missing of a run."""
+    out, radio = run.path, run.config.radio
     if encoder_file is not None and not (out / ENCODER_FILE).exists():
         keep_encoder(encoder_file, out)
     if config.background == "learned" and not (out / BACKGROUND_FILE).exists():
@@ -133,7 +124,7 @@ def train_sequence(
         begin = time.perf_counter()
         # Of a calibrated run the background has no offsets only once a frame is fitted.
         seed = sub_seed(config.seed, sequence.name, radio, "static set")
-        observations = run.observations(frames[0])
+        observations = run.observations(run.frames[0])
         with one_torch_thread():
             write_static_set(out, fit_static_set(observations, config.static_set, seed))
         spent += time.perf_counter() - begin
@@ -175,11 +166,11 @@ def _fit_frames(run: Run, config: TrainConfig, log: bool) -> float:
     ):
         for frame in run.frames:
             begin = time.perf_counter()
-            state = _finished(run, frame)
+            state = finished_frame(run, frame)
             if state is None:
                 with one_torch_thread():
                     state = _fit(run, frame, config, before, bar, curves.of_frame(frame))
-                _store(run, frame, state)
+                store_frame(run, frame, state)
                 spent += time.perf_counter() - begin
                 replace(run.config, train_s=round(spent, 2)).write(run.path)
             else:
@@ -220,7 +211,7 @@ def _fit(
         config,
         seed,
         encoder=encoder,
-        checkpoint=_partial_path(run, frame),
+        checkpoint=partial_path(run, frame),
         on_solved=lambda: bar.update(1),
         on_step=on_step,
         scalars=scalars,
@@ -242,10 +233,8 @@ def _calibrate(run: Run, frame: int, config: TrainConfig, seed: int) -> None:
 
 def _open_or_create(out: Path, config: RunConfig) -> Run:
     if not (out / CONFIG_FILE).exists():
-        if out.exists() and not out.is_dir():
-            raise RfgsError(f"{out} is a file; expected a folder, choose another --out")
         # Whoever starts a training from elsewhere keeps its log there.
-        if out.exists() and any(entry.name != "log" for entry in out.iterdir()):
+        if any(entry.name != "log" for entry in out.iterdir()):
             raise RfgsError(f"{out} is not empty and not a run; choose another --out")
         config.write(out)
         return Run(out, config)
@@ -257,60 +246,6 @@ def _open_or_create(out: Path, config: RunConfig) -> Run:
             "delete that folder"
         )
     return run
-
-
-def _partial_path(run: Run, frame: int) -> Path:
-    return checkpoint_path(run.path, frame).with_suffix(".partial.npz")
-
-
-def _store(run: Run, frame: int, state: FrameState) -> None:
-    """Writes a finished frame; its checkpoint comes last and marks it as done."""
-    power_db = decibels(state.power.numpy()).astype(np.float32)
-    write_ply(run.ply_path(frame), cloud_of(state.gaussians, rf_power_db=power_db))
-    gamma = state.gamma.detach().numpy().astype(np.complex64)
-    save_arrays(
-        run.ply_path(frame).with_suffix(".features.npz"),
-        {
-            "features": state.gaussians.features.numpy(),
-            "gamma": gamma[:, None],
-            "rf_power_db": power_db,
-            "track_id": state.track_id,
-            "body": state.moving.body,
-        },
-    )
-    if not static_ply(run.path).exists():
-        write_ply(static_ply(run.path), cloud_of(Gaussians.none()))
-    head = state.head.arrays()
-    save_arrays(run.path / "radio_head.npz", head)
-    arrays = {name: value.numpy() for name, value in state.gaussians.items()}
-    arrays |= {"power": state.power.numpy(), "track_id": state.track_id}
-    arrays["next_track"] = np.array(state.unused_track)
-    arrays |= {name: np.asarray(value) for name, value in asdict(state.tracks).items()}
-    arrays |= {f"head.{name}": value for name, value in head.items()}
-    save_arrays(checkpoint_path(run.path, frame), arrays)
-    _partial_path(run, frame).unlink(missing_ok=True)
-
-
-def _finished(run: Run, frame: int) -> FrameState | None:
-    """The state of a frame that is already fitted, for the next one to start from."""
-    path = checkpoint_path(run.path, frame)
-    if not path.exists():
-        return None
-    arrays = load_arrays(path, "delete it to fit this frame again", _CHECKPOINT, _MAY_BE_NAN)
-    fields = {name: torch.from_numpy(arrays[name]) for name in GAUSSIAN_SHAPES}
-    return FrameState(
-        gaussians=Gaussians(**fields),
-        power=torch.from_numpy(arrays["power"]),
-        head=RadioHead.of_arrays(arrays, "head."),
-        tracks=Tracks(
-            axes_xy=arrays["axes_xy"],
-            velocity_xy=arrays["velocity_xy"],
-            time_s=float(arrays["time_s"]),
-            knees_rad=arrays["knees_rad"],
-        ),
-        track_id=arrays["track_id"],
-        next_track=int(arrays["next_track"]),
-    )
 
 
 def _write_point_cloud(run: Run) -> None:

@@ -38,7 +38,7 @@ def radio_shapes(sequence: Sequence, radio: str) -> RadioShapes:
     devices, elements = sequence.devices(radio), sequence.layout(radio)
     samples = frame_samples(sequence.radio_spec(radio), sequence.fps, devices)
     pairs = [pair for pair in elements.device_pairs if pair[0] != pair[1]]
-    hidden = {frozenset(pair) for pair in sequence.splits["rf"][radio]["device_pairs"]}
+    hidden = {frozenset(pair) for pair in sequence.held_out(radio)["device_pairs"]}
     return RadioShapes(
         names=[device.name for device in devices],
         places=np.array([device.position_m for device in devices]),

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 from rfgs_core.errors import RfgsError
 
 if TYPE_CHECKING:
-    from viser import ViserServer
+    from rfgs_core.view.page_server import PageServer
 
 
 @contextlib.contextmanager
-def running_server(host: str, port: int) -> Iterator[ViserServer]:
+def running_server(host: str, port: int) -> Iterator[PageServer]:
     """A web server for as long as the block runs.
 
     Args:
@@ -27,12 +27,12 @@ def running_server(host: str, port: int) -> Iterator[ViserServer]:
     Raises:
         RfgsError: The address is none of this machine's, or the port is taken or not allowed.
     """
-    from viser import ViserServer
+    from rfgs_core.view.page_server import PageServer
 
     _check_free(host, port)
     # It prints a greeting and a farewell of its own.
     with contextlib.redirect_stdout(io.StringIO()):
-        server = ViserServer(host=host, port=port, verbose=False)
+        server = PageServer(host, port)
     try:
         # The server looks for another port by itself where somebody was faster.
         if port not in (0, server.get_port()):
@@ -43,11 +43,12 @@ def running_server(host: str, port: int) -> Iterator[ViserServer]:
             server.stop()
 
 
-def address(server: ViserServer) -> str:
-    """Where a browser of this machine finds the page."""
+def address(server: PageServer) -> str:
+    """Where a browser of this machine finds the page; whoever knows it may look."""
     host = server.get_host()
-    host = {"0.0.0.0": "127.0.0.1", "::": "[::1]"}.get(host, host)
-    return f"http://{host}:{server.get_port()}"
+    host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
+    host = f"[{host}]" if ":" in host else host
+    return f"http://{host}:{server.get_port()}/{server.token}"
 
 
 def _check_free(host: str, port: int) -> None:

@@ -13,7 +13,7 @@ from rfgs_core.view.browser import open_page, settled_picture
 from rfgs_core.view.server import address
 
 if TYPE_CHECKING:
-    from viser import ViserServer
+    from rfgs_core.view.page_server import PageServer
 
 #: Size of the page [px].
 WIDTH_PX, HEIGHT_PX = 1280, 840
@@ -24,7 +24,7 @@ LIMIT_S = 300.0
 _DISMISS = "document.querySelectorAll('.mantine-Notification-closeButton').forEach(e => e.click())"
 
 
-def take_picture(server: ViserServer, file: Path) -> None:
+def take_picture(server: PageServer, file: Path) -> None:
     """Writes what the page of a server looks like, PNG.
 
     Raises:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from functools import lru_cache
@@ -26,6 +27,8 @@ from rfgs_core.view.stage import Stage
 
 if TYPE_CHECKING:
     from viser import ClientHandle, ViserServer
+
+_LOG = logging.getLogger(__name__)
 
 #: Frames kept in memory, and frames that scales are made for.
 _KEPT_FRAMES = 8
@@ -116,9 +119,12 @@ class Viewer:
         return [self._frame_of(self.frames[round(index)]) for index in bar]
 
     def follow(self) -> None:
-        """Follows the controls until it is interrupted."""
+        """Follows the controls until it is interrupted; a frame that cannot be drawn is told."""
         while True:
-            self.step()
+            try:
+                self.step()
+            except RfgsError as error:
+                _LOG.warning("%s", error)
 
     def step(self, limit_s: float | None = None) -> None:
         """Waits until a control changes or the next frame is due, and draws that.

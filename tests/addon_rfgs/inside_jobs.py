@@ -17,7 +17,14 @@ import addon_rfgs
 from addon_rfgs.cli import run
 from addon_rfgs.errors import AddonError
 from addon_rfgs.jobs import environment, following, queue, starting
-from addon_rfgs.jobs.plans import EvaluatePlan, GeneratePlan, TrainPlan, plan_of_json, plan_to_json
+from addon_rfgs.jobs.plans import (
+    EvaluatePlan,
+    GeneratePlan,
+    TrainPlan,
+    plan_of_json,
+    plan_to_json,
+    with_blender,
+)
 from addon_rfgs.jobs.process import Process, birth
 from addon_rfgs.jobs.progress import Progress, read_log
 from addon_rfgs.jobs.record import (
@@ -217,6 +224,49 @@ def test_plans_come_back_and_values_cannot_become_options(tmp_path: Path) -> Non
     ]
     with pytest.raises(AddonError, match="no radio"):
         GeneratePlan(str(tmp_path), "/a.blend", radios=" ,").arguments()
+
+
+def test_no_record_names_a_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = GeneratePlan(str(tmp_path), "/a.blend", blender="/chosen/blender")
+    kept = plan_to_json(made)
+    assert "blender" not in json.dumps(kept["settings"])
+    # One of an earlier version, or of somebody who wants theirs to be run.
+    kept["settings"]["blender"] = "/evil/blender"
+    back = plan_of_json(kept, tmp_path)
+    assert "evil" not in " ".join(back.arguments())
+    assert "--blender=/own/blender" in with_blender(back, "/own/blender").arguments()
+    train = TrainPlan(str(tmp_path), str(tmp_path))
+    assert with_blender(train, "/own/blender") == train
+
+
+def test_resume_runs_the_blender_of_the_preferences(
+    program, tmp_path: Path, registered: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("BLENDER", "/own/blender")
+    monkeypatch.setattr(following, "QUEUE", queue.Queue(lambda: tmp_path / "jobs.json"))
+    made = GeneratePlan(str(tmp_path / "data"), "/a.blend")
+    write_record(Record(made, 0, ""))
+    file = record_file(made)
+    row = json.loads(file.read_text())
+    row["settings"]["blender"] = "/evil/blender"
+    file.write_text(json.dumps(row))
+    run(["resume", made.out, "--python", str(program("quick"))])
+    assert following.QUEUE.jobs[-1].plan.blender == "/own/blender"
+
+
+@pytest.mark.parametrize("name", ["log", "log/job_train.json", "log/job_train.log"])
+def test_a_job_writes_through_no_link(jobs, tmp_path: Path, program, name: str) -> None:
+    victim = tmp_path / "victim"
+    victim.mkdir()
+    (victim / "file").write_text("mine")
+    out = plan(tmp_path, "a").out
+    place = Path(out, name)
+    place.parent.mkdir(parents=True, exist_ok=True)
+    place.symlink_to(victim if name == "log" else victim / "file")
+    with pytest.raises(AddonError, match="a symbolic link"):
+        jobs.add(plan(tmp_path, "a"), program("quick"))
+    assert [file.name for file in victim.iterdir()] == ["file"]
+    assert (victim / "file").read_text() == "mine"
 
 
 def test_bars_of_the_programs_are_read(tmp_path: Path, monkeypatch) -> None:

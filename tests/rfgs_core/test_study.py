@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from whole_metrics import whole_metrics
 
 from rfgs_core.cli.calls import call
 from rfgs_core.cli.study import StudyArgs, run
 from rfgs_core.errors import RfgsError
-from rfgs_core.evaluate.metrics import SCHEMA
 from rfgs_core.files import write_json
 from rfgs_core.study import CONDITIONS, RADIOS, SCENES, Case, cases, study_table, summarise
 
@@ -136,7 +136,7 @@ def test_a_case_that_fails_is_named_and_the_others_go_on(
     damaged, finished = (Case("two_crossing", "clean", radio, 0) for radio in ("wifi", "mmwave"))
     write_json(tmp_path / damaged.dataset / "dataset.json", {})
     write_json(tmp_path / finished.run / "config.json", {})
-    write_json(tmp_path / finished.run / "metrics.json", {"schema": SCHEMA, **metrics(0.8)})
+    write_json(tmp_path / finished.run / "metrics.json", whole_metrics(metrics(0.8)))
     assert run(StudyArgs(tmp_path, ("two_crossing",), ("clean",), ("wifi", "mmwave"), 1)) == 1
     text = (tmp_path / "study.md").read_text()
     assert text in capsys.readouterr().out

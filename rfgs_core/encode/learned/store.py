@@ -26,6 +26,10 @@ _SHAPES: dict[str, Shape | None] = {
     "packets": (),
     "packet_interval_s": (),
 }
+_TYPES = {
+    "packets": "i8",
+    **dict.fromkeys(("freq_hz", "tx_offset_m", "rx_offset_m", "packet_interval_s"), "f8"),
+}
 
 
 def save_encoder(path: Path, encoder: LearnedEncoder) -> None:
@@ -55,7 +59,7 @@ def load_encoder(path: Path) -> LearnedEncoder:
     """
     if path.suffix != ".npz" and path.is_file():
         raise RfgsError(f"{path}: expected an encoder, a file that ends in .npz; {_REMEDY}")
-    arrays = load_arrays(path, _REMEDY, _SHAPES)
+    arrays = load_arrays(path, _REMEDY, _SHAPES, types=_TYPES, others=True)
     schema, kind = str(arrays["schema"]), str(arrays["network"])
     if schema != SCHEMA:
         raise RfgsFormatError(f"{path}: expected schema {SCHEMA}, found {schema}; {_REMEDY}")
@@ -65,10 +69,11 @@ def load_encoder(path: Path) -> LearnedEncoder:
     expected = {f"weights.{name}": value for name, value in model.state_dict().items()}
     for name, value in expected.items():
         found = arrays.get(name)
-        if found is None or found.shape != tuple(value.shape) or not np.isfinite(found).all():
+        shape, dtype = tuple(value.shape), value.numpy().dtype
+        fits = found is not None and (found.shape, found.dtype) == (shape, dtype)
+        if found is None or not fits or not np.isfinite(found).all():
             raise RfgsFormatError(
-                f"{path}: {name} is missing, not finite or not of shape {tuple(value.shape)}; "
-                f"{_REMEDY}"
+                f"{path}: {name} is missing, not finite or not of shape {shape}, {dtype}; {_REMEDY}"
             )
     model.load_state_dict(
         {name.removeprefix("weights."): torch.from_numpy(arrays[name]) for name in expected}

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json
+from rfgs_core.records import record, unknown_fields
 
 
 @dataclass(frozen=True)
@@ -131,32 +132,8 @@ def impairments_from_json(value: Any) -> Impairments:
     Raises:
         RfgsError: A field is unknown or out of range.
     """
-    if not isinstance(value, dict):
-        raise RfgsError("impairments: expected a JSON object with settings")
-    known = [spec.name for spec in fields(Impairments)]
-    unknown = sorted(set(value) - set(known))
+    unknown = unknown_fields(value, Impairments)
     if unknown:
-        raise RfgsError(
-            f"impairments: unknown setting {unknown[0]!r}; expected some of {', '.join(known)}"
-        )
-    return Impairments(**{name: _typed(name, item) for name, item in value.items()})
-
-
-def _typed(name: str, value: Any) -> Any:
-    if name in ("thermal_noise", "agc"):
-        expected, fits = "true or false", isinstance(value, bool)
-    elif name == "permutation":
-        expected, fits = "none, fixed or per_sample", value in ("none", "fixed", "per_sample")
-    elif name in ("training_symbols", "adc_bits"):
-        expected = "a whole number"
-        fits = isinstance(value, int) and not isinstance(value, bool)
-    else:
-        if value is None and name in ("noise_figure_db", "power_dbm"):
-            return None
-        expected = "a number"
-        fits = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if isinstance(value, int) and fits:
-            value = float(value)
-    if not fits:
-        raise RfgsError(f"impairments: {name}: expected {expected}, found {value!r}")
-    return value
+        known = ", ".join(spec.name for spec in fields(Impairments))
+        raise RfgsError(f"impairments: unknown setting {unknown[0]!r}; expected some of {known}")
+    return record("impairments", value, Impairments)

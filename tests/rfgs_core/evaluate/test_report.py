@@ -121,7 +121,7 @@ def test_compare_prints_and_writes_both_kinds(evaluated_run, tmp_path: Path, cap
     row = next(line for line in text.splitlines() if line.startswith("geometry.f10 "))
     assert row.endswith(evaluated_run.path.name)
     (other / "metrics.json").write_text("[]")
-    with pytest.raises(RfgsFormatError, match=r"metrics\.json: expected schema rfgs-metrics/2"):
+    with pytest.raises(RfgsFormatError, match=r"metrics\.json: expected an object, found \[\]"):
         compare(CompareArgs(evaluated_run.path, other))
 
 

@@ -289,9 +289,9 @@ def test_links_that_are_not_measured_stay_silent() -> None:
     [
         ({"adc_bits": 30}, "adc_bits: expected 0 to 24, found 30"),
         ({"adc_bits": 8.5}, "expected a whole number"),
-        ({"cfo_std_hz": float("nan")}, "cfo_std_hz"),
+        ({"cfo_std_hz": float("nan")}, "expected JSON, got something else"),
         ({"cfo_std_hz": "fast"}, "expected a number, found 'fast'"),
-        ({"permutation": "random"}, "expected none, fixed or per_sample"),
+        ({"permutation": "random"}, "expected fixed or none or per_sample, found 'random'"),
         ({"agc": 1}, "expected true or false"),
         ({"loss_rate": 1.0}, "loss_rate: expected 0 to 0.99"),
         ({"colour": 1}, "unknown setting 'colour'"),

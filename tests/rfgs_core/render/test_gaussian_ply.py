@@ -162,7 +162,7 @@ def test_headers_that_promise_too_much_or_lists_are_refused(cloud, tmp_path: Pat
     header, _ = file.read_bytes().split(b"end_header\n")
     text = header.decode().replace("binary_little_endian", "ascii")
     file.write_text(text.replace("vertex 50", "vertex 1000000000000000") + "end_header\n")
-    with pytest.raises(RfgsFormatError, match=r"hostile\.ply: not a whole PLY"):
+    with pytest.raises(RfgsFormatError, match=r"hostile\.ply: .*not a whole PLY"):
         read_ply(file)
     lists = text.replace("vertex 50", "vertex 1").replace("float x", "list uchar float x")
     numbers = " ".join(["2 0 0", *["0"] * 17])

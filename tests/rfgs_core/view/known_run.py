@@ -52,7 +52,13 @@ def _write_frame(folder: Path, sequence: Sequence, frame: int) -> None:
     write_ply(folder / f"{frame:06d}.ply", cloud_of(moving, rf_power_db=power_db))
     save_arrays(
         folder / f"{frame:06d}.features.npz",
-        {"features": moving.features.numpy(), "rf_power_db": power_db},
+        {
+            "features": moving.features.numpy(),
+            "gamma": head.gamma(moving.features).numpy().astype(np.complex64)[:, None],
+            "rf_power_db": power_db,
+            "track_id": np.arange(len(moving)),
+            "body": np.zeros(len(moving), np.int64),
+        },
     )
 
 

@@ -40,7 +40,7 @@ def page(known_run: Run) -> Iterator[tuple[Viewer, Client]]:
     """A viewer and a client that has received everything."""
     with running_server("127.0.0.1", 0) as server:
         viewer = Viewer(known_run, server)
-        with connected(server.get_port()) as client:
+        with connected(server) as client:
             client.read(lambda: "/splats" in client.nodes and "Camera" in client.controls)
             yield viewer, client
 
@@ -178,7 +178,7 @@ def test_what_a_capture_does_not_hold_is_not_offered(tiny_dataset: Path, tmp_pat
     with running_server("127.0.0.1", 0) as server:
         viewer = Viewer(run, server)
         assert list(viewer.scales) == ["display", "power", "phase"]
-        with connected(server.get_port()) as client:
+        with connected(server) as client:
             client.read(lambda: "/splats" in client.nodes and "Cameras" in client.controls)
             client.read(lambda: "no true picture" in str(client.labelled("GuiMarkdownMessage")))
         assert not {"/truth", "/room/edges"} & set(client.nodes)
@@ -264,7 +264,7 @@ def test_ctrl_c_ends_the_program_with_one_line(known_run: Run) -> None:
     )
     assert process.stdout is not None
     line = process.stdout.readline()
-    found = re.fullmatch(r"(http://127\.0\.0\.1:\d+) shows the run; Ctrl-C ends\n", line)
+    found = re.fullmatch(r"(http://127\.0\.0\.1:\d+/[\w-]{22}) shows the run; Ctrl-C ends\n", line)
     assert found is not None, line
     with urllib.request.urlopen(found[1], timeout=10) as answer:
         assert answer.status == 200

@@ -14,6 +14,9 @@ import viser
 import zstandard
 from websockets.sync.client import connect
 
+from rfgs_core.view.page_server import PageServer
+from rfgs_core.view.server import address
+
 
 class Client:
     """Nodes of the scene by name and controls by label, as the server has sent them."""
@@ -34,6 +37,10 @@ class Client:
         """Moves a control, as a user of the page would."""
         uuid = self.controls[label]["uuid"]
         self._send("GuiUpdateMessage", uuid=uuid, updates={"value": value})
+
+    def send(self, raw: bytes | str) -> None:
+        """Sends anything."""
+        self._socket.send(raw)
 
     def look(self) -> None:
         """Tells where this client looks from; nobody is heard before that."""
@@ -69,12 +76,19 @@ class Client:
             self.nodes[message["name"]] = {"type": kind, "visible": True, **props}
 
 
-@contextlib.contextmanager
-def connected(port: int) -> Iterator[Client]:
-    """A client that is connected to a server of this machine."""
+def opened(where: str, **headers: str) -> Any:
+    """A socket at the address of a page, with headers that a browser would send."""
     protocol: Any = f"viser-v{viser.__version__}"
-    where = f"ws://127.0.0.1:{port}"
-    with connect(where, subprotocols=[protocol], max_size=None, compression=None) as socket:
+    return connect(
+        where.replace("http://", "ws://"), subprotocols=[protocol], max_size=None,
+        compression=None, additional_headers=headers,
+    )  # fmt: skip
+
+
+@contextlib.contextmanager
+def connected(server: PageServer) -> Iterator[Client]:
+    """A client that is connected to a server of this machine."""
+    with opened(address(server)) as socket:
         client = Client(socket)
         client.look()
         yield client

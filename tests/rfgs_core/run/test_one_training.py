@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One training per folder, and a disk that fills up while it trains: a line each."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+def training(data: Path, out: Path, *more: str) -> subprocess.Popen[str]:
+    arguments = ["train", str(data), "--radio", "wifi", "--out", str(out), *more]
+    return subprocess.Popen(
+        [sys.executable, "-m", "rfgs_core.cli", *arguments],
+        cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def complaints(said: str) -> list[str]:
+    """What stands on the terminal beside progress bars."""
+    lines = [line.rpartition("\r")[2] for line in said.splitlines()]
+    return [line for line in lines if line and not re.match(r"train wifi: +\d+%", line)]
+
+
+def test_the_second_training_is_refused_in_one_line(tiny_dataset: Path, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    first = training(tiny_dataset, out, "--iterations", "100000")
+    try:
+        end = time.monotonic() + 60.0
+        while not (out / "config.json").exists():
+            assert time.monotonic() < end and first.poll() is None
+            time.sleep(0.05)
+        second = training(tiny_dataset, out, "--iterations", "100000")
+        _, said = second.communicate(timeout=60)
+        assert second.returncode == 2
+        assert complaints(said) == [
+            f"error: {out}: another rfgs train is working on it; wait until it ends, or choose "
+            "another --out"
+        ]
+    finally:
+        first.kill()
+        first.communicate()
+    # A killed one holds nothing.
+    third = training(tiny_dataset, out, "--iterations", "100000", "--seed", "3")
+    _, said = third.communicate(timeout=60)
+    assert "holds a run with another seed" in said
+
+
+@pytest.fixture(params=[20, 400])
+def small_disk(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Path]:
+    """A file system that is full after so many kB: at once, or at the first finished frame."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", f"size={request.param}k", "tmpfs", str(folder)]
+    if subprocess.run(mount, capture_output=True, check=False).returncode:
+        pytest.skip("only root may mount a small disk")
+    yield folder
+    subprocess.run(["umount", "--lazy", str(folder)], check=True)
+
+
+@pytest.mark.parametrize("log", [False, True])
+def test_a_full_disk_is_one_line(tiny_dataset: Path, small_disk: Path, log: bool) -> None:
+    more = ["--iterations", "60", "--gaussians", "2000", *(["--log"] if log else [])]
+    process = training(tiny_dataset, small_disk / "run", *more)
+    _, said = process.communicate(timeout=120)
+    assert process.returncode == 2, said
+    assert "Traceback" not in said and "Exception ignored" not in said
+    lines = complaints(said)
+    assert [line.partition(";")[0].partition(" while")[0] for line in lines] == [
+        "error: the disk is full"
+    ]

@@ -38,6 +38,8 @@ class TracerRow:
     """Interactions of people's paths."""
     frames: int
     """Frames compared."""
+    seen: bool
+    """Whether anybody shows in Sionna RT's channel; if not, what follows of ΔH is 0."""
     static_db: float
     """Error power of `csi_static` over its power [dB]."""
     static_worst_db: float
@@ -99,7 +101,9 @@ def compare_tracers(
         traced.append(np.stack(rows))
         still.append(static[None])
         seconds.append(float(np.median(spent)))
-    people = _errors(traced[0], traced[1], elements)
+    # Behind concrete nothing of a person is left at 60 GHz.
+    seen = _power(traced[0]) > 0.0
+    people = _errors(traced[0], traced[1], elements) if seen else (0.0, 0.0)
     static = _errors(still[0], still[1], elements)
     powers = [_delay_angle_powers(change, elements, radio.freq_hz) for change in traced]
     return TracerRow(
@@ -107,12 +111,13 @@ def compare_tracers(
         radio=radio_name,
         depth=depth,
         frames=len(bundle.frames),
+        seen=seen,
         static_db=static[0],
         static_worst_db=static[1],
         people_db=people[0],
         people_worst_db=people[1],
-        level_db=decibels(float(_power(traced[1]) / max(_power(traced[0]), 1e-300))),
-        correlation=float(np.corrcoef(powers[0].ravel(), powers[1].ravel())[0, 1]),
+        level_db=decibels(_power(traced[1]) / _power(traced[0])) if seen else 0.0,
+        correlation=float(np.corrcoef(powers[0].ravel(), powers[1].ravel())[0, 1]) if seen else 0.0,
         sionna_s=seconds[0],
         fast_s=seconds[1],
         ratio=seconds[0] / seconds[1],
@@ -127,11 +132,14 @@ def as_table(rows: list[TracerRow]) -> str:
         "|" + "---|" * 12,
     ]
     for row in rows:
+        people = (
+            f"{row.people_db:.1f} | {row.people_worst_db:.1f} | {row.level_db:+.2f} "
+            f"| {row.correlation:.4f}"
+        )
         lines.append(
             f"| {row.scene} | {row.radio} | {row.depth} | {row.static_db:.0f} "
-            f"| {row.static_worst_db:.0f} | {row.people_db:.1f} | {row.people_worst_db:.1f} "
-            f"| {row.level_db:+.2f} | {row.correlation:.4f} | {row.sionna_s:.2f} "
-            f"| {row.fast_s:.3f} | {row.ratio:.0f} |"
+            f"| {row.static_worst_db:.0f} | {people if row.seen else 'nobody | shows | – | –'} "
+            f"| {row.sionna_s:.2f} | {row.fast_s:.3f} | {row.ratio:.0f} |"
         )
     return "\n".join(lines) + "\n"
 

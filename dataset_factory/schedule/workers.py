@@ -36,7 +36,8 @@ _GOODBYE_S = 5
 _MEMORY_SHARE = 0.9
 
 #: One library's worker pool inside each process would make processes fight for cores.
-_SINGLE_THREADED = {f"{name}_NUM_THREADS": 1 for name in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
+#: What these read when NumPy is imported, Dask sets in this process too, and leaves there.
+_SINGLE_THREADED = {f"{name}_NUM_THREADS": 1 for name in ("OMP", "OPENBLAS", "MKL")}
 #: Dask's settings for workers of this machine.
 _HERE = {
     # A frame is tried twice.
@@ -53,6 +54,8 @@ _HERE = {
     "distributed.worker.profile.enabled": False,
     "distributed.worker.multiprocessing-method": "spawn",
     "distributed.nanny.pre-spawn-environ": _SINGLE_THREADED,
+    # Left in this process, it would end the next compilation here: numba reads it again.
+    "distributed.nanny.environ": {"NUMBA_NUM_THREADS": 1},
 }
 
 

@@ -88,7 +88,7 @@ def test_moved_bounces_keep_the_law_of_reflection(
     from rfgs_core.radio.images import SCATTERING
 
     tracer = Tracer(person_bundle, small_radio, two_devices, depth=3)
-    trace = tracer._trace(person_bundle.frame(1).vertices)
+    trace = tracer.trace_at(person_bundle.frame(1).vertices)
     assert trace.points is not None and trace.bounced is not None
     paths = trace.bounced.select(np.arange(0, len(trace.bounced), 50))
     shift = np.array([0.012, -0.007, 0.004])

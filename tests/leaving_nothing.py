@@ -25,8 +25,10 @@ def write_material(folder: Path) -> None:
     PlyData([PlyElement.describe(rows, "vertex")]).write(str(folder / "cloud.ply"))
     sequence = folder / "dataset" / "room"
     sequence.mkdir(parents=True)
-    devices = {"wifi": [{"name": "a"}, {"name": "b"}]}
-    (sequence / "sequence.json").write_text(json.dumps({"frames": [1], "devices": devices}))
+    pose = {"quat_wxyz": [1.0, 0.0, 0.0, 0.0], "role": "ACCESS_POINT"}
+    devices = [{"name": name, "position_m": [x, 0.0, 1.2], **pose} for x, name in enumerate("ab")]
+    info = {"frames": [1], "devices": {"wifi": devices}, "radios": {"wifi": {}}}
+    (sequence / "sequence.json").write_text(json.dumps(info))
     one, angle = np.zeros(1, np.int32), np.zeros(1, np.float32)
     table = PathTable(
         *(one, one + 1, one, one + 1),

@@ -114,6 +114,7 @@ def steps() -> list[Step]:
         Step("clear_paths"),
         Step("remove_data"),
         Step("import_ply", {"filepath": "{folder}/cloud.ply"}),
+        Step("import_devices", {"directory": "{folder}/dataset"}),
     ]
 
 

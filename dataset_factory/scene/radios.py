@@ -10,6 +10,7 @@ from typing import Any
 from dataset_factory.scene.bundle import Bundle
 from rfgs_core.errors import RfgsError
 from rfgs_core.radio import PRESETS, Radio, preset
+from rfgs_core.radio.check import material_problems, too_deep
 from rfgs_core.radio.files import SUFFIXES, checked_radio, read_radio
 
 #: The radio whose every property stands in the scene.
@@ -78,3 +79,23 @@ def scene_radio(bundle: Bundle) -> Radio:
                 )
     values = {**asdict(preset("wifi")), **first, "name": SCENE_RADIO, "num_devices": len(rows)}
     return checked_radio(f"{bundle.info['blend_name']}: Empty {rows[0]['name']!r}", values)
+
+
+def refuse_trace(bundle: Bundle, radio: Radio, depth: int) -> None:
+    """Refuses what no tracer can do with a radio in a scene.
+
+    Args:
+        bundle: The scene.
+        radio: The radio.
+        depth: Interactions of people's paths.
+
+    Raises:
+        RfgsError: The depth is not 1, 2 or 3, or more than the radio can have, or a material does
+            not hold in the radio's band.
+    """
+    if depth not in (1, 2, 3):
+        raise RfgsError(f"trace depth {depth}: expected 1, 2 or 3")
+    if depth > radio.deepest:
+        raise RfgsError(too_deep(radio, depth))
+    for problem in material_problems(radio, bundle.materials):
+        raise RfgsError(f"{bundle.path}: {problem}")

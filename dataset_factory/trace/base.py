@@ -10,12 +10,9 @@ from contextlib import contextmanager
 import drjit as dr
 
 from dataset_factory.scene.bundle import Bundle
-from dataset_factory.trace.bounces.solver import DEPTHS
+from dataset_factory.scene.radios import refuse_trace
 from dataset_factory.trace.people.bodies import Bodies
-from dataset_factory.trace.rays.scene import check_materials
-from rfgs_core.errors import RfgsError
 from rfgs_core.radio import Radio
-from rfgs_core.radio.check import too_deep
 from rfgs_core.radio.layout import DevicePose
 from rfgs_core.seeds import sub_seed
 from rfgs_core.simulate.shadow.environment import node_frequencies
@@ -53,11 +50,7 @@ class BaseTracer:
             RfgsError: A material does not hold in the radio's band, or the depth is not 1, 2
                 or 3, or more than the radio can have.
         """
-        if depth != 1 and depth not in DEPTHS:
-            raise RfgsError(f"trace depth {depth}: expected 1, 2 or 3")
-        if depth > radio.deepest:
-            raise RfgsError(too_deep(radio, depth))
-        check_materials(bundle, radio)
+        refuse_trace(bundle, radio, depth)
         self._bundle, self._radio, self._devices = bundle, radio, devices
         self._shadow: Shadow = shadow
         self._rays = sub_seed(seed, "environment")

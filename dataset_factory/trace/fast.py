@@ -8,10 +8,10 @@ import numpy as np
 from dataset_factory.scene.bundle import Bundle, BundleFrame
 from dataset_factory.scene.motion import read_motion
 from dataset_factory.scene.movers import split_movers
+from dataset_factory.scene.radios import refuse_trace
 from dataset_factory.scene.surroundings import room_of
 from rfgs_core.errors import RfgsError
 from rfgs_core.radio import Radio, frame_samples, pose_span_s
-from rfgs_core.radio.check import material_problems, too_deep
 from rfgs_core.radio.layout import DevicePose
 from rfgs_core.simulate.packets import sampled
 from rfgs_core.simulate.shadow.kirchhoff import Shadow
@@ -47,12 +47,7 @@ class FastBundleTracer(FastTracer):
                 "the fast tracer has antennas that stand still, this radio's move; "
                 "use --tracer sionna"
             )
-        if not 1 <= depth <= 3:
-            raise RfgsError(f"trace depth {depth}: expected 1, 2 or 3")
-        if depth > radio.deepest:
-            raise RfgsError(too_deep(radio, depth))
-        for problem in material_problems(radio, bundle.materials):
-            raise RfgsError(f"{bundle.path}: {problem}")
+        refuse_trace(bundle, radio, depth)
         people, vehicles = split_movers(bundle)
         room = room_of(bundle)
         super().__init__(

@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rfgs_core.capture.channels import channels_of
+from rfgs_core.capture.channels import Channels, channels_of
 from rfgs_core.capture.model import Capture
 from rfgs_core.capture.prepared import Prepared, bounds_around, guess, scale_to_free_space
 from rfgs_core.errors import RfgsError
@@ -50,16 +52,9 @@ def prepare_placed(capture: Capture, scene: str) -> Prepared:
 def _table(capture: Capture, tx: np.ndarray, rx: np.ndarray, scene: str) -> Prepared:
     """One transmitter and a receiving device at each place, in one frame."""
     channels = channels_of(capture)
-    count, half = len(channels.measured), 0.5 * channels.spacing_hz
-    radio = Radio(
+    radio = _one_element(
+        channels,
         name="radio",
-        freq_min_hz=float(channels.freq_hz[0] - half),
-        freq_max_hz=float(channels.freq_hz[-1] + half),
-        num_subcarriers=count,
-        tx_rows=1,
-        tx_cols=1,
-        rx_rows=1,
-        rx_cols=1,
         tx_offset_m=(0.0, 0.0, 0.0),
         own_device_links="excluded",
         num_devices=1 + len(rx),
@@ -91,20 +86,28 @@ def _table(capture: Capture, tx: np.ndarray, rx: np.ndarray, scene: str) -> Prep
     )
 
 
-def _aperture(capture: Capture, places: np.ndarray, scene: str) -> Prepared:
-    """One radar that takes a pulse at each place, in one frame."""
-    channels = channels_of(capture)
+def _one_element(channels: Channels, **fields: Any) -> Radio:
+    """A radio of one element each way over the band of some channels, with further fields."""
     half = 0.5 * channels.spacing_hz
-    pulses, count = len(places), len(channels.measured)
-    radio = Radio(
-        name="sar_capture",
+    return Radio(
         freq_min_hz=float(channels.freq_hz[0] - half),
         freq_max_hz=float(channels.freq_hz[-1] + half),
-        num_subcarriers=count,
+        num_subcarriers=len(channels.measured),
         tx_rows=1,
         tx_cols=1,
         rx_rows=1,
         rx_cols=1,
+        **fields,
+    )
+
+
+def _aperture(capture: Capture, places: np.ndarray, scene: str) -> Prepared:
+    """One radar that takes a pulse at each place, in one frame."""
+    channels = channels_of(capture)
+    pulses = len(places)
+    radio = _one_element(
+        channels,
+        name="sar_capture",
         tx_offset_m=(0.0, _BESIDE_M, 0.0),
         own_device_links="only",
         placement="circle",

@@ -64,7 +64,7 @@ _Step = Annotated[int, msgspec.Meta(ge=1, le=2**40)]
 
 
 class _Strict(msgspec.Struct, forbid_unknown_fields=True):
-    pass
+    """An object of `zarr.json` that holds nothing but what its class names."""
 
 
 class _Endian(_Strict):

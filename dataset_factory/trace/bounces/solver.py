@@ -40,8 +40,6 @@ CHUNK = 4096
 NUM_SAMPLES = 1000
 #: Legs with two walls kept per point.
 BUFFER = 512
-#: Interactions of people's paths by way of walls, the scattering one included.
-DEPTHS = (2, 3)
 #: Paths weaker than this share of the strongest are left out: facets damped to nothing.
 NEGLIGIBLE = 1e-4
 

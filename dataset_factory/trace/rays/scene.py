@@ -12,9 +12,7 @@ import sionna.rt as rt
 from sionna.rt.radio_materials.itu import itu_material
 
 from dataset_factory.scene.bundle import Bundle
-from rfgs_core.errors import RfgsError
 from rfgs_core.radio import Layout, Radio
-from rfgs_core.radio.check import material_problems
 from rfgs_core.radio.constants import VACUUM_PERMITTIVITY
 from rfgs_core.radio.layout import DevicePose, rotation
 from rfgs_core.radio.sites import centres, owners
@@ -25,16 +23,6 @@ from rfgs_core.simulate.surface.movers import Movers
 Group = tuple[np.ndarray, np.ndarray]
 #: Name of the one object that holds everything that moves and scatters from points.
 BODY = "moving"
-
-
-def check_materials(bundle: Bundle, radio: Radio) -> None:
-    """Refuses materials whose model does not cover the radio's band.
-
-    Raises:
-        RfgsError: Naming the material, its band and the radio's.
-    """
-    for problem in material_problems(radio, bundle.materials):
-        raise RfgsError(f"{bundle.path}: {problem}")
 
 
 def radio_material(row: dict[str, Any], index: int) -> rt.RadioMaterial:

@@ -44,7 +44,7 @@ def crossings(
     if length <= 2.0 * rim_m:
         return 0
     wx, wy, wz = wx / length, wy / length, wz / length
-    inverse_x, inverse_y, inverse_z = _inverse(wx), _inverse(wy), _inverse(wz)
+    inverse = _inverse(wx), _inverse(wy), _inverse(wz)
     reach = length - rim_m
     low, high, first, count, corners = bvh.low, bvh.high, bvh.first, bvh.count, bvh.corners
     stack = np.zeros(_STACK, dtype=np.int64)
@@ -52,10 +52,7 @@ def crossings(
     while size:
         size -= 1
         node = stack[size]
-        near, far = _within(low[node, 0], high[node, 0], x, inverse_x, 0.0, reach)
-        near, far = _within(low[node, 1], high[node, 1], y, inverse_y, near, far)
-        near, far = _within(low[node, 2], high[node, 2], z, inverse_z, near, far)
-        if near > far:
+        if not _enters(low, high, node, (x, y, z), inverse, reach):
             continue
         if count[node] == 0 and len(first) > 1:
             stack[size], stack[size + 1] = first[node] + 1, first[node]
@@ -82,17 +79,14 @@ def nearest(bvh: Bvh, start: np.ndarray, way: np.ndarray, rim_m: float) -> tuple
         rim_m: What is nearer than this does not count [m].
     """
     x, y, z, wx, wy, wz = start[0], start[1], start[2], way[0], way[1], way[2]
-    inverse_x, inverse_y, inverse_z = _inverse(wx), _inverse(wy), _inverse(wz)
+    inverse = _inverse(wx), _inverse(wy), _inverse(wz)
     low, high, first, count, corners = bvh.low, bvh.high, bvh.first, bvh.count, bvh.corners
     stack = np.zeros(_STACK, dtype=np.int64)
     size, best, found = 1, np.inf, -1
     while size:
         size -= 1
         node = stack[size]
-        near, far = _within(low[node, 0], high[node, 0], x, inverse_x, 0.0, best)
-        near, far = _within(low[node, 1], high[node, 1], y, inverse_y, near, far)
-        near, far = _within(low[node, 2], high[node, 2], z, inverse_z, near, far)
-        if near > far:
+        if not _enters(low, high, node, (x, y, z), inverse, best):
             continue
         if count[node] == 0 and len(first) > 1:
             stack[size], stack[size + 1] = first[node] + 1, first[node]
@@ -128,17 +122,14 @@ def blocked(bvh: Bvh, start: np.ndarray, end: np.ndarray, rim_m: float, stack: n
     if length <= 2.0 * rim_m:
         return False
     wx, wy, wz = wx / length, wy / length, wz / length
-    inverse_x, inverse_y, inverse_z = _inverse(wx), _inverse(wy), _inverse(wz)
+    inverse = _inverse(wx), _inverse(wy), _inverse(wz)
     reach = length - rim_m
     low, high, first, count, corners = bvh.low, bvh.high, bvh.first, bvh.count, bvh.corners
     stack[0], size = 0, 1
     while size:
         size -= 1
         node = stack[size]
-        near, far = _within(low[node, 0], high[node, 0], x, inverse_x, 0.0, reach)
-        near, far = _within(low[node, 1], high[node, 1], y, inverse_y, near, far)
-        near, far = _within(low[node, 2], high[node, 2], z, inverse_z, near, far)
-        if near > far:
+        if not _enters(low, high, node, (x, y, z), inverse, reach):
             continue
         if count[node] == 0 and len(first) > 1:
             stack[size], stack[size + 1] = first[node] + 1, first[node]
@@ -154,6 +145,22 @@ def blocked(bvh: Bvh, start: np.ndarray, end: np.ndarray, rim_m: float, stack: n
 def _inverse(part: float) -> float:
     """1 / part, large where there is none."""
     return 1.0 / part if abs(part) > 1e-15 else 1e15
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _enters(
+    low: np.ndarray,
+    high: np.ndarray,
+    node: int,
+    start: tuple[float, float, float],
+    inverse: tuple[float, float, float],
+    reach: float,
+) -> bool:
+    """Whether a ray of some reach enters a node's box."""
+    near, far = _within(low[node, 0], high[node, 0], start[0], inverse[0], 0.0, reach)
+    near, far = _within(low[node, 1], high[node, 1], start[1], inverse[1], near, far)
+    near, far = _within(low[node, 2], high[node, 2], start[2], inverse[2], near, far)
+    return near <= far
 
 
 @numba.njit(cache=True, nogil=True, inline="always")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`python -m blender_scenes` lists and builds our scenes, and small ones of plain shapes."""
+"""`python -m blender_scenes` builds our scenes, plain shapes, and the shape space of people."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import importlib
 import json
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 from blender_scenes.catalogue import scenes
@@ -28,6 +29,8 @@ def main(arguments: list[str] | None = None) -> int:
     shapes = commands.add_parser("shapes", help="build a small scene of plain shapes")
     shapes.add_argument("description", type=Path, help="JSON file, see `verification.py`")
     shapes.add_argument("--out", type=Path, required=True, help="the .blend to write")
+    bodies = commands.add_parser("bodies", help="build the shape space of rfgs_core.articulated")
+    bodies.add_argument("--out", type=Path, help="where to; default: into the package")
     args = parser.parse_args(arguments)
     known = scenes()
     if args.command == "list":
@@ -37,6 +40,8 @@ def main(arguments: list[str] | None = None) -> int:
         return 0
     if args.command == "shapes":
         return _shapes(args.description, args.out)
+    if args.command == "bodies":
+        return _bodies(args.out)
     if args.command == "sheet":
         return _sheet(args.out, args.size, args.samples)
     if args.name not in known:
@@ -69,13 +74,24 @@ def _sheet(out: Path, size_px: int, samples: int) -> int:
     return 0
 
 
+def _bodies(out: Path | None) -> int:
+    from blender_scenes.people.shape_space import write_shape_space
+    from rfgs_core.articulated.space import SHAPE_SPACE
+
+    return _write(lambda path: sys.stdout.write(f"{write_shape_space(path)}\n"), out or SHAPE_SPACE)
+
+
 def _build(name: str, out: Path) -> int:
+    return _write(lambda path: importlib.import_module(f"blender_scenes.{name}").build(path), out)
+
+
+def _write(build: Callable[[Path], object], out: Path) -> int:
+    """Has a builder write a file; what it needs may be missing."""
     if not out.resolve().parent.is_dir():
         sys.stderr.write(f"error: {out.parent}: no such folder; make it first\n")
         return 2
     try:
-        builder = importlib.import_module(f"blender_scenes.{name}")
-        builder.build(out)
+        build(out)
     except ModuleNotFoundError as error:
         if error.name not in ("anny", "bpy", "torch"):
             raise

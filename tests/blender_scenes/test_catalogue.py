@@ -42,3 +42,6 @@ def test_wrong_names_get_one_clear_line(python: Run, tmp_path: Path) -> None:
     done = python("-m", "blender_scenes", "build", "--out", tmp_path / "absent" / "a.blend")
     assert done.returncode == 2
     assert "no such folder" in done.stderr and len(done.stderr.splitlines()) == 1
+    done = python("-m", "blender_scenes", "bodies", "--out", tmp_path / "absent" / "a.npz")
+    assert done.returncode == 2
+    assert "no such folder" in done.stderr and len(done.stderr.splitlines()) == 1

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Random worlds: the same for the same seed, bodies where they should be, sights that agree."""
+
+from __future__ import annotations
+
+from itertools import islice
+
+import numpy as np
+import pytest
+from scipy.spatial import KDTree
+
+from rfgs_core.articulated import Body, Pose, facets_of, people
+from rfgs_core.limbs.learn import LearnConfig, Worlds, learn, next_chunk, pairs_of
+from rfgs_core.radio.presets import preset
+from rfgs_core.worlds.figure import Figure, seen_from, seen_roughly
+from rfgs_core.worlds.heard import Example, examples
+from rfgs_core.worlds.motion import random_motion
+from rfgs_core.worlds.room import Room, Sight
+
+WAVELENGTH_M = 0.051
+
+
+def first(count: int, seed: int, name: str = "mmwave") -> list[Example]:
+    return list(islice(examples(preset(name), seed), count))
+
+
+@pytest.fixture(scope="module")
+def walker() -> tuple[Body, Pose]:
+    rng = np.random.default_rng(3)
+    body = people().random(rng)
+    return body, random_motion(rng, body, "walk").at(0.7)
+
+
+def test_a_seed_is_a_world() -> None:
+    one, again, other = first(4, 5), first(4, 5), first(4, 6)
+    for a, b in zip(one, again, strict=True):
+        np.testing.assert_array_equal(a.maps, b.maps)
+        np.testing.assert_array_equal(a.joints, b.joints)
+    assert not np.array_equal(one[0].joints, other[0].joints)
+
+
+@pytest.mark.parametrize("name", ["mmwave", "wifi"])
+def test_everybody_is_inside_and_near_the_centre_of_the_maps(name: str) -> None:
+    for example in first(24, 1, name):
+        assert np.isfinite(example.maps).all() and (example.maps >= 0.0).all()
+        assert len(example.maps) == len(example.views)
+        middle = example.joints[:, :2].mean(axis=0)
+        assert np.linalg.norm(middle - example.centre[:2]) < 0.6
+        own = [view.pair[0] == view.pair[1] for view in example.views]
+        assert all(own) if name == "mmwave" else not all(own)
+
+
+def test_facets_cover_the_skin(walker: tuple[Body, Pose]) -> None:
+    body, pose = walker
+    figure = Figure.of(body, WAVELENGTH_M)
+    skin = body.skin(pose)
+    centres, _, areas = facets_of(skin, body.faces)
+    assert figure.areas_m2.sum() == pytest.approx(areas.sum(), rel=0.03)
+    posed = figure.posed(pose)
+    gaps = KDTree(centres).query(posed.points)[0]
+    assert gaps.max() < 0.06
+    np.testing.assert_allclose(posed.vertices, skin, atol=1e-6)
+
+
+def test_a_rough_sight_is_nearly_the_sight_of_a_picture(walker: tuple[Body, Pose]) -> None:
+    body, pose = walker
+    figure = Figure.of(body, WAVELENGTH_M)
+    posed = figure.posed(pose)
+    centre = posed.centroid(figure.areas_m2)
+    for angle in np.linspace(0.0, 2 * np.pi, 7)[:-1]:
+        place = centre + np.array([3.0 * np.cos(angle), 3.0 * np.sin(angle), 0.6])
+        drawn = seen_from(posed, body.faces, place)
+        rough = seen_roughly(posed.points, posed.normals, place, centre)
+        # Both see most of the half that faces them, and hide an arm behind the trunk.
+        assert 0.2 < drawn.mean() < 0.5
+        assert (drawn == rough).mean() > 0.93
+
+
+def test_devices_that_find_no_place_are_no_world() -> None:
+    rng = np.random.default_rng(0)
+    tiny = Room(np.array([[-0.5, -0.5, 0.0], [0.5, 0.5, 2.5]]), np.zeros((3, 2)))
+    radio = preset("mmwave")
+    drawn = [Sight.random(rng, radio, tiny, np.zeros(2)) for _ in range(40)]
+    # Corners there are always; anywhere else is too near to the person.
+    assert any(sight is None for sight in drawn)
+
+
+@pytest.mark.slow
+def test_a_network_learns_from_worlds(tmp_path) -> None:
+    """Joint errors in worlds it has not seen fall well below those of an untrained network."""
+    radio = preset("mmwave")
+    config = LearnConfig(frames=4096, steps_per_chunk=6.0, kept=4096, workers=0)
+    learned = learn(radio, config, checkpoint=tmp_path / "state")
+    assert learned.progress.frames == 4096 and learned.unseen_m < 0.3
+    # The state that was kept goes on without another step being due.
+    again = learn(radio, config, checkpoint=tmp_path / "state")
+    assert again.progress.frames == 4160
+
+
+def test_chunks_hold_what_a_step_needs() -> None:
+    radio = preset("mmwave")
+    chunk = next_chunk(examples(radio, 2), 8, pairs_of(radio))
+    assert chunk.packed.there.any(axis=1).all() and np.isfinite(chunk.joints).all()
+    streamed = next(iter(Worlds(radio, 2)))
+    assert streamed.joints.shape == (64, 17, 3)

@@ -1,0 +1,240 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Joints and surfaces of one person beside everything that knows less: the table of limbs.
+
+All rows are at the place that radio found, but for the ceiling. Rows that say so are told which
+way the person truly faces, which no method is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Float64
+
+from rfgs_core.articulated import fit_pose, people
+from rfgs_core.bodies.localise import locate_bodies, pair_maps
+from rfgs_core.dataset import Sequence
+from rfgs_core.errors import RfgsError
+from rfgs_core.evaluate.geometry import geometry_metrics, reference_points, voxel_budget
+from rfgs_core.evaluate.grid import Grid, splat_gaussians
+from rfgs_core.limbs.evidence.library import headings_of, upright
+from rfgs_core.limbs.evidence.tell import tell
+from rfgs_core.limbs.network import LimbNetwork
+from rfgs_core.limbs.propose import Joints, propose, smoothed
+from rfgs_core.limbs.skins import PosedPeople
+from rfgs_core.measure.observations import Observations, observe
+from rfgs_core.seeds import sub_seed
+from rfgs_core.skeleton import JOINTS
+from rfgs_core.worlds.motion import random_motion
+
+#: Joints that a standing body has in other places than a moving one.
+LIMBS = [
+    JOINTS.index(f"{s}_{n}") for s in ("left", "right") for n in ("knee", "ankle", "elbow", "wrist")
+]
+WRISTS = [JOINTS.index(f"{s}_wrist") for s in ("left", "right")]
+#: Walks whose mean pose is a row, and moments of each.
+_WALKS, _MOMENTS = 40, 10
+#: Points that stand for a posed surface, and the deviation around each [m].
+_POINTS, _POINT_M = 6000, 0.01
+
+
+@dataclass(frozen=True)
+class Person:
+    """The one person of a sequence, in all frames, and what radio says of them."""
+
+    frames: list[int]
+    time_s: Float64[np.ndarray, "frame"]
+    seen: list[Observations]
+    """What the method may see."""
+    axes_xy: Float64[np.ndarray, "frame 2"]
+    """Where radio finds the person [m]."""
+    truth: Float64[np.ndarray, "frame 17 3"]
+    """True joints [m]."""
+
+    @staticmethod
+    def of(
+        sequence: Sequence,
+        radio: str,
+        frames: list[int],
+        everything: bool,
+        on_frame: Callable[[], Any],
+    ) -> Person:
+        """Reads and locates.
+
+        Raises:
+            RfgsError: There is not exactly one person, or their joints are not known.
+        """
+        count = sum(1 for row in sequence.instances if row["class"] == "person")
+        if count != 1:
+            raise RfgsError(f"{sequence.name}: expected one person for the table, found {count}")
+        seen, axes, truth = [], [], []
+        for frame in frames:
+            seen.append(observe(sequence, radio, frame, everything=everything))
+            axes.append(locate_bodies(pair_maps(seen[-1]), seen[-1].bounds_m, 1)[0])
+            truth.append(np.asarray(sequence.joints(frame)[0], dtype=np.float64))
+            on_frame()
+        time_s = np.array([sequence.time_s(frame) for frame in frames])
+        return Person(list(frames), time_s, seen, np.array(axes), np.array(truth))
+
+    @property
+    def headings(self) -> Float64[np.ndarray, "frame"]:
+        """Which way the person truly faces [rad]."""
+        return headings_of(self.truth)
+
+
+def limb_table(
+    sequence: Sequence,
+    radio: str,
+    network: LimbNetwork | None,
+    frames: list[int],
+    seed: int = 0,
+    *,
+    everything: bool = True,
+    on_frame: Callable[[], Any] = lambda: None,
+) -> dict[str, dict[str, float]]:
+    """Errors of every row.
+
+    Args:
+        sequence: One person, whose joints are known.
+        radio: Which radio.
+        network: The network of that radio; None leaves its rows out.
+        frames: Frames.
+        seed: Seed of walks and of whose radio is swapped.
+        everything: Whether held-out entries are read as well.
+        on_frame: Called as frames are located.
+
+    Returns:
+        For each row: joints, with the pelvis in place, limbs and wrists [m], F-scores at 5 and
+        10 cm of the posed surface. Rows of the evidence are missing where it tells nothing.
+    """
+    person = Person.of(sequence, radio, frames, everything, on_frame)
+    # Frames from the other half of the sequence.
+    other = [(k + len(frames) // 2) % len(frames) for k in range(len(frames))]
+    rows: dict[str, Float64[np.ndarray, "frame 17 3"]] = {}
+    if network is not None:
+        rows |= _by_network(network, person, other)
+    rows |= _by_evidence(person, other, seed)
+    mean, phases = _walking(person, seed)
+    own = people().body(np.zeros(0))
+    rows |= {
+        "standing, true heading": _placed(own.joints17(upright(own)), person),
+        "mean walk, true heading": _placed(mean, person),
+        "walk at a random phase, true heading": _placed(phases, person),
+        "true joints, another body": person.truth,
+    }
+    surfaces = _Surfaces.of(sequence, person)
+    return {name: _scores(joints, person, surfaces) for name, joints in rows.items()}
+
+
+def _by_network(
+    network: LimbNetwork, person: Person, other: list[int]
+) -> dict[str, Float64[np.ndarray, "frame 17 3"]]:
+    """Joints by the network, and those it gives to the radio of other frames."""
+    proposed = _proposed(network, person, person.seen)
+    swapped = _proposed(network, person, [person.seen[k] for k in other])
+    smooth = smoothed(proposed, person.time_s)
+    return {
+        "network, smoothed": PosedPeople.through(smooth).joints17()[:, 0],
+        "network, one frame": proposed.xyz[:, 0],
+        "radio of another frame": swapped.xyz[:, 0],
+    }
+
+
+def _by_evidence(
+    person: Person, other: list[int], seed: int
+) -> dict[str, Float64[np.ndarray, "frame 17 3"]]:
+    """Joints by evidence, and by that of other frames' radio, where they are told."""
+    swapped = [
+        replace(person.seen[k], time_s=one.time_s)
+        for k, one in zip(other, person.seen, strict=True)
+    ]
+    rows = {"evidence of a walk": person.seen, "evidence, radio of another frame": swapped}
+    told = {name: tell(seen, person.axes_xy, seed) for name, seen in rows.items()}
+    return {name: one.joints.xyz[:, 0] for name, one in told.items() if one is not None}
+
+
+def _proposed(network: LimbNetwork, person: Person, seen: list[Observations]) -> Joints:
+    said = [propose(network, one, xy[None]) for one, xy in zip(seen, person.axes_xy, strict=True)]
+    return Joints(np.array([one.xyz for one in said]), np.array([one.sigma_m for one in said]))
+
+
+def _walking(
+    person: Person, seed: int
+) -> tuple[Float64[np.ndarray, "17 3"], Float64[np.ndarray, "frame 17 3"]]:
+    """Mean pose of random walks, and one moment of a walk for each frame, facing along x."""
+    rng = np.random.default_rng(sub_seed(seed, "walks"))
+    body = people().body(np.zeros(0))
+    moments = []
+    for _ in range(_WALKS):
+        motion = random_motion(rng, body, "walk")
+        moments += [
+            body.joints17(motion.at(t)) for t in rng.uniform(0.0, motion.duration_s, _MOMENTS)
+        ]
+    ahead = _turned(np.array(moments), -headings_of(np.array(moments)))
+    ahead[..., :2] -= ahead[:, :1, :2]
+    return ahead.mean(axis=0), ahead[rng.integers(len(ahead), size=len(person.frames))]
+
+
+def _turned(
+    joints: Float[np.ndarray, "frame 17 3"], angle: Float[np.ndarray, "frame"]
+) -> Float64[np.ndarray, "frame 17 3"]:
+    c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    x, y, z = np.moveaxis(np.asarray(joints, dtype=np.float64), -1, 0)
+    return np.stack([c * x - s * y, s * x + c * y, z], axis=-1)
+
+
+def _placed(joints: Float[np.ndarray, "*frame 17 3"], person: Person) -> np.ndarray:
+    """Joints around the origin, facing along x, at the places found and facing the true way."""
+    many = np.broadcast_to(joints, (len(person.frames), 17, 3))
+    many = _turned(many, person.headings)
+    floor_m = float(person.seen[0].bounds_m[0, 2])
+    places = np.column_stack([person.axes_xy, np.full(len(many), floor_m)])
+    return many + places[:, None]
+
+
+@dataclass(frozen=True)
+class _Surfaces:
+    """True surfaces, and the grid they are compared on."""
+
+    grid: Grid
+    budget: int
+    truth: list[Float64[np.ndarray, "n 3"]]
+
+    @staticmethod
+    def of(sequence: Sequence, person: Person) -> _Surfaces:
+        truth = [reference_points(*sequence.moving_mesh(frame)[:2]) for frame in person.frames]
+        grid = Grid.over(np.asarray(sequence.bounds_m))
+        return _Surfaces(grid, voxel_budget(sequence.instances), truth)
+
+    def scores(self, frame: int, points: Float64[np.ndarray, "n 3"]) -> tuple[float, float]:
+        """F-scores at 5 and 10 cm of points on a surface."""
+        covariance = np.broadcast_to(np.eye(3) * _POINT_M**2, (len(points), 3, 3))
+        score = splat_gaussians(self.grid, points, covariance, np.ones(len(points)))
+        metrics = geometry_metrics(score, self.grid, self.truth[frame], self.budget)
+        return metrics["f05"] or 0.0, metrics["f10"] or 0.0
+
+
+def _scores(
+    joints: Float64[np.ndarray, "frame 17 3"], person: Person, surfaces: _Surfaces
+) -> dict[str, float]:
+    """Mean errors and F-scores of one row."""
+    error = np.linalg.norm(joints - person.truth, axis=2)
+    aligned = (joints - joints[:, :1]) - (person.truth - person.truth[:, :1])
+    body, found = people().body(np.zeros(0)), []
+    for frame, wanted in enumerate(joints):
+        pose = fit_pose(body, wanted, np.ones(17), None)
+        skin = body.skin(pose)
+        points = reference_points(skin, body.faces)[:_POINTS]
+        found.append(surfaces.scores(frame, points))
+    f05, f10 = np.mean(found, axis=0)
+    return {
+        "joints_m": float(error.mean()),
+        "aligned_m": float(np.linalg.norm(aligned, axis=2).mean()),
+        "limbs_m": float(error[:, LIMBS].mean()),
+        "wrists_m": float(error[:, WRISTS].mean()),
+        "f05": float(f05),
+        "f10": float(f10),
+    }

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Evidence of one pose in one frame: direct echoes, and echoes by way of one wall."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float64
+
+from rfgs_core.articulated import Body, Pose
+from rfgs_core.limbs.evidence.entries import End, Pair
+from rfgs_core.limbs.evidence.kernel import Facets, covariance
+from rfgs_core.worlds.figure import Figure, seen_from
+
+#: Facets lie as close as a tracer would set them for this wavelength [m]: phases are random.
+_WAVELENGTH_M = 0.1
+#: Width of the lobe around a facet's normal [rad], wider than without walls.
+LOBE_RAD = 0.25
+#: Of a body in a wall's mirror every so manieth facet is enough.
+_EVERY = 8
+#: Echoes by way of a wall that come later than this are told apart by band or direction [m].
+_LATEST_M = 6.0
+
+
+class Posed(NamedTuple):
+    """A body in a pose, and what every place sees of it."""
+
+    facets: Facets
+    seen: dict[tuple[float, ...], Bool[np.ndarray, "facet"]]
+    """Facets seen from each place, by its coordinates to the centimetre."""
+
+    def by(self, end: End) -> Bool[np.ndarray, "facet"]:
+        """Facets that an end sees."""
+        return self.seen[_key(end.centre)]
+
+
+def figure_of(body: Body) -> Figure:
+    """Facets on a body for its evidence."""
+    return Figure.of(body, _WAVELENGTH_M)
+
+
+def posed(figure: Figure, pose: Pose, pairs: list[Pair]) -> Posed:
+    """A body in a pose as the ends of some pairs see it."""
+    standing = figure.posed(pose)
+    facets = Facets(standing.points, standing.normals, np.sqrt(figure.areas_m2))
+    seen = {}
+    for pair in pairs:
+        for end in (pair.tx, pair.rx):
+            if _key(end.centre) not in seen:
+                seen[_key(end.centre)] = seen_from(standing, figure.body.faces, end.centre)
+    return Posed(facets, seen)
+
+
+def direct(posed: Posed, pair: Pair, shift: np.ndarray) -> np.ndarray:
+    """Covariance of the straight echoes of a posed body, moved a little by `shift` [3] m."""
+    seen = posed.by(pair.tx), posed.by(pair.rx)
+    return covariance(pair, posed.facets.moved(shift), *seen, LOBE_RAD)
+
+
+def by_walls(
+    facets: Facets, pair: Pair, bounds_m: Float64[np.ndarray, "2 3"], centre: np.ndarray
+) -> np.ndarray:
+    """Covariance of the echoes by way of one wall on either leg, every wall a mirror."""
+    few = facets.thinned(_EVERY)
+    seen = np.ones(len(few.points), dtype=bool)
+    total = np.zeros((len(pair.change),) * 2, dtype=np.complex64)
+    for tx, rx in _images(pair, bounds_m, centre):
+        total += covariance(pair, few, seen, seen, LOBE_RAD, tx, rx)
+    return total
+
+
+def _images(pair: Pair, bounds_m: np.ndarray, centre: np.ndarray) -> Iterator[tuple[End, End]]:
+    straight_m = _path_m(pair.tx, pair.rx, centre)
+    for axis in range(3):
+        for at_m in bounds_m[:, axis].tolist():
+            for ends in (
+                (pair.tx.mirrored(axis, at_m), pair.rx),
+                (pair.tx, pair.rx.mirrored(axis, at_m)),
+            ):
+                if _path_m(*ends, centre) - straight_m <= _LATEST_M:
+                    yield ends
+
+
+def _path_m(tx: End, rx: End, centre: np.ndarray) -> float:
+    return float(np.linalg.norm(tx.centre - centre) + np.linalg.norm(rx.centre - centre))
+
+
+def _key(place: np.ndarray) -> tuple[float, ...]:
+    # Elements of one device lie within millimetres: one look does for them.
+    return tuple(np.round(place, 2).tolist())

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Joints of located people, frame by frame and smoothed over a sequence."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from jaxtyping import Float, Float64
+
+from rfgs_core.encode.body_maps import CENTRE_HEIGHT_M, body_maps, views_of
+from rfgs_core.limbs.network import LimbNetwork
+from rfgs_core.limbs.tokens import (
+    MIRRORED,
+    Packed,
+    mirrored_joints,
+    pack,
+    power_of,
+    rotate,
+    tokens,
+)
+from rfgs_core.measure.observations import Observations
+
+#: Frames this far apart smooth each other [s], and the degree of the curve through them.
+SMOOTH_S, DEGREE = 0.4, 2
+#: No joint is surer than this where joints are smoothed [m].
+_SUREST_M = 0.01
+
+
+class Joints(NamedTuple):
+    """Where joints are."""
+
+    xyz: Float64[np.ndarray, "*frame body 17 3"]
+    """In the world [m]."""
+    sigma_m: Float64[np.ndarray, "*frame body 17"]
+    """How far each is expected to be off [m]."""
+
+
+def propose(
+    network: LimbNetwork, observations: Observations, axes_xy: Float[np.ndarray, "body 2"]
+) -> Joints:
+    """What the network makes of one frame.
+
+    Every device pair's receiver gives the direction of the x axis once, with and without a
+    mirror; what comes out is the mean.
+
+    Args:
+        network: The network of this kind of radio.
+        observations: The frame.
+        axes_xy: Where bodies are [m].
+    """
+    floor_m = float(observations.bounds_m[0, 2])
+    views = views_of(observations.layout, observations.links)
+    found, sigma = [], []
+    for x, y in axes_xy:
+        centre = np.array([x, y, floor_m + CENTRE_HEIGHT_M])
+        maps = body_maps(
+            observations.delta, observations.layout, observations.links,
+            observations.freq_hz, observations.subcarriers, centre,
+        )  # fmt: skip
+        joints, sure = _asked(network, pack([(views, maps, centre)], len(views)))
+        found.append(joints + centre)
+        sigma.append(sure)
+    return Joints(np.array(found).reshape(-1, 17, 3), np.array(sigma).reshape(-1, 17))
+
+
+def _asked(
+    network: LimbNetwork, packed: Packed
+) -> tuple[Float64[np.ndarray, "17 3"], Float64[np.ndarray, "17"]]:
+    """Mean joints around the centre, and σ, of one packed frame."""
+    pairs = np.flatnonzero(packed.there[0])
+    receivers = packed.vectors[0, pairs, 1]
+    # One reference per receiving device.
+    _, first = np.unique(np.round(receivers, 3), axis=0, return_index=True)
+    references = np.repeat(pairs[np.sort(first)], 2)
+    many = Packed(*(np.repeat(values, len(references), axis=0) for values in packed))
+    there = torch.from_numpy(many.there)
+    mirror = torch.arange(len(references)) % 2 == 1
+    network.eval()
+    with torch.no_grad():
+        seen = tokens(many, power_of(many), there, torch.from_numpy(references), mirror)
+        joints, log_sigma = network(seen)
+        straight = mirrored_joints(joints, mirror)
+        sigma = torch.where(mirror[:, None], log_sigma[:, MIRRORED], log_sigma).exp()
+        world = rotate(straight, seen.yaw)
+    return world.mean(0).double().numpy(), sigma.mean(0).double().numpy()
+
+
+def smoothed(joints: Joints, time_s: Float64[np.ndarray, "frame"]) -> Joints:
+    """Each joint on a weighted quadratic through the frames around.
+
+    Args:
+        joints: Of all frames, shape (frame, body, 17, ·).
+        time_s: Their times [s].
+
+    Returns:
+        The same. Errors of frames near each other are alike, so σ is their mean and no smaller.
+    """
+    xyz, sigma = joints.xyz.copy(), joints.sigma_m.copy()
+    for frame in range(len(time_s)):
+        near = np.flatnonzero(np.abs(time_s - time_s[frame]) <= SMOOTH_S + 1e-6)
+        degree = min(DEGREE, len(near) - 1)
+        powers = (time_s[near] - time_s[frame])[:, None] ** np.arange(degree + 1)
+        weight = 1.0 / np.maximum(joints.sigma_m[near], _SUREST_M) ** 2
+        normal = np.einsum("fi,fbj,fk->bjik", powers, weight, powers)
+        moment = np.einsum("fi,fbj,fbjx->bjix", powers, weight, joints.xyz[near])
+        inverse = np.linalg.inv(normal + 1e-9 * np.eye(degree + 1))
+        xyz[frame] = np.einsum("bjk,bjkx->bjx", inverse[..., 0, :], moment)
+        sigma[frame] = joints.sigma_m[near].mean(axis=0)
+    return Joints(xyz, sigma)

@@ -21,6 +21,8 @@ Observe = Literal["complex", "power", "delay_power"]
 Packets = Literal["all", "first"]
 #: told: the likelier of standing and sitting, per frame; standing: everybody stands.
 Posture = Literal["told", "standing"]
+#: auto: where a network for the radio comes with the package; off: a body is a column of a seat.
+Limbs = Literal["auto", "off"]
 #: empty_room: the capture without anything that moves; learned: the median over the frames.
 Background = Literal["empty_room", "learned"]
 #: Offsets of devices that are estimated: none, of oscillators, of clocks, or of both.
@@ -74,6 +76,12 @@ class TrainOptions:
     posture: Posture = "told"
     """told: the radio decides in every frame who stands and who sits, and where the knees point;
     standing: everybody stands, as is assumed without phases anyway."""
+
+    limbs: Limbs = "auto"
+    """auto: a network that was trained on random worlds tells people's limbs where one for the
+    radio is at hand, else evidence those of one person who walks, and Gaussians start on the
+    skins of posed bodies; off: they start around the bodies' places, knowing nothing but whether
+    somebody stands or sits."""
 
     def __post_init__(self) -> None:
         """Refuses values that no option may have.

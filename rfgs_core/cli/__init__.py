@@ -10,6 +10,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "info": ("info", "InfoArgs"),
     "demo": ("demo", "DemoArgs"),
     "encode": ("encode", "EncodeArgs"),
+    "limbs": ("limbs", "LimbsArgs"),
     "train": ("train", "TrainArgs"),
     "eval": ("eval", "EvalArgs"),
     "render": ("render", "RenderArgs"),
@@ -24,6 +25,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "csi": ("csi", "CsiArgs"),
     "inspect": ("inspect_capture", "InspectArgs"),
     "import": ("import_capture", "ImportArgs"),
+    "addon": ("addon", "AddonArgs"),
     "bench": ("bench", "BenchArgs"),
 }
 

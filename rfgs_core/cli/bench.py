@@ -27,10 +27,13 @@ class BenchArgs:
     readers: captures of Intel 5300 beside csiread, and of FeitCSI. real: not speed but how well
     measured data are explained, each part beside a baseline; docs/captures.md names the files.
     tracers: the fast tracer beside Sionna RT on our scenes, as `rfgs-factory tracers`.
+    limbs: joints and surface of a dataset's one person beside what knows less.
     """
 
     part: tyro.conf.Positional[
-        Literal["propagation", "raster", "blender", "training", "readers", "real", "tracers"]
+        Literal[
+            "propagation", "raster", "blender", "training", "readers", "real", "tracers", "limbs"
+        ]
     ]
     """What to time or judge."""
     data: Path | None = None
@@ -38,9 +41,14 @@ class BenchArgs:
     blender: Path | None = None
     """Blender program for the part `blender`; else $BLENDER, else pip's bpy."""
     dataset: Path | None = None
-    """Dataset for the part `training`."""
+    """Dataset for the parts `training` and `limbs`."""
     radio: str = "wifi"
-    """Radio for the part `training`."""
+    """Radio for the parts `training` and `limbs`."""
+    network: Path | None = None
+    """Network for the part `limbs`, as `rfgs limbs` makes it; left out: the one that comes with
+    the package."""
+    hold_out: bool = False
+    """For the part `limbs`: hide what the dataset holds out, as training does."""
     frame: int | None = None
     """Frame for the part `training`; the first one when left out."""
     gaussians: int = 20_000
@@ -67,6 +75,8 @@ def _bench(args: BenchArgs) -> Callable[[], dict[str, Any]]:
         return bench_readers
     if args.part == "real":
         return partial(_real, args)
+    if args.part == "limbs":
+        return partial(_limbs, args)
     if args.part == "raster":
         from rfgs_core.render.bench import bench_raster
 
@@ -100,6 +110,32 @@ def _real(args: BenchArgs) -> dict[str, Any]:
     if args.data is None:
         raise RfgsError("bench real: expected --data FOLDER of captures, see docs/captures.md")
     return bench_real(args.data, _note)
+
+
+def _limbs(args: BenchArgs) -> dict[str, Any]:
+    from tqdm import tqdm
+
+    from rfgs_core.bench import hardware
+    from rfgs_core.dataset import open_dataset
+    from rfgs_core.errors import RfgsError
+    from rfgs_core.evaluate.limbs import limb_table
+    from rfgs_core.limbs.weights import load_network, own_network
+
+    if args.dataset is None:
+        raise RfgsError("bench limbs: expected --dataset FOLDER, see `rfgs-factory generate`")
+    sequence = open_dataset(args.dataset).sequence()
+    freq_hz = sequence.coordinates(args.radio)["freq_hz"].values
+    trained = load_network(args.network) if args.network else own_network(freq_hz)
+    network = None if trained is None else trained.network
+    with tqdm(total=len(sequence.frames), desc="limbs") as bar:
+        table = limb_table(
+            sequence, args.radio, network, sequence.frames,
+            everything=not args.hold_out, on_frame=bar.update,
+        )  # fmt: skip
+    flat = {
+        f"{row}: {name}": value for row, values in table.items() for name, value in values.items()
+    }
+    return {**flat, "frames": len(sequence.frames), **hardware()}
 
 
 def _note(line: str) -> None:

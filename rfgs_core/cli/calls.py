@@ -3,11 +3,19 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
+import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 from rfgs_core.errors import RfgsError
+from rfgs_core.interrupts import CALLED, STOPPED
+
+#: Ctrl-C reaches the called program too; one that it did not reach is told after so long [s].
+_GRACE_S = 2.0
 
 
 def call(*command: str | Path) -> None:
@@ -18,8 +26,38 @@ def call(*command: str | Path) -> None:
         KeyboardInterrupt: The user stopped it.
     """
     arguments = [sys.executable, "-m", *map(str, command)]
-    code = subprocess.run(arguments, check=False).returncode
-    if code == 130:
+    with subprocess.Popen(arguments, env={**os.environ, CALLED: "1"}) as program:
+        try:
+            code = program.wait()
+        except KeyboardInterrupt:
+            _let_end(program)
+            raise
+    if code == STOPPED:
         raise KeyboardInterrupt
     if code:
         raise RfgsError(f"`python -m {' '.join(map(str, command))}` failed (exit code {code})")
+
+
+def _let_end(program: subprocess.Popen[bytes]) -> None:
+    """Waits for a program that ends by itself, as one that is killed leaves its workers behind."""
+    try:
+        program.wait(_GRACE_S)
+    except subprocess.TimeoutExpired:
+        program.send_signal(signal.SIGINT)
+        program.wait()
+
+
+@contextlib.contextmanager
+def watched(run: Path) -> Iterator[None]:
+    """Shows a run in the viewer for as long as the block runs; the viewer says where.
+
+    Args:
+        run: Folder of a run that is trained meanwhile.
+    """
+    command = ("rfgs_core.cli", "view", str(run), "--wait", "--port", "0")
+    arguments = [sys.executable, "-m", *command]
+    with subprocess.Popen(arguments, env={**os.environ, CALLED: "1"}) as viewer:
+        try:
+            yield
+        finally:
+            viewer.terminate()

@@ -12,7 +12,11 @@ import tyro
 
 @dataclass(frozen=True)
 class PoseArgs:
-    """Fits a 17-joint body to each person's Gaussians and writes RUN/pose.npz and RUN/pose.png.
+    """Tells the joints of each person and writes RUN/pose.npz and RUN/pose.png.
+
+    Where the run knows limbs they are those of its posed bodies, which are also written as motion
+    capture, RUN/person0.bvh and so on, with a deviation for each joint; else a 17-joint body is
+    fitted to each person's Gaussians.
 
     The errors are printed beside those of a standing body of average height at the same place,
     which knows nothing of the limbs: only what beats it was seen by radio. RUN/pose.json holds
@@ -32,7 +36,9 @@ def run(args: PoseArgs) -> int:
     from rfgs_core.figures.poses import write_pose_chart
     from rfgs_core.files import write_json
     from rfgs_core.pose import estimate_poses, score_poses
+    from rfgs_core.pose.bvh import write_bvh
     from rfgs_core.run import open_run
+    from rfgs_core.run.limbs import read_limbs
 
     trained = open_run(args.run)
     trained.need_frames()
@@ -40,6 +46,13 @@ def run(args: PoseArgs) -> int:
         estimate = estimate_poses(trained, bar.update)
     scores = score_poses(estimate, trained.sequence)
     arrays = {name: getattr(estimate, name) for name in ("time_s", "centroid", "joints")}
+    if estimate.sigma_m is not None:
+        arrays["sigma_m"] = estimate.sigma_m
+    limbs = read_limbs(args.run)
+    if limbs is not None:
+        arrays |= {"root": limbs.people.root, "turns": limbs.people.turns}
+        for number in range(len(limbs.people.coefficients)):
+            write_bvh(args.run / f"person{number}.bvh", limbs.people, number, estimate.time_s)
     save_arrays(args.run / "pose.npz", {"frames": np.array(estimate.frames), **arrays})
     write_json(args.run / "pose.json", scores)
     truth = [trained.sequence.joints(frame) for frame in estimate.frames]

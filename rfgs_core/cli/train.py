@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -47,6 +48,9 @@ class TrainArgs:
     """Moving Gaussians at the start; the recipe's own number when left out."""
     log: bool = False
     """Write curves of loss and number of Gaussians into OUT/log, for `tensorboard --logdir`."""
+    view: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """Watch meanwhile: serves the viewer's page, prints its address, and shows each frame as soon
+    as it is fitted; ends with the training."""
     shader: Annotated[bool, tyro.conf.arg(name="shader")] = True
     """Colour the frozen Gaussians from training pictures afterwards, for display only. Without any
     such picture they stay grey."""
@@ -55,6 +59,7 @@ class TrainArgs:
 
 def run(args: TrainArgs) -> int:
     """Trains, then colours the result where the dataset has pictures."""
+    from rfgs_core.cli.calls import watched
     from rfgs_core.dataset import open_dataset
     from rfgs_core.errors import RfgsError
     from rfgs_core.frames import chosen_frames
@@ -80,9 +85,10 @@ def run(args: TrainArgs) -> int:
     config = replace(config, packets=packets_to_read(args.packets, sequence, args.radio, config))
     frames = chosen_frames(args.frames, sequence.frames)
     shader = args.shader and _can_color(dataset, sequence, frames)
-    trained = train_sequence(
-        dataset, sequence, args.radio, frames, config, args.out, encoder_file, log=args.log
-    )
+    with watched(args.out) if args.view else contextlib.nullcontext():
+        trained = train_sequence(
+            dataset, sequence, args.radio, frames, config, args.out, encoder_file, log=args.log
+        )
     if args.options.calibrate != "none":
         sys.stdout.write(f"offsets: {calibration_text(args.out, frames)}\n")
     if shader and not (args.out / "shader.npz").exists():

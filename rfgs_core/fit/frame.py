@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -72,6 +73,43 @@ class FrameState:
         return self.head.gamma(self.gaussians.features)
 
 
+class OnSkins(NamedTuple):
+    """Gaussians on the skins of posed people: where a frame starts whose limbs are told."""
+
+    points: Float64[np.ndarray, "M 3"]
+    """Where they are [m], row by row at the same place of the skin in every frame."""
+    normals: Float64[np.ndarray, "M 3"]
+    """How they face."""
+    tracks: Tracks
+    """Where the bodies are."""
+
+
+def start_on_skins(
+    observations: Observations,
+    config: TrainConfig,
+    skins: OnSkins,
+    before: FrameState | None,
+    encoder: Encoder = MATCHED_FILTER,
+) -> FrameState:
+    """Gaussians on the skins of posed people; a track is a place on the skin.
+
+    Args:
+        observations: The frame.
+        config: Settings.
+        skins: Where the Gaussians are.
+        before: The fitted frame before, whose head goes on; None in a first one.
+        encoder: φ.
+
+    Raises:
+        RfgsError: Nobody changes the channel.
+    """
+    _need_change(observations)
+    head = None if before is None else before.head
+    state = state_at(skins.points, skins.normals, observations, config, skins.tracks, encoder, head)
+    goes_on = None if before is None else np.isin(state.track_id, before.track_id)
+    return replace(state, goes_on=goes_on, next_track=len(skins.points))
+
+
 def start_frame(
     observations: Observations,
     config: TrainConfig,
@@ -97,15 +135,10 @@ def start_frame(
     Raises:
         RfgsError: Nobody changes the channel.
     """
-    if not observations.changed:
-        raise RfgsError(
-            "the channel of this frame is that of the empty scene, or lost in noise: nobody is in "
-            "it; choose other --frames, or generate the dataset with a larger --depth or more "
-            "--packets-per-frame"
-        )
+    _need_change(observations)
     rng = np.random.default_rng(seed)
     maps = pair_maps(observations)
-    tracks = _followed(before, maps, observations, config, seed)
+    tracks = _followed(None if before is None else before.tracks, maps, observations, config, seed)
     bodies = tell_postures(observations, maps, tracks.axes_xy, config, seed)
     tracks = replace(tracks, knees_rad=bodies.knees_rad)
     cells = StartCells.around(maps, bodies.axes_xy, observations.bounds_m)
@@ -155,8 +188,29 @@ def state_at(
     return FrameState(replace(gaussians, features=features), power, head, tracks, track_id)
 
 
+def followed(
+    before: Tracks | None, observations: Observations, config: TrainConfig, seed: int
+) -> Tracks:
+    """Finds the bodies of a frame, those of the frame before in the same order.
+
+    Raises:
+        RfgsError: Nobody changes the channel.
+    """
+    _need_change(observations)
+    return _followed(before, pair_maps(observations), observations, config, seed)
+
+
+def _need_change(observations: Observations) -> None:
+    if not observations.changed:
+        raise RfgsError(
+            "the channel of this frame is that of the empty scene, or lost in noise: nobody is in "
+            "it; choose other --frames, or generate the dataset with a larger --depth or more "
+            "--packets-per-frame"
+        )
+
+
 def _followed(
-    before: FrameState | None,
+    before: Tracks | None,
     maps: PairMaps,
     observations: Observations,
     config: TrainConfig,
@@ -167,10 +221,10 @@ def _followed(
     if before is None:
         axes_xy = locate_bodies(maps, bounds_m, config.bodies)
         return Tracks.begun(separated(observations, maps, axes_xy, config, seed), time_s)
-    near, reach_m = before.tracks.expected(time_s)
+    near, reach_m = before.expected(time_s)
     axes_xy = locate_bodies(maps, bounds_m, config.bodies, near, reach_m)
     axes_xy = separated(observations, maps, axes_xy, config, seed, near, reach_m)
-    return before.tracks.moved(axes_xy, time_s)
+    return before.moved(axes_xy, time_s)
 
 
 def solve_reflectivity(

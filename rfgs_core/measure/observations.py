@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Bool, Complex, Complex64, Float32, Float64, Int64
@@ -116,7 +117,13 @@ def packets_to_read(
 
 
 def visible_channel(
-    sequence: Sequence, radio: str, frame: int, channel: Observed, packets: Packets = "first"
+    sequence: Sequence,
+    radio: str,
+    frame: int,
+    channel: Observed,
+    packets: Packets = "first",
+    *,
+    everything: bool = False,
 ) -> tuple[Layout, Bool[np.ndarray, "tx rx"], Bool[np.ndarray, "subcarrier"], np.ndarray]:
     """Elements, visible links and subcarriers, and the channels of a frame with everything in them.
 
@@ -137,7 +144,8 @@ def visible_channel(
             )
         # The links that exist are those the channels were stored with.
         elements = replace(elements, measured=data["measured"].values.copy())
-    split = HeldOut.of(sequence.held_out(radio), elements, data.sizes["subcarrier"])
+    hidden = _nothing_hidden(sequence.held_out(radio)) if everything else sequence.held_out(radio)
+    split = HeldOut.of(hidden, elements, data.sizes["subcarrier"])
     links, subcarriers = split.links, split.subcarriers
     count = 1 if packets == "first" else None
     csi = whole_packets(sequence, radio, frame, channel, count)
@@ -146,6 +154,12 @@ def visible_channel(
         received = received & ~np.isnan(csi).all(axis=3)
     _need_finite(csi, received, subcarriers, f"csi of frame {frame} ({sequence.name}, {radio})")
     return elements, received.any(axis=0), subcarriers, csi
+
+
+def _nothing_hidden(split: Mapping[str, Any]) -> dict[str, Any]:
+    """A split that holds out nothing; what a real radio did not report stays unknown."""
+    nothing = dict.fromkeys(("rx_elements", "subcarriers", "device_pairs"), ())
+    return {**split, **nothing}
 
 
 def _need_finite(csi: np.ndarray, links: np.ndarray, subcarriers: np.ndarray, what: str) -> None:
@@ -162,6 +176,8 @@ def observe(
     empty: Reported | None = None,
     packets: Packets = "first",
     kept: Kept | None = None,
+    *,
+    everything: bool = False,
 ) -> Observations:
     """Reads one frame at its own time and hides what is held out, and links that heard nothing.
 
@@ -175,11 +191,14 @@ def observe(
         packets: Whether the frame's other packets help to tell the change from noise; only of
             the channel itself.
         kept: Hides all other links and subcarriers as well, before anything is made of the channel.
+        everything: Hides nothing: for poses and geometry, whose truth is no channel.
 
     Raises:
         RfgsError: The channel holds values that are not finite.
     """
-    elements, links, subcarriers, csi = visible_channel(sequence, radio, frame, channel, packets)
+    elements, links, subcarriers, csi = visible_channel(
+        sequence, radio, frame, channel, packets, everything=everything
+    )
     if kept is not None:
         links, subcarriers = links & kept[0], subcarriers & kept[1]
     if empty is None:

@@ -15,8 +15,12 @@ from rfgs_core.pose.body import index_of, joints_of
 from rfgs_core.pose.fit import Cloud, fit_body, standing
 from rfgs_core.radio.levels import power_of
 from rfgs_core.run import Run
+from rfgs_core.run.limbs import Limbs, read_limbs
 from rfgs_core.seeds import sub_seed
+from rfgs_core.skeleton import JOINTS
 
+#: Whose pelvis is lower above the floor sits [m]: halfway between a chair and standing.
+SITTING_PELVIS_M = 0.75
 #: Slower people may walk any way [m/s].
 WALKING_M_S = 0.3
 #: Frames further apart than this say nothing about where somebody walks [s].
@@ -40,10 +44,12 @@ class PoseEstimate:
     standing: Float64[np.ndarray, "frame body 17 3"]
     """Joints of the baseline: a standing body of average height at the same centroid, which
     looks where the track leads [m]."""
+    sigma_m: Float64[np.ndarray, "frame body 17"] | None = None
+    """How far each joint is expected to be off [m]; None where the network did not tell limbs."""
 
 
 def estimate_poses(run: Run, on_step: Callable[[], Any] = lambda: None) -> PoseEstimate:
-    """Fits one body to each person's Gaussians in every frame.
+    """People as the run's limbs have them, else one body fitted to each person's Gaussians.
 
     Raises:
         RfgsError: The run does not say which Gaussian belongs to whom.
@@ -53,6 +59,9 @@ def estimate_poses(run: Run, on_step: Callable[[], Any] = lambda: None) -> PoseE
     clouds = [_clouds(run, frame, floor_m) for frame in run.frames]
     time_s = np.array([sequence.time_s(frame) for frame in run.frames])
     centroid = np.array([[cloud.centre for cloud in row] for row in clouds])
+    limbs = read_limbs(run.path)
+    if limbs is not None:
+        return _told(limbs, clouds, centroid, time_s, floor_m)
     joints = np.zeros((*centroid.shape[:2], 17, 3))
     baseline = np.zeros_like(joints)
     knees_rad = np.array([_knees(run, frame) for frame in run.frames])
@@ -78,6 +87,32 @@ def estimate_poses(run: Run, on_step: Callable[[], Any] = lambda: None) -> PoseE
             baseline[k, body] = joints_of(standing(cloud, looks), floor_m)
             on_step()
     return PoseEstimate(list(run.frames), time_s, centroid, joints, sits, baseline)
+
+
+def _told(
+    limbs: Limbs,
+    clouds: list[list[Cloud]],
+    centroid: Float64[np.ndarray, "frame body 3"],
+    time_s: Float64[np.ndarray, "frame"],
+    floor_m: float,
+) -> PoseEstimate:
+    """The poses that the Gaussians were drawn on."""
+    joints = limbs.people.joints17()
+    baseline = np.zeros_like(joints)
+    for body in range(joints.shape[1]):
+        ways = headings_of(time_s, centroid[:, body, :2])
+        for k, looks in enumerate(ways):
+            # Of a body at rest the baseline is told which way the pose faces.
+            left = (
+                joints[k, body, JOINTS.index("left_hip")]
+                - joints[k, body, JOINTS.index("right_hip")]
+            )
+            own = float(np.arctan2(-left[0], left[1]))
+            way = looks[0] if len(looks) == 1 else own
+            baseline[k, body] = joints_of(standing(clouds[k][body], way), floor_m)
+    seated = joints[:, :, 0, 2] - floor_m < SITTING_PELVIS_M
+    sigma_m = limbs.joints.sigma_m
+    return PoseEstimate(limbs.frames, time_s, centroid, joints, seated, baseline, sigma_m)
 
 
 def _knees(run: Run, frame: int) -> Float64[np.ndarray, "body"]:

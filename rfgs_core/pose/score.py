@@ -10,13 +10,11 @@ from jaxtyping import Float64, Int64
 from scipy.optimize import linear_sum_assignment
 
 from rfgs_core.dataset import Sequence
-from rfgs_core.pose.estimate import PoseEstimate
+from rfgs_core.pose.estimate import SITTING_PELVIS_M, PoseEstimate
 from rfgs_core.skeleton import JOINTS
 
 #: A body further than this from everybody has lost its person [m].
 LOST_M = 0.5
-#: Whose pelvis is lower above the floor sits [m]: halfway between a chair and standing.
-SITTING_PELVIS_M = 0.75
 
 
 def score_poses(estimate: PoseEstimate, sequence: Sequence) -> dict[str, Any]:

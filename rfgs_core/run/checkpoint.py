@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 
@@ -48,8 +49,17 @@ def partial_path(run: Run, frame: int) -> Path:
     return checkpoint_path(run.path, frame).with_suffix(".partial.npz")
 
 
-def store_frame(run: Run, frame: int, state: FrameState) -> None:
-    """Writes a finished frame; its checkpoint comes last and marks it as done."""
+def store_frame(
+    run: Run, frame: int, state: FrameState, more: Mapping[str, np.ndarray] | None = None
+) -> None:
+    """Writes a finished frame; its checkpoint comes last and marks it as done.
+
+    Args:
+        run: The run.
+        frame: Which frame.
+        state: Its Gaussians.
+        more: Further arrays beside the PLY, a row per Gaussian.
+    """
     power_db = decibels(state.power.numpy()).astype(np.float32)
     write_ply(run.ply_path(frame), cloud_of(state.gaussians, rf_power_db=power_db))
     gamma = state.gamma.detach().numpy().astype(np.complex64)
@@ -61,6 +71,7 @@ def store_frame(run: Run, frame: int, state: FrameState) -> None:
             "rf_power_db": power_db,
             "track_id": state.track_id,
             "body": state.moving.body,
+            **(more or {}),
         },
     )
     if not static_ply(run.path).exists():

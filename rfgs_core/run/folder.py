@@ -32,6 +32,8 @@ from rfgs_core.threads import one_torch_thread
 
 #: What a learned background is kept in.
 BACKGROUND_FILE = "background.npz"
+#: What `rfgs train` keeps of people's limbs, where it tells them.
+LIMBS_FILE = "limbs.npz"
 _REMEDY = "train this run again"
 _ATTRIBUTES: dict[str, Shape] = {
     "features": ("M", FEATURE_DIM),
@@ -40,7 +42,17 @@ _ATTRIBUTES: dict[str, Shape] = {
     "track_id": ("M",),
     "body": ("M",),
 }
-_TYPES = {"features": "f4", "gamma": "c8", "rf_power_db": "f4", "track_id": "i8", "body": "i8"}
+#: What only Gaussians on the skin of a posed body have.
+_ON_SKIN: dict[str, Shape] = {"bone": ("M",), "sigma_m": ("M",)}
+_TYPES = {
+    "features": "f4",
+    "gamma": "c8",
+    "rf_power_db": "f4",
+    "track_id": "i8",
+    "body": "i8",
+    "bone": "i8",
+    "sigma_m": "f4",
+}
 
 
 @dataclass(frozen=True)
@@ -131,6 +143,9 @@ class Run:
     def attributes(self, frame: int) -> dict[str, np.ndarray]:
         """Per-Gaussian arrays of the moving Gaussians, rows as in the PLY.
 
+        `features`, `gamma`, `rf_power_db`, `track_id` and `body`; where limbs were told also `bone`
+        and `sigma_m`.
+
         Raises:
             RfgsError: The run has no such frame.
             RfgsFormatError: The file is damaged.
@@ -143,7 +158,9 @@ class Run:
                 if known
                 else f"{self.path} holds no frame {frame}; it has {self.frames}"
             )
-        arrays = load_arrays(path, _REMEDY, _ATTRIBUTES, types=_TYPES)
+        posed = (self.path / LIMBS_FILE).exists()
+        shapes = {**_ATTRIBUTES, **_ON_SKIN} if posed else _ATTRIBUTES
+        arrays = load_arrays(path, _REMEDY, shapes, types=_TYPES)
         count = count_ply(self.ply_path(frame))
         if count != len(arrays["features"]):
             raise RfgsFormatError(

@@ -6,7 +6,6 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from tqdm import tqdm
 
@@ -22,7 +21,7 @@ from rfgs_core.device import need_device
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import sweep
 from rfgs_core.fit.calibrate import calibrate
-from rfgs_core.fit.frame import FrameState, start_frame
+from rfgs_core.fit.frame import FrameState, start_frame, start_on_skins
 from rfgs_core.fit.refine import need_sample_points
 from rfgs_core.fit.stages import fit_frame
 from rfgs_core.gaussians.ply import GaussianCloud, read_ply, write_ply
@@ -37,6 +36,7 @@ from rfgs_core.run.calibration import (
 )
 from rfgs_core.run.checkpoint import finished_frame, partial_path, store_frame
 from rfgs_core.run.config import CONFIG_FILE, RunConfig
+from rfgs_core.run.costs import CostBar, cost_bar
 from rfgs_core.run.encoders import (
     ENCODER_FILE,
     keep_encoder,
@@ -48,6 +48,15 @@ from rfgs_core.run.folder import (
     Run,
     open_run,
     relative_dataset,
+)
+from rfgs_core.run.limbs import (
+    Limbs,
+    evidence_tells,
+    find_limbs,
+    frames_read,
+    limbs_network,
+    limbs_wanted,
+    looks_at,
 )
 from rfgs_core.run.log import Scalars, TrainingLog
 from rfgs_core.run.static import (
@@ -159,9 +168,11 @@ def _fit_frames(run: Run, config: TrainConfig, log: bool) -> float:
     """Fits and stores the frames that are not finished; returns the time of all so far [s]."""
     spent = run.config.train_s
     before: FrameState | None = None
-    total = len(run.frames) * (config.iterations + 2)
+    begin = time.perf_counter()
+    limbs = _limbs(run, config)
+    spent += time.perf_counter() - begin
     with (
-        tqdm(total=total, desc=f"train {run.config.radio}") as bar,
+        cost_bar(run, config.iterations) as bar,
         TrainingLog(run.path / "log" if log else None) as curves,
     ):
         for frame in run.frames:
@@ -169,14 +180,27 @@ def _fit_frames(run: Run, config: TrainConfig, log: bool) -> float:
             state = finished_frame(run, frame)
             if state is None:
                 with one_torch_thread():
-                    state = _fit(run, frame, config, before, bar, curves.of_frame(frame))
-                store_frame(run, frame, state)
+                    state = _fit(run, frame, config, before, limbs, bar, curves.of_frame(frame))
+                more = None if limbs is None else limbs.of_gaussians(frame, config)
+                store_frame(run, frame, state, more)
                 spent += time.perf_counter() - begin
                 replace(run.config, train_s=round(spent, 2)).write(run.path)
+                bar.finish_frame()
             else:
-                bar.update(config.iterations + 2)
+                bar.skip()
             before = state
     return spent
+
+
+def _limbs(run: Run, config: TrainConfig) -> Limbs | None:
+    """Follows and poses the people of all frames, where a network or evidence tells limbs."""
+    if not limbs_wanted(run, config):
+        return None
+    trained = limbs_network(run)
+    if trained is None and not evidence_tells(run, frames_read(run)):
+        return None
+    with tqdm(total=looks_at(run), desc="posing people") as bar, one_torch_thread():
+        return find_limbs(run, config, trained, bar.update)
 
 
 def _fit(
@@ -184,7 +208,8 @@ def _fit(
     frame: int,
     config: TrainConfig,
     before: FrameState | None,
-    bar: Any,
+    limbs: Limbs | None,
+    bar: CostBar,
     scalars: Scalars | None = None,
 ) -> FrameState:
     """Runs all stages on one frame."""
@@ -196,14 +221,16 @@ def _fit(
     earlier = None
     if config.density == "motion" and before is not None:
         earlier = run.observations(run.frames[run.frames.index(frame) - 1])
-    bar.set_postfix_str(f"frame {frame}, finding bodies")
-    state = start_frame(observations, config, seed, before, encoder, earlier)
-    bar.update(1)
-    bar.set_postfix_str(f"frame {frame}, solving reflectivities")
+    bar.begin(f"frame {frame}, finding bodies")
+    if limbs is None:
+        state = start_frame(observations, config, seed, before, encoder, earlier)
+    else:
+        skins = limbs.on_skins(frame, config)
+        state = start_on_skins(observations, config, skins, before, encoder)
+    bar.found(f"frame {frame}, solving reflectivities")
 
     def on_step(loss: float, count: int) -> None:
-        bar.update(1)
-        bar.set_postfix_str(f"frame {frame}, loss {loss:.3g}, {count} Gaussians")
+        bar.step(f"frame {frame}, loss {loss:.3g}, {count} Gaussians")
 
     return fit_frame(
         observations,
@@ -212,7 +239,7 @@ def _fit(
         seed,
         encoder=encoder,
         checkpoint=partial_path(run, frame),
-        on_solved=lambda: bar.update(1),
+        on_solved=bar.solved,
         on_step=on_step,
         scalars=scalars,
     )

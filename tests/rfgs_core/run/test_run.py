@@ -93,8 +93,8 @@ def test_a_refit_knows_no_more_than_what_is_left(
     np.testing.assert_array_equal(change[kept], seen.delta[kept])
 
     def after(factor: np.ndarray) -> np.ndarray:
-        def altered(*args: Any) -> Any:
-            elements, links, subcarriers, csi = visible_channel(*args)
+        def altered(*args: Any, **options: Any) -> Any:
+            elements, links, subcarriers, csi = visible_channel(*args, **options)
             return elements, links, subcarriers, (csi * factor).astype(np.complex64)
 
         monkeypatch.setattr(observations, "visible_channel", altered)

@@ -1,0 +1,257 @@
+# SPDX-License-Identifier: Apache-2.0
+"""People of a run with their limbs: followed through all frames, posed, and kept in a file."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float64
+
+from rfgs_core.arrays import load_arrays, save_arrays
+from rfgs_core.articulated import BONES
+from rfgs_core.bodies.localise import pair_maps
+from rfgs_core.bodies.separation import each_alone
+from rfgs_core.bodies.tracks import Tracks
+from rfgs_core.fit.frame import OnSkins, followed
+from rfgs_core.limbs.evidence.tell import long_enough, looks, tell
+from rfgs_core.limbs.propose import SMOOTH_S, Joints, propose, smoothed
+from rfgs_core.limbs.skins import PosedPeople
+from rfgs_core.limbs.weights import Trained, own_network
+from rfgs_core.measure.observations import Observations
+from rfgs_core.run.folder import LIMBS_FILE, Run
+from rfgs_core.seeds import sub_seed
+from rfgs_core.settings import TrainConfig
+
+_LOG = logging.getLogger(__name__)
+#: Limbs that are expected to be further off on average than this are left alone: joints of a
+#: standing body at the right place are 0.11 m off those of one who walks.
+_UNSURE_M = 0.15
+_REMEDY = "delete it and run the same `rfgs train` again"
+_SHAPES = {
+    "frames": ("frame",),
+    "axes_xy": ("frame", "body", 2),
+    "velocity_xy": ("frame", "body", 2),
+    "time_s": ("frame",),
+    "joints": ("frame", "body", 17, 3),
+    "sigma_m": ("frame", "body", 17),
+    "coefficients": ("body", "coefficient"),
+    "root": ("frame", "body", 3),
+    "turns": ("frame", "body", len(BONES), 3, 3),
+}
+_TYPES = {name: "f8" for name in _SHAPES} | {"frames": "i8", "turns": "f4"}
+
+
+@dataclass(frozen=True)
+class Limbs:
+    """Everybody in every frame of a run."""
+
+    frames: list[int]
+    """Frames."""
+    tracks: list[Tracks]
+    """Where people are in each frame, and how fast."""
+    joints: Joints
+    """What the network says, smoothed, or evidence, shape (frame, body, 17, ·)."""
+    people: PosedPeople
+    """Bodies in these poses."""
+
+    def on_skins(self, frame: int, config: TrainConfig) -> OnSkins:
+        """Gaussians of a frame, at the same places of the skins as in all others."""
+        index = self.frames.index(frame)
+        drawn = self.people.gaussians(index, config.num_gaussians, config.seed)
+        return OnSkins(drawn.points, drawn.normals, self.tracks[index])
+
+    def of_gaussians(self, frame: int, config: TrainConfig) -> dict[str, np.ndarray]:
+        """What else is known of each Gaussian of `on_skins`.
+
+        Returns:
+            `bone` that carries it, as in `articulated.BONES`, and `sigma_m`, how far the joint next
+            to it is expected to be off [m].
+        """
+        index = self.frames.index(frame)
+        drawn = self.people.gaussians(index, config.num_gaussians, config.seed)
+        joints = self.people.joints17()[index]
+        away = np.linalg.norm(drawn.points[:, None] - joints[drawn.body], axis=2)
+        sigma_m = self.joints.sigma_m[index][drawn.body, away.argmin(axis=1)]
+        return {"bone": drawn.bone, "sigma_m": sigma_m.astype(np.float32)}
+
+
+def limbs_wanted(run: Run, config: TrainConfig) -> bool:
+    """Whether limbs are asked for and the radio's report may tell them."""
+    if config.limbs == "off" or config.observe != "complex" or config.recipe == "paper":
+        return False
+    if config.density not in (None, "none") or config.calibrate != "none":
+        return False
+    return not run.sequence.radio_spec(run.config.radio).antennas_move
+
+
+def limbs_network(run: Run) -> Trained | None:
+    """The network for a run's radio; None where there is none, and evidence tells or nothing."""
+    coordinates = run.sequence.coordinates(run.config.radio)
+    return own_network(np.asarray(coordinates["freq_hz"].values, dtype=np.float64))
+
+
+def find_limbs(
+    run: Run,
+    config: TrainConfig,
+    trained: Trained | None,
+    on_frame: Callable[[], Any] = lambda: None,
+) -> Limbs | None:
+    """Follows people through a run's frames and poses them; what is kept is read.
+
+    Evidence tells those of one person who walks, the network those of everybody else. Frames of
+    the sequence beside those of the run, near enough to smooth them, are read as well.
+
+    Args:
+        run: The run.
+        config: Its settings.
+        trained: The network for its radio; None where there is none.
+        on_frame: Called as frames are read and looked at; see `looks_at`.
+
+    Returns:
+        None where nothing can be told, or nothing that would be of use.
+    """
+    kept = read_limbs(run.path)
+    if kept is not None:
+        return kept
+    frames = frames_read(run)
+    tracks: list[Tracks] = []
+    seen: list[Observations] = []
+    seeds = [
+        sub_seed(config.seed, run.config.sequence, run.config.radio, frame, "fit")
+        for frame in frames
+    ]
+    for frame, seed in zip(frames, seeds, strict=True):
+        seen.append(run.observations(frame))
+        tracks.append(followed(tracks[-1] if tracks else None, seen[-1], config, seed))
+        on_frame()
+    walks = evidence_tells(run, frames)
+    joints = _by_evidence(seen, tracks, config.seed, on_frame) if walks else None
+    if joints is None and trained is not None:
+        joints = _by_network(trained, seen, tracks, config, seeds)
+    if joints is None:
+        return None
+    own = [frames.index(frame) for frame in run.frames]
+    joints = Joints(joints.xyz[own], joints.sigma_m[own])
+    if joints.sigma_m.mean() > _UNSURE_M:
+        _LOG.warning(
+            "limbs are expected to be %.2f m off, more than %.2f m: bodies stay without",
+            joints.sigma_m.mean(),
+            _UNSURE_M,
+        )
+        return None
+    limbs = Limbs(list(run.frames), [tracks[k] for k in own], joints, PosedPeople.through(joints))
+    _store(run.path, limbs)
+    return limbs
+
+
+def evidence_tells(run: Run, frames: list[int]) -> bool:
+    """Whether frames are those of one person and show enough of a walk."""
+    sequence = run.sequence
+    people = sum(1 for row in sequence.instances if row["class"] == "person")
+    time_s = np.array([sequence.time_s(frame) for frame in frames])
+    return people == 1 and long_enough(time_s)
+
+
+def looks_at(run: Run) -> int:
+    """How often `find_limbs` calls `on_frame`, if somebody walks wherever evidence may tell."""
+    frames = frames_read(run)
+    return len(frames) + (looks(len(frames)) if evidence_tells(run, frames) else 0)
+
+
+def _by_evidence(
+    seen: list[Observations], tracks: list[Tracks], seed: int, on_frame: Callable[[], Any]
+) -> Joints | None:
+    """Joints of one person in all frames; None where evidence tells nothing."""
+    if any(len(track.axes_xy) != 1 for track in tracks):
+        return None
+    told = tell(seen, np.array([track.axes_xy[0] for track in tracks]), seed, on_frame)
+    return None if told is None else told.joints
+
+
+def _by_network(
+    trained: Trained,
+    seen: list[Observations],
+    tracks: list[Tracks],
+    config: TrainConfig,
+    seeds: list[int],
+) -> Joints:
+    """Joints of everybody in all frames, on curves through them."""
+    said = [
+        _everybody(trained, observations, track.axes_xy, config, seed)
+        for observations, track, seed in zip(seen, tracks, seeds, strict=True)
+    ]
+    joints = Joints(*(np.array(values) for values in zip(*said, strict=True)))
+    return smoothed(joints, np.array([track.time_s for track in tracks]))
+
+
+def _everybody(
+    trained: Trained,
+    observations: Observations,
+    axes_xy: Float64[np.ndarray, "body 2"],
+    config: TrainConfig,
+    seed: int,
+) -> Joints:
+    """Joints of all bodies of a frame, each asked for without the echoes of the others."""
+    if len(axes_xy) == 1:
+        return propose(trained.network, observations, axes_xy)
+    alone = each_alone(observations, pair_maps(observations), axes_xy, config, seed)
+    each = [propose(trained.network, heard, axes_xy[[body]]) for body, heard in enumerate(alone)]
+    return Joints(*(np.concatenate(values) for values in zip(*each, strict=True)))
+
+
+def frames_read(run: Run) -> list[int]:
+    """Frames of the run, and those of its sequence that smooth them."""
+    sequence = run.sequence
+    own = np.array([sequence.time_s(frame) for frame in run.frames])
+    return [
+        frame
+        for frame in sequence.frames
+        if np.abs(own - sequence.time_s(frame)).min() <= SMOOTH_S + 1e-6
+    ]
+
+
+def _store(run: Path, limbs: Limbs) -> None:
+    save_arrays(
+        run / LIMBS_FILE,
+        {
+            "frames": np.array(limbs.frames, dtype=np.int64),
+            "axes_xy": np.array([track.axes_xy for track in limbs.tracks]),
+            "velocity_xy": np.array([track.velocity_xy for track in limbs.tracks]),
+            "time_s": np.array([track.time_s for track in limbs.tracks]),
+            "joints": limbs.joints.xyz,
+            "sigma_m": limbs.joints.sigma_m,
+            "coefficients": limbs.people.coefficients,
+            "root": limbs.people.root,
+            "turns": limbs.people.turns,
+        },
+    )
+
+
+def read_limbs(run: Path) -> Limbs | None:
+    """The people of a run; None where their limbs were not told.
+
+    Raises:
+        RfgsFormatError: The file is damaged.
+    """
+    path = run / LIMBS_FILE
+    if not path.exists():
+        return None
+    stored = load_arrays(path, _REMEDY, _SHAPES, ("velocity_xy",), types=_TYPES)
+    standing: Float64[np.ndarray, "body"] = np.full(stored["axes_xy"].shape[1], np.nan)
+    tracks = [
+        Tracks(axes, velocity, float(at), standing)
+        for axes, velocity, at in zip(
+            stored["axes_xy"], stored["velocity_xy"], stored["time_s"], strict=True
+        )
+    ]
+    return Limbs(
+        [int(frame) for frame in stored["frames"]],
+        tracks,
+        Joints(stored["joints"], stored["sigma_m"]),
+        PosedPeople(stored["coefficients"], stored["root"], stored["turns"]),
+    )

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A run whose people have limbs: where Gaussians start, what is kept, what is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from scipy.spatial import KDTree
+
+from rfgs_core.articulated import BONES, Pose, facets_of, people
+from rfgs_core.cli.pose import PoseArgs
+from rfgs_core.cli.pose import run as pose
+from rfgs_core.dataset import open_dataset
+from rfgs_core.errors import RfgsFormatError
+from rfgs_core.files import read_json
+from rfgs_core.limbs import weights
+from rfgs_core.limbs.evidence.tell import Told
+from rfgs_core.limbs.network import LimbNetwork
+from rfgs_core.limbs.propose import Joints
+from rfgs_core.limbs.weights import save_network
+from rfgs_core.radio.presets import preset
+from rfgs_core.run import Run
+from rfgs_core.run import limbs as limbs_of_run
+from rfgs_core.run.folder import LIMBS_FILE
+from rfgs_core.run.limbs import frames_read, read_limbs
+from rfgs_core.settings import TrainConfig
+
+CONFIG = TrainConfig(num_gaussians=400, solver_steps=2, iterations=0, posture="standing")
+
+
+@pytest.fixture
+def network(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A network for the tiny dataset's radio that says a standing body, and that of no other."""
+    torch.manual_seed(5)
+    made = LimbNetwork(4)
+    body = people().body(np.zeros(0))
+    upright = body.joints17(Pose(body.heads[0], body.neutral)) - [0.0, 0.0, 0.95]
+    with torch.no_grad():
+        last = made.say[-1]
+        assert isinstance(last, torch.nn.Linear)
+        last.weight *= 0.02
+        said = np.concatenate([upright / 0.3, np.full((17, 1), np.log(0.05))], axis=1)
+        last.bias[:] = torch.from_numpy(said.ravel()).float()
+    folder = tmp_path / "networks"
+    folder.mkdir()
+    save_network(folder / "wifi.safetensors", made, preset("wifi"), {})
+    monkeypatch.setattr(weights, "OWN", folder)
+    return folder
+
+
+@pytest.fixture
+def limbed(network: Path, train: Callable[..., Run], tiny_dataset: Path, tmp_path: Path) -> Run:
+    return train(tiny_dataset, tmp_path / "run", CONFIG)
+
+
+def test_gaussians_start_on_the_skin_and_stay_at_their_place(limbed: Run) -> None:
+    limbs = read_limbs(limbed.path)
+    assert limbs is not None and limbs.frames == [1, 2]
+    body = limbs.people.body(0)
+    for index, frame in enumerate(limbs.frames):
+        skin = body.skin(limbs.people.pose(index, 0))
+        centres = facets_of(skin, body.faces)[0]
+        gaps = KDTree(centres).query(limbed.moving(frame).means.numpy())[0]
+        assert gaps.max() < 0.06
+    tracks = [limbed.attributes(frame)["track_id"] for frame in (1, 2)]
+    np.testing.assert_array_equal(tracks[0], tracks[1])
+    told = limbed.attributes(2)
+    head = told["bone"] == BONES.index("head")
+    height_m = limbed.moving(2).means.numpy()[:, 2]
+    assert head.any() and height_m[head].min() > 1.3
+    np.testing.assert_allclose(told["sigma_m"], 0.05, rtol=0.3)
+
+
+def test_a_training_that_was_interrupted_ends_in_the_same_bytes(
+    limbed: Run, train: Callable[..., Run], tiny_dataset: Path
+) -> None:
+    names = [LIMBS_FILE, "gaussians/000001.ply", "gaussians/000002.ply", "checkpoints/000002.npz"]
+    before = {name: (limbed.path / name).read_bytes() for name in names}
+    for gone in names[2:]:
+        (limbed.path / gone).unlink()
+    train(tiny_dataset, limbed.path, CONFIG)
+    assert {name: (limbed.path / name).read_bytes() for name in names} == before
+    (limbed.path / LIMBS_FILE).unlink()
+    (limbed.path / names[3]).unlink()
+    train(tiny_dataset, limbed.path, CONFIG)
+    assert {name: (limbed.path / name).read_bytes() for name in names} == before
+
+
+@pytest.mark.parametrize(
+    "changes", [{"limbs": "off"}, {"observe": "power"}, {"density": "motion"}, {"recipe": "paper"}]
+)
+def test_some_settings_do_without_limbs(
+    changes: dict, network: Path, train, tiny_dataset: Path, tmp_path: Path
+) -> None:
+    run = train(tiny_dataset, tmp_path / "plain", replace(CONFIG, **changes))
+    assert read_limbs(run.path) is None
+
+
+def test_without_a_network_for_the_radio_there_are_no_limbs(
+    network: Path, train, tiny_dataset: Path, tmp_path: Path
+) -> None:
+    save_network(network / "wifi.safetensors", LimbNetwork(49), preset("mmwave"), {})
+    assert read_limbs(train(tiny_dataset, tmp_path / "plain", CONFIG).path) is None
+
+
+@pytest.mark.parametrize("told", [True, False])
+def test_without_a_network_evidence_tells_who_walks(
+    told: bool, train, tiny_dataset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[int] = []
+
+    def tell(seen: list, axes_xy: np.ndarray, seed: int, on_frame: Callable) -> Told | None:
+        asked.append(len(seen))
+        body = people().body(np.zeros(0))
+        upright = body.joints17(Pose(body.heads[0], body.neutral))
+        xyz = upright + np.column_stack([axes_xy, np.zeros(len(axes_xy))])[:, None, None]
+        return Told(Joints(xyz, np.full((len(seen), 1, 17), 0.06)), 5.0, 1.0) if told else None
+
+    monkeypatch.setattr(weights, "OWN", tmp_path / "none")
+    monkeypatch.setattr(limbs_of_run, "long_enough", lambda time_s: True)
+    monkeypatch.setattr(limbs_of_run, "tell", tell)
+    limbs = read_limbs(train(tiny_dataset, tmp_path / "run", CONFIG).path)
+    assert asked and asked[0] >= 2
+    assert (limbs is not None) == told
+    if limbs is not None:
+        pelvis = limbs.people.joints17()[:, 0, 0, :2]
+        found = np.array([track.axes_xy[0] for track in limbs.tracks])
+        assert np.abs(pelvis - found).max() < 0.1
+
+
+def test_two_frames_are_too_short_a_walk_for_evidence(
+    train, tiny_dataset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(weights, "OWN", tmp_path / "none")
+    monkeypatch.setattr(limbs_of_run, "tell", lambda *_: pytest.fail("it was asked"))
+    assert read_limbs(train(tiny_dataset, tmp_path / "run", CONFIG).path) is None
+
+
+def test_frames_between_those_of_the_run_are_read_too(limbed: Run) -> None:
+    one = Run(limbed.path, replace(limbed.config, frames=[1]))
+    near = open_dataset(limbed.path / limbed.config.dataset).sequence()
+    apart_s = abs(near.time_s(2) - near.time_s(1))
+    assert frames_read(one) == ([1, 2] if apart_s <= 0.4 else [1])
+
+
+def test_poses_come_from_the_limbs(limbed: Run) -> None:
+    assert pose(PoseArgs(limbed.path)) == 0
+    limbs = read_limbs(limbed.path)
+    assert limbs is not None
+    with np.load(limbed.path / "pose.npz") as stored:
+        np.testing.assert_allclose(stored["joints"], limbs.people.joints17())
+        assert stored["sigma_m"].shape == (2, 1, 17)
+    assert read_json(limbed.path / "pose.json")["fit"]["mpjpe_m"] > 0.0
+    assert (limbed.path / "person0.bvh").read_text().startswith("HIERARCHY")
+
+
+def test_a_damaged_file_is_named(limbed: Run) -> None:
+    (limbed.path / LIMBS_FILE).write_bytes(b"PK\x03\x04 nothing")
+    with pytest.raises(RfgsFormatError, match=rf"{LIMBS_FILE}.*run the same `rfgs train` again"):
+        read_limbs(limbed.path)

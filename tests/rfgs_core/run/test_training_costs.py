@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The time left of a training is right when stages cost what they cost, also the first time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rfgs_core.run import costs
+from rfgs_core.run.costs import USUAL, CostBar, Costs, price_line, recalled
+from rfgs_core.settings import TrainConfig
+
+STEPS = 10
+#: What the stages of the pretended training take [s].
+TRUE = Costs(find_s=40.0, solve_s=10.0, step_s=1.0)
+
+
+class Clock:
+    """A clock that stands still unless it is told."""
+
+    def __init__(self) -> None:
+        self.now_s = 1000.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Clock:
+    made = Clock()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr(costs.time, "perf_counter", made)
+    return made
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Any:
+    """As much of a run as costs are asked of."""
+    layout = SimpleNamespace(measured=np.ones((4, 8), bool))
+    return SimpleNamespace(
+        frames=[1, 2, 3, 4],
+        config=SimpleNamespace(radio="wifi", settings=TrainConfig()),
+        sequence=SimpleNamespace(layout=lambda _radio: layout),
+        ply_path=lambda frame: tmp_path / f"{frame}.ply",
+    )
+
+
+def fit_frame(bar: CostBar, clock: Clock) -> None:
+    bar.begin("finding")
+    clock.now_s += TRUE.find_s
+    bar.found("solving")
+    clock.now_s += TRUE.solve_s
+    bar.solved()
+    for _ in range(STEPS):
+        clock.now_s += TRUE.step_s
+        bar.step("refining")
+    bar.finish_frame()
+
+
+def test_after_one_frame_the_rest_is_what_that_took(clock: Clock, run: Any) -> None:
+    bar = CostBar(run, STEPS)
+    assert bar._bar.total == pytest.approx(4 * USUAL.frame_s(STEPS))
+    fit_frame(bar, clock)
+    assert bar._bar.total - bar._bar.n == pytest.approx(3 * TRUE.frame_s(STEPS))
+    bar.skip()
+    assert bar._bar.total - bar._bar.n == pytest.approx(2 * TRUE.frame_s(STEPS))
+    fit_frame(bar, clock)
+    fit_frame(bar, clock)
+    assert bar._bar.n == pytest.approx(bar._bar.total)
+    bar.close()
+
+
+def test_the_next_training_knows_from_its_beginning(clock: Clock, run: Any) -> None:
+    assert recalled(run) is None
+    assert "how long is known after the first" in price_line(run)
+    bar = CostBar(run, STEPS)
+    fit_frame(bar, clock)
+    bar.close()
+    assert recalled(run) == TRUE
+    run.ply_path(2).touch()
+    line = price_line(run)
+    whole = 3 * TRUE.frame_s(run.config.settings.iterations)
+    assert line.startswith("3 frames to fit") and f"about {whole / 60:.0f} min" in line
+    other = SimpleNamespace(
+        **{**vars(run), "config": SimpleNamespace(radio="uwb", settings=TrainConfig())}
+    )
+    assert recalled(other) is None, "another radio has costs of its own"
+
+
+def test_a_damaged_note_stops_no_training(clock: Clock, run: Any, tmp_path: Path) -> None:
+    bar = CostBar(run, STEPS)
+    fit_frame(bar, clock)
+    bar.close()
+    (note,) = (tmp_path / "cache").rglob("*.json")
+    note.write_text("{")
+    assert recalled(run) is None

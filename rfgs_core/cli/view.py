@@ -13,6 +13,7 @@ import tyro
 from rfgs_core.view.selection import ColorMode
 
 if TYPE_CHECKING:
+    from rfgs_core.run import Run
     from rfgs_core.view.page_server import PageServer
     from rfgs_core.view.viewer import Viewer
 
@@ -21,15 +22,17 @@ if TYPE_CHECKING:
 class ViewArgs:
     """Shows a run in the web browser: Gaussians over time beside the truth and the radios.
 
-    Prints an address to open; Ctrl-C ends it. The page needs no internet. It shows the
-    Gaussians of each frame (coloured by display RGB, reflected power, phase of the
-    reflectivity, or distance to the true surface), the true surface, the room, antennas,
-    boresights and links, and what a camera of the dataset sees, rendered beside true.
-    A run that is still being trained shows its finished frames.
+    Prints an address to open; Ctrl-C ends it. The page needs no internet. It plays the Gaussians
+    of all frames as points (coloured by distance to the true surface, reflected power, phase of
+    the reflectivity, or display RGB), over a thin outline of the true surface, in the room with
+    antennas, boresights and links, and what a camera of the dataset sees, rendered beside true.
+    A run that is still being trained shows its finished frames, and more as they are finished.
     """
 
-    run: tyro.conf.Positional[Path]
+    run: tyro.conf.Positional[Path | None] = None
     """Folder of a trained run."""
+    example: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """Show the small run that comes with the package: nothing has to be made before."""
     host: str = "127.0.0.1"
     """Address to listen at: this machine only; 0.0.0.0 lets everybody in its network look."""
     port: int = 8080
@@ -38,34 +41,65 @@ class ViewArgs:
     """Open the page in this machine's browser."""
     frame: int | None = None
     """Frame to begin with; the first of the run if not given."""
-    color: ColorMode = "display"
-    """Colours to begin with."""
+    color: ColorMode | None = None
+    """Colours to begin with; if not given, error (distance to the true surface) where that is
+    known, else power."""
+    play: bool = True
+    """Let frames follow each other from the beginning."""
+    wait: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """Wait for the first fitted frame of a run in training, instead of refusing one without."""
     picture: Path | None = None
     """Write a picture of the page to this .png with a headless Chromium, and end."""
+    record: Path | None = None
+    """Write a video to this .mp4 (ffmpeg must be installed) or .webp with a headless Chromium, and
+    end: all frames in their own time, seen by a camera that swings around the people."""
 
 
 def run(args: ViewArgs) -> int:
     """Serves the page until Ctrl-C; exit code 0."""
     from rfgs_core.errors import RfgsError
+    from rfgs_core.example import chosen_run
     from rfgs_core.run import open_run
+    from rfgs_core.video import check_video
     from rfgs_core.view.browser import find_chromium
+    from rfgs_core.view.recording import record
     from rfgs_core.view.server import running_server
     from rfgs_core.view.snapshot import take_picture
     from rfgs_core.view.viewer import Viewer
 
-    if args.picture is not None:
-        if args.picture.suffix.lower() != ".png":
-            raise RfgsError(f"{args.picture}: expected a file name ending in .png")
+    if args.picture is not None and args.picture.suffix.lower() != ".png":
+        raise RfgsError(f"{args.picture}: expected a file name ending in .png")
+    if args.record is not None:
+        check_video(args.record)
+    files = [file for file in (args.picture, args.record) if file is not None]
+    if files:
         find_chromium()
-    trained = open_run(args.run)
+    path = chosen_run(args.run, args.example)
+    trained = _first_frame(path) if args.wait else open_run(path)
     with running_server(args.host, args.port) as server:
-        viewer = Viewer(trained, server, args.frame, args.color)
-        if args.picture is None:
+        viewer = Viewer(trained, server, args.frame, args.color, play=args.play and not files)
+        if not files:
             return _serve(viewer, server, args.open)
-        sys.stderr.write("taking the picture; a minute or two without a GPU\n")
-        take_picture(server, args.picture)
-    sys.stdout.write(f"{args.picture} written\n")
+        sys.stderr.write("drawing the page; a minute or two without a GPU\n")
+        if args.picture is not None:
+            take_picture(server, args.picture)
+        if args.record is not None:
+            record(viewer, server, args.record)
+    for file in files:
+        sys.stdout.write(f"{file} written\n")
     return 0
+
+
+def _first_frame(path: Path) -> Run:
+    """A run, as soon as a frame of it is fitted."""
+    import time
+
+    from rfgs_core.run import open_run
+    from rfgs_core.run.config import CONFIG_FILE
+
+    while not (path / CONFIG_FILE).is_file() or not any((path / "gaussians").glob("[0-9]*.ply")):
+        time.sleep(0.5)
+    return open_run(path)
 
 
 def _serve(viewer: Viewer, server: PageServer, open_page: bool) -> int:

@@ -5,9 +5,12 @@ from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Float, UInt8
+from PIL import Image
 
 #: White columns between a rendered picture and the true one.
 GAP_PX = 4
+#: Pictures narrower than this are enlarged for a page or a video [px].
+WIDTH_PX = 640
 
 
 def to_bytes(rgb: Float[np.ndarray, "h w 3"]) -> UInt8[np.ndarray, "h w 3"]:
@@ -21,3 +24,10 @@ def side_by_side(
     """Two pictures of the same height with a white gap between them."""
     gap = np.full((left.shape[0], GAP_PX, 3), 255, np.uint8)
     return np.concatenate([left, gap, right], axis=1)
+
+
+def enlarged(picture: UInt8[np.ndarray, "h w 3"], least_px: int) -> UInt8[np.ndarray, "h2 w2 3"]:
+    """A picture, enlarged by a whole number where it is narrower than `least_px`."""
+    factor = -(-least_px // picture.shape[1])
+    size = (picture.shape[1] * factor, picture.shape[0] * factor)
+    return np.asarray(Image.fromarray(picture).resize(size, Image.Resampling.BICUBIC))

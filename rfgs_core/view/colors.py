@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import get_args
 
 import numpy as np
-from jaxtyping import Float, Float32
+from jaxtyping import Float, Float32, UInt8
 
 from rfgs_core.view.frame import ShownFrame
 from rfgs_core.view.selection import ColorMode
@@ -19,7 +19,10 @@ TITLES: dict[ColorMode, str] = {
     "power": "reflected power",
     "phase": "phase of reflectivity",
     "error": "distance to true surface",
+    "sigma": "expected error of the limb",
 }
+#: What a page begins with is the first of these that a run has values for.
+PREFERRED: tuple[ColorMode, ...] = ("error", "power", "display")
 #: Colour of a Gaussian whose value is not known.
 UNKNOWN = 0.45
 #: Distances to the true surface end here [m]; F-scores count up to 0.20 m.
@@ -29,7 +32,10 @@ POWER_PERCENTILES = (2.0, 99.5)
 #: Least span of the power scale [dB]: equal powers are no rainbow.
 LEAST_SPAN_DB = 3.0
 
-_MAPS: dict[ColorMode, str] = {"power": "viridis", "error": "turbo"}
+#: Limbs expected to be further off than this are as good as unknown [m].
+MOST_SIGMA_M = 0.20
+
+_MAPS: dict[ColorMode, str] = {"power": "viridis", "error": "turbo", "sigma": "turbo"}
 #: Saturation of the circle of hues that phases are shown on: none of them is dark.
 _SATURATION = 0.8
 _LEGEND_STOPS = 17
@@ -61,6 +67,8 @@ def scales_of(frames: Sequence[ShownFrame]) -> dict[ColorMode, Scale]:
         found["phase"] = Scale(-np.pi, np.pi)
     if any(np.isfinite(frame.error_m).any() for frame in frames):
         found["error"] = Scale(0.0, MOST_ERROR_M)
+    if any(frame.sigma_m is not None for frame in frames):
+        found["sigma"] = Scale(0.0, MOST_SIGMA_M)
     return {mode: found[mode] for mode in get_args(ColorMode) if mode in found}
 
 
@@ -68,7 +76,12 @@ def colors_of(frame: ShownFrame, mode: ColorMode, scale: Scale) -> Float32[np.nd
     """One colour per Gaussian, sRGB in [0, 1]."""
     if mode == "display":
         return frame.rgb
-    values = {"power": frame.power_db, "phase": frame.phase_rad, "error": frame.error_m}[mode]
+    values = {
+        "power": frame.power_db,
+        "phase": frame.phase_rad,
+        "error": frame.error_m,
+        "sigma": np.full(len(frame), np.nan) if frame.sigma_m is None else frame.sigma_m,
+    }[mode]
     known = np.isfinite(values)
     rgb = np.full((len(frame), 3), UNKNOWN, np.float32)
     rgb[known] = _map(mode, scale.place(values[known]))
@@ -83,17 +96,29 @@ def legend_html(mode: ColorMode, scale: Scale) -> str:
             "cannot come from radio: fitted to pictures afterwards, for display.</div>"
         )
     stops = ", ".join(_hex(rgb) for rgb in _map(mode, np.linspace(0.0, 1.0, _LEGEND_STOPS)))
-    ends = {
-        "power": (f"{scale.low:.0f} dB", f"{scale.high:.0f} dB"),
-        "phase": ("−180°", "180°"),
-        "error": ("0 cm", f"≥ {100 * scale.high:.0f} cm"),
-    }[mode]
+    ends = ends_of(mode, scale)
     return (
         '<div style="padding:0 0.8em">'
         f'<div style="height:0.8em;border-radius:3px;background:linear-gradient(90deg, {stops})">'
         '</div><div style="display:flex;justify-content:space-between;font-size:0.8em">'
-        f"<span>{ends[0]}</span><span>{TITLES[mode]}</span><span>{ends[1]}</span></div></div>"
+        f"<span>{ends[0]}</span><span>{ends[1]}</span></div></div>"
     )
+
+
+def ends_of(mode: ColorMode, scale: Scale) -> tuple[str, str]:
+    """What the ends of a mode's colour map stand for, with their unit."""
+    return {
+        "display": ("", ""),
+        "power": (f"{scale.low:.0f} dB", f"{scale.high:.0f} dB"),
+        "phase": ("−180°", "180°"),
+        "error": ("0 cm (right)", f"≥ {100 * scale.high:.0f} cm (wrong)"),
+        "sigma": ("0 cm (sure)", f"≥ {100 * scale.high:.0f} cm (unknown)"),
+    }[mode]
+
+
+def strip_of(mode: ColorMode, width: int) -> UInt8[np.ndarray, "1 width 3"]:
+    """The colour map of a mode as one row of pixels; not for the display colours."""
+    return (_map(mode, np.linspace(0.0, 1.0, width)) * 255 + 0.5).astype(np.uint8)[None]
 
 
 def _map(mode: ColorMode, shares: Float[np.ndarray, "M"]) -> Float32[np.ndarray, "M 3"]:

@@ -53,6 +53,10 @@ class ShownFrame:
     """Distance of the centre to the true moving surface [m], at most `FARTHEST_M`."""
     truth: Mesh | None
     """True surface of what moves; None where the data does not tell."""
+    static: int = 0
+    """How many of the Gaussians are static."""
+    sigma_m: Float32[np.ndarray, "M"] | None = None
+    """How far the limb of each is expected to be off [m]; None where limbs were not told."""
 
     def __len__(self) -> int:
         return len(self.means)
@@ -90,6 +94,10 @@ def load_frame(run: Run, frame: int, shader: Shader | None) -> ShownFrame:
         phase_rad=_behind(still[1], _phase_rad(run, frame)),
         error_m=_behind(np.full(static, np.nan), distance_m(cloud.means[static:], truth)),
         truth=truth,
+        static=static,
+        sigma_m=_behind(np.full(static, np.nan), attributes["sigma_m"])
+        if "sigma_m" in attributes
+        else None,
     )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from rfgs_core.view.colors import TITLES
 from rfgs_core.view.pictures import Beside
-from rfgs_core.view.selection import ColorMode, Selection
+from rfgs_core.view.selection import ColorMode, Selection, TruthDrawing
 
 if TYPE_CHECKING:
     from viser import ViserServer
@@ -21,6 +21,12 @@ if TYPE_CHECKING:
 ALL_DB = 60.0
 
 _NAMES = {title: mode for mode, title in TITLES.items()}
+#: The true surface as the panel calls it.
+_TRUTH_CALLED: dict[str, TruthDrawing] = {
+    "thin outline": "outline",
+    "hidden": "hidden",
+    "shaded surface": "surface",
+}
 _MAX_BRIGHTNESS = 20.0
 
 
@@ -40,6 +46,8 @@ class Offer:
     """Cameras to render through."""
     has_truth: bool
     """Whether the true surface is known."""
+    has_skeletons: bool
+    """Whether skeletons have been fitted."""
     has_room: bool
     """Whether there is a mesh of what stands still."""
     has_links: bool
@@ -49,7 +57,17 @@ class Offer:
 class Panel:
     """Controls on a page; `choice` reads them all at once."""
 
-    def __init__(self, server: ViserServer, offer: Offer, start: Selection) -> None:
+    def __init__(
+        self, server: ViserServer, offer: Offer, start: Selection, *, play: bool = False
+    ) -> None:
+        """Adds the controls: what everybody uses on top, the rest in folders that are closed.
+
+        Args:
+            server: The server of the page.
+            offer: What there is to choose from.
+            start: What is chosen first.
+            play: Whether frames follow each other from the beginning.
+        """
         self._frames = np.asarray(offer.frames)
         gui = server.gui
         gui.set_panel_label("RF-GS")
@@ -59,15 +77,19 @@ class Panel:
         gui.main_panel.dock_right()
         gui.add_markdown(offer.title)
         self._inputs: dict[str, Any] = {}
-        self._add_time(gui, start)
-        with gui.add_folder("Gaussians"):
+        self._add_time(gui, start, play)
+        self._add_meaning(gui, offer, start)
+        with gui.add_folder("More about Gaussians", expand_by_default=False):
             self._add_gaussians(gui, offer, start)
-        with gui.add_folder("Scene"):
+        with gui.add_folder("Scene", expand_by_default=False):
             self._add_scene(gui, offer, start)
         self._has_pictures = bool(offer.cameras)
         if offer.cameras:
-            with gui.add_folder("Rendered beside true"):
+            # A panel of its own: open on a desk, folded away below the others on a phone.
+            below = gui.add_panel()
+            with below.add_tab("Camera pictures"):
                 self._add_pictures(gui, offer, start)
+            below.dock_below(gui.main_panel)
 
     def choice(self) -> Selection:
         """What is chosen now."""
@@ -77,6 +99,7 @@ class Panel:
         return Selection(
             **{
                 **value,
+                "truth": _TRUTH_CALLED[value["truth"]],
                 "frame": nearest,
                 "mode": _NAMES[value["mode"]],
                 "below_peak_db": floor_db if floor_db < ALL_DB else math.inf,
@@ -104,6 +127,17 @@ class Panel:
         index = int(np.flatnonzero(self._frames == frame)[0])
         return frame, int(self._frames[(index + 1) % len(self._frames)])
 
+    def offer_frames(self, frames: Sequence[int]) -> None:
+        """Offers other frames, when a training has finished some."""
+        self._frames = np.asarray(frames)
+        slider = self._inputs["frame"]
+        slider.min, slider.max, slider.step = self._ends_and_step()
+        self._play.disabled = len(frames) < 2
+
+    def _ends_and_step(self) -> tuple[int, int, int]:
+        step = int(np.gcd.reduce(np.diff(self._frames))) if len(self._frames) > 1 else 1
+        return int(self._frames[0]), int(self._frames[-1]), step
+
     def set(self, field: str, value: Any) -> None:
         """Moves the control of a number or a tick of `Selection`."""
         self._inputs[field].value = value
@@ -118,30 +152,36 @@ class Panel:
         self._picture.image = beside.picture
         self._caption.content = beside.caption
 
-    def _add_time(self, gui: Any, start: Selection) -> None:
-        first, last = int(self._frames[0]), int(self._frames[-1])
-        step = int(np.gcd.reduce(np.diff(self._frames))) if len(self._frames) > 1 else 1
+    def _add_time(self, gui: Any, start: Selection, play: bool) -> None:
+        first, last, step = self._ends_and_step()
         self._inputs["frame"] = gui.add_slider("Frame", first, last, step, start.frame)
-        self._play = gui.add_checkbox("Play", False, disabled=first == last)
+        self._play = gui.add_checkbox("Play", play and first < last, disabled=first == last)
         self._shown = gui.add_markdown("")
 
-    def _add_gaussians(self, gui: Any, offer: Offer, start: Selection) -> None:
+    def _add_meaning(self, gui: Any, offer: Offer, start: Selection) -> None:
+        """What the colours say, and how the truth is told from what was fitted."""
         names = [TITLES[mode] for mode in offer.modes]
+        self._inputs["mode"] = gui.add_dropdown(
+            "Colour by", names, initial_value=TITLES[start.mode]
+        )
+        self._legend = gui.add_html("")
+        self._inputs["truth"] = gui.add_dropdown(
+            "Ground truth", tuple(_TRUTH_CALLED), initial_value=_called(start.truth),
+            disabled=not offer.has_truth, hint="What really moved; never an output of the radio",
+        )  # fmt: skip
+
+    def _add_gaussians(self, gui: Any, offer: Offer, start: Selection) -> None:
         top = math.ceil(100.0 * offer.max_opacity) / 100.0
         self._inputs |= {
-            "mode": gui.add_dropdown("Colour by", names, initial_value=TITLES[start.mode])
-        }
-        self._legend = gui.add_html("")
-        self._inputs |= {
             "drawn_as": gui.add_dropdown(
-                "Draw as", ("splats", "points"), initial_value=start.drawn_as
+                "Draw as", ("points", "splats"), initial_value=start.drawn_as
             ),
             "min_opacity": gui.add_slider(
                 "Opacity from", 0.0, top, top / 200.0, start.min_opacity,
                 hint="Hides Gaussians with less opacity",
             ),
             "below_peak_db": gui.add_slider(
-                "Power within dB", 0.0, ALL_DB, 1.0, min(start.below_peak_db, ALL_DB),
+                "Power within [dB]", 0.0, ALL_DB, 1.0, min(start.below_peak_db, ALL_DB),
                 hint="Hides what reflects this much less than the strongest; the end hides none",
             ),
             "brightness": gui.add_slider(
@@ -152,7 +192,7 @@ class Panel:
 
     def _add_scene(self, gui: Any, offer: Offer, start: Selection) -> None:
         for name, label, there in (
-            ("truth", "True surface", offer.has_truth),
+            ("skeleton", "Skeletons", offer.has_skeletons),
             ("room", "Room", offer.has_room),
             ("radios", "Antennas", True),
             ("links", "Links", offer.has_links),
@@ -168,3 +208,7 @@ class Panel:
         self._picture = gui.add_image(np.zeros((2, 4, 3), np.uint8), format="png")
         self._caption = gui.add_markdown("")
         self._look = gui.add_button("Look through this camera")
+
+
+def _called(truth: TruthDrawing) -> str:
+    return next(name for name, drawing in _TRUTH_CALLED.items() if drawing == truth)

@@ -6,11 +6,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-ColorMode = Literal["display", "power", "phase", "error"]
-Drawing = Literal["splats", "points"]
+ColorMode = Literal["display", "power", "phase", "error", "sigma"]
+Drawing = Literal["points", "splats"]
+#: How the true surface is shown: not at all, as thin level lines, or as a shaded body.
+TruthDrawing = Literal["hidden", "outline", "surface"]
 
 #: Everything that changes how Gaussians look.
 GAUSSIAN_FIELDS = ("frame", "mode", "drawn_as", "min_opacity", "below_peak_db", "brightness")
+#: Ticks of what stands in the scene beside Gaussians and truth.
+SCENE_TICKS = ("skeleton", "room", "radios", "links", "cameras")
 
 
 @dataclass(frozen=True)
@@ -21,8 +25,8 @@ class Selection:
     """Blender frame number."""
     mode: ColorMode = "display"
     """What the colours of Gaussians say."""
-    drawn_as: Drawing = "splats"
-    """As Gaussians, or as points that show their exact colours."""
+    drawn_as: Drawing = "points"
+    """As points that show their exact colours, or as Gaussians, which are thin as fog."""
     min_opacity: float = 0.0
     """Gaussians with less opacity are hidden."""
     below_peak_db: float = float("inf")
@@ -31,8 +35,10 @@ class Selection:
     """Opacities are multiplied by this before they are drawn."""
     camera: str | None = None
     """Camera whose picture is rendered; None where there are none."""
-    truth: bool = True
-    """Show the true surface of what moves."""
+    truth: TruthDrawing = "outline"
+    """How the true surface of what moves is shown, beside what was fitted."""
+    skeleton: bool = True
+    """Show fitted skeletons."""
     room: bool = True
     """Show what stands still."""
     radios: bool = True

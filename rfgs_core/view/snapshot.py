@@ -13,6 +13,8 @@ from rfgs_core.view.browser import open_page, settled_picture
 from rfgs_core.view.server import address
 
 if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
     from rfgs_core.view.page_server import PageServer
 
 #: Size of the page [px].
@@ -21,7 +23,7 @@ WIDTH_PX, HEIGHT_PX = 1280, 840
 LIMIT_S = 300.0
 
 #: Without a GPU the page warns about that; in a picture it would hide the scene.
-_DISMISS = "document.querySelectorAll('.mantine-Notification-closeButton').forEach(e => e.click())"
+DISMISS = "document.querySelectorAll('.mantine-Notification-closeButton').forEach(e => e.click())"
 
 
 def take_picture(server: PageServer, file: Path) -> None:
@@ -32,11 +34,20 @@ def take_picture(server: PageServer, file: Path) -> None:
         RfgsError: The page does not connect or does not come to rest.
     """
     with open_page(address(server), WIDTH_PX, HEIGHT_PX) as page:
-        until = time.monotonic() + LIMIT_S
-        while not server.get_clients():
-            if time.monotonic() > until:
-                raise RfgsError(f"the page did not connect within {LIMIT_S:.0f} s")
-            page.wait_for_timeout(200.0)
+        wait_for_page(server, page)
         settled_picture(page, LIMIT_S)
-        page.evaluate(_DISMISS)
+        page.evaluate(DISMISS)
         write_bytes(file, settled_picture(page, LIMIT_S))
+
+
+def wait_for_page(server: PageServer, page: Page) -> None:
+    """Waits until a page has connected to its server.
+
+    Raises:
+        RfgsError: It does not.
+    """
+    until = time.monotonic() + LIMIT_S
+    while not server.get_clients():
+        if time.monotonic() > until:
+            raise RfgsError(f"the page did not connect within {LIMIT_S:.0f} s")
+        page.wait_for_timeout(200.0)

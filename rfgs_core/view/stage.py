@@ -10,35 +10,63 @@ from jaxtyping import Bool, Float
 
 from rfgs_core.render.cameras import Camera
 from rfgs_core.view.frame import Mesh, ShownFrame
+from rfgs_core.view.outline import level_lines
 from rfgs_core.view.radios import RadioShapes
 from rfgs_core.view.room import Room
-from rfgs_core.view.selection import Selection
+from rfgs_core.view.selection import SCENE_TICKS, Selection
 
 if TYPE_CHECKING:
     from viser import ClientHandle, ViserServer
 
 _BACKGROUND = (24, 26, 31)
 _TRUTH = (235, 200, 170)
+_BONE = (255, 255, 255)
 _ROOM, _EDGE = (46, 48, 54), (70, 74, 84)
 _TX, _RX = (255, 90, 80), (90, 160, 255)
 _LINK, _HELD_OUT = (20, 150, 60), (255, 110, 0)
-_POINT_M = 0.02
+_POINT_M, _GAUSSIAN_M = 0.02, 0.014
 _BORESIGHT_M = 0.4
 _LINE_PX = 2.0
+_THIN_PX = 1.0
+_BONE_PX = 4.0
+#: The page looks along this from what it shows.
+_AHEAD = np.array([0.5, 0.6, -0.4]) / np.linalg.norm([0.5, 0.6, -0.4])
+#: Space around people that is in view [m].
+_AROUND_M = 2.6
+#: Narrower pages have the controls below: what is shown stands higher there, and farther away.
+_NARROW_PX, _LOWER_M, _FARTHER = 576, 0.8, 1.25
 
 
 class Stage:
     """Draws into the scene of a server."""
 
-    def __init__(self, server: ViserServer, bounds_m: Float[np.ndarray, "2 3"]) -> None:
+    def __init__(self, server: ViserServer, seen_m: Float[np.ndarray, "2 3"]) -> None:
+        """Prepares an empty scene.
+
+        Args:
+            server: Where to draw.
+            seen_m: Lowest and highest corner of what a page looks at first [m].
+        """
         self._server, self._scene = server, server.scene
         self._groups: dict[str, list[Any]] = {}
         self._scene.set_up_direction("+z")
         self._scene.set_background_image(np.full((2, 2, 3), _BACKGROUND, np.uint8))
-        low, high = bounds_m
-        centre, reach = (low + high) / 2.0, float(np.linalg.norm(high - low))
-        server.initial_camera.look_at = tuple(centre - [0.0, 0.0, 0.1 * reach])
-        server.initial_camera.position = tuple(centre + reach * np.array([-0.5, -0.6, 0.5]))
+        low, high = seen_m
+        self._centre = (low + high) / 2.0
+        self._reach = _AROUND_M + float(np.linalg.norm((high - low)[:2]))
+        server.initial_camera.look_at = tuple(self._centre)
+        server.initial_camera.position = tuple(self._centre - self._reach * _AHEAD)
+        server.on_client_connect(self._welcome)
+
+    def _welcome(self, client: ClientHandle) -> None:
+        """Shows people above the controls where these cover the lower half of the page."""
+        if client.camera.image_width >= _NARROW_PX:
+            return
+        aim = self._centre - [0.0, 0.0, _LOWER_M]
+        with client.atomic():
+            # In this order: a camera that is moved takes the point that it looks at along.
+            client.camera.position = tuple(aim - _FARTHER * self._reach * _AHEAD)
+            client.camera.look_at = tuple(aim)
 
     def draw_gaussians(
         self,
@@ -51,7 +79,7 @@ class Stage:
         if choice.drawn_as == "points" or not rows.any():
             handle = self._scene.add_point_cloud(
                 "/points", frame.means[rows], rgb[rows],
-                point_size=_POINT_M, point_shape="circle", precision="float32",
+                point_size=_GAUSSIAN_M, point_shape="circle", precision="float32",
             )  # fmt: skip
         else:
             opacities = np.minimum(frame.opacities[rows] * choice.brightness, 1.0)
@@ -63,11 +91,32 @@ class Stage:
 
     def draw_truth(self, truth: Mesh | None) -> None:
         """Replaces the true surface of what moves."""
-        if truth is not None:
-            handle = self._scene.add_mesh_simple(
-                "/truth", truth.vertices, truth.faces, color=_TRUTH, opacity=0.4, side="double"
-            )
-            self._groups["truth"] = [handle]
+        if truth is None:
+            return
+        lines = self._scene.add_line_segments(
+            "/truth/outline", level_lines(truth), _TRUTH, thickness=_THIN_PX,
+            thickness_units="screen",
+        )  # fmt: skip
+        body = self._scene.add_mesh_simple(
+            "/truth/surface", truth.vertices, truth.faces, color=_TRUTH, opacity=0.4, side="double"
+        )
+        top = truth.vertices[truth.vertices[:, 2].argmax()]
+        name = self._scene.add_label(
+            "/truth/name", "outline: ground truth", position=top, anchor="bottom-center",
+            font_screen_scale=0.8,
+        )  # fmt: skip
+        self._groups |= {"outline": [lines], "surface": [body], "truth": [name]}
+
+    def draw_skeletons(self, bones: Float[np.ndarray, "bone 2 3"] | None) -> None:
+        """Replaces the fitted skeletons; None where a frame has none."""
+        for old in self._groups.pop("skeleton", []):
+            old.remove()
+        if bones is None or not len(bones):
+            return
+        handle = self._scene.add_line_segments(
+            "/skeleton", bones, _BONE, thickness=_BONE_PX, thickness_units="screen"
+        )
+        self._groups["skeleton"] = [handle]
 
     def draw_room(self, room: Room) -> None:
         """Draws what stands still."""
@@ -132,9 +181,12 @@ class Stage:
 
     def set_visible(self, choice: Selection) -> None:
         """Shows and hides groups as chosen."""
-        for name in ("truth", "room", "radios", "links", "cameras"):
+        shown = {name: getattr(choice, name) for name in SCENE_TICKS}
+        shown |= {name: choice.truth == name for name in ("outline", "surface")}
+        shown["truth"] = choice.truth != "hidden"
+        for name, visible in shown.items():
             for handle in self._groups.get(name, []):
-                handle.visible = getattr(choice, name)
+                handle.visible = visible
 
     def _replace(self, group: str, handle: Any) -> None:
         for old in self._groups.get(group, []):

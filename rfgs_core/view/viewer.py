@@ -6,18 +6,16 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from tqdm import tqdm
 
 from rfgs_core.errors import RfgsError
 from rfgs_core.render.cameras import Camera
-from rfgs_core.render.view import fitted_shader
 from rfgs_core.run import Run
-from rfgs_core.view.colors import colors_of, legend_html, scales_of
-from rfgs_core.view.frame import ShownFrame, load_frame
+from rfgs_core.view.colors import PREFERRED, colors_of, legend_html, scales_of
+from rfgs_core.view.frame import ShownFrame
+from rfgs_core.view.frames import Frames, where_people_are
 from rfgs_core.view.panel import Offer, Panel
 from rfgs_core.view.pictures import beside_true
 from rfgs_core.view.radios import RadioShapes, radio_shapes
@@ -30,22 +28,8 @@ if TYPE_CHECKING:
 
 _LOG = logging.getLogger(__name__)
 
-#: Frames kept in memory, and frames that scales are made for.
-_KEPT_FRAMES = 8
-#: A progress bar is shown for what takes longer.
-_PATIENCE_S = 2.0
-
-
-def finished_frames(run: Run) -> list[int]:
-    """Frames of a run that have been fitted; a run in training has some of them.
-
-    Raises:
-        RfgsError: There is none yet.
-    """
-    frames = [frame for frame in run.frames if run.ply_path(frame).is_file()]
-    if not frames:
-        raise RfgsError(f"{run.path}: no frame has been fitted yet; `rfgs train` goes on with it")
-    return frames
+#: How often a run in training is asked for more frames [s].
+_LOOK_S = 2.0
 
 
 class Viewer:
@@ -56,7 +40,9 @@ class Viewer:
         run: Run,
         server: ViserServer,
         frame: int | None = None,
-        mode: ColorMode = "display",
+        mode: ColorMode | None = None,
+        *,
+        play: bool = False,
     ) -> None:
         """Reads the run and draws it for the first time.
 
@@ -64,46 +50,47 @@ class Viewer:
             run: The run.
             server: Where to show it.
             frame: Frame to begin with; the first if not given.
-            mode: Colours to begin with.
+            mode: Colours to begin with; if not given, how far each Gaussian is from the truth, or
+                else what it reflects.
+            play: Whether frames follow each other from the beginning.
 
         Raises:
             RfgsError: The run has no such frame, or nothing to colour by `mode`.
         """
         self._run, self.server = run, server
-        self.frames = finished_frames(run)
-        self._frame_of = lru_cache(_KEPT_FRAMES)(self._load)
-        begin = self.frames[0] if frame is None else frame
-        if begin not in self.frames:
-            raise RfgsError(
-                f"{run.path}: no frame {begin}; it has {', '.join(map(str, self.frames))}"
-            )
-        samples = self._samples()
+        self.frames = Frames(run)
+        numbers = self.frames.numbers
+        begin = numbers[0] if frame is None else frame
+        if begin not in numbers:
+            raise RfgsError(f"{run.path}: no frame {begin}; it has {', '.join(map(str, numbers))}")
+        samples = self.frames.samples()
         self.scales = scales_of(samples)
+        mode = mode or next(known for known in PREFERRED if known in self.scales)
         if mode not in self.scales:
             raise RfgsError(
                 f"{run.path}: nothing to colour by {mode}; expected one of {', '.join(self.scales)}"
             )
         self._cameras = {row["name"]: Camera.from_dict(row) for row in run.sequence.cameras}
         room, radio = room_of(run.sequence), radio_shapes(run.sequence, run.config.radio)
-        first = self._frame_of(begin)
+        first = self.frames.read(begin)
         offer = Offer(
             title=self._title(),
-            frames=self.frames,
+            frames=numbers,
             modes=list(self.scales),
             max_opacity=max(float(each.opacities.max(initial=0.01)) for each in samples),
             cameras=list(self._cameras),
             has_truth=first.truth is not None,
+            has_skeletons=self.frames.has_skeletons,
             has_room=room is not None,
             has_links=len(radio.links) > 0,
         )
         start = Selection(
             frame=begin,
             mode=mode,
-            drawn_as="splats" if mode == "display" else "points",
             camera=next(iter(self._cameras), None),
         )
-        self.stage = Stage(server, run.sequence.bounds_m)
-        self.panel = Panel(server, offer, start)
+        self.stage = Stage(server, where_people_are(samples, run.sequence.bounds_m))
+        self.panel = Panel(server, offer, start, play=play)
         self._drawn: Selection | None = None
         self._changed = threading.Event()
         self._due_s = 0.0
@@ -111,12 +98,6 @@ class Viewer:
         self.update()
         self.panel.on_change(self._changed.set)
         self.panel.on_look(self._look)
-
-    def _samples(self) -> list[ShownFrame]:
-        """Some frames, spread over the run."""
-        chosen = np.linspace(0, len(self.frames) - 1, min(len(self.frames), _KEPT_FRAMES))
-        bar = tqdm(chosen, desc="read", unit="frame", delay=_PATIENCE_S, leave=False)
-        return [self._frame_of(self.frames[round(index)]) for index in bar]
 
     def follow(self) -> None:
         """Follows the controls until it is interrupted; a frame that cannot be drawn is told."""
@@ -134,22 +115,31 @@ class Viewer:
         """
         if self.panel.playing:
             limit_s = max(0.0, self._due_s - time.monotonic())
+        elif self.frames.growing:
+            limit_s = _LOOK_S if limit_s is None else min(limit_s, _LOOK_S)
         self._changed.wait(limit_s)
         self._changed.clear()
+        if self.frames.growing and self.frames.grow():
+            self.panel.offer_frames(self.frames.numbers)
         if self.panel.playing and time.monotonic() >= self._due_s:
             self._due_s = time.monotonic() + self._advance()
         self.update()
+
+    def time_s(self, frame: int) -> float:
+        """When a frame is [s]."""
+        return self._run.sequence.time_s(frame)
 
     def update(self) -> None:
         """Draws whatever has been chosen since the last time."""
         choice, before = self.panel.choice(), self._drawn
         self._drawn = choice
-        frame = self._frame_of(choice.frame)
+        frame = self.frames.read(choice.frame)
         with self.server.atomic():
             if choice.differs(before, *GAUSSIAN_FIELDS):
                 self._show_gaussians(frame, choice)
             if choice.differs(before, "frame"):
                 self.stage.draw_truth(frame.truth)
+                self.stage.draw_skeletons(self.frames.bones(choice.frame))
             self.stage.set_visible(choice)
         if choice.camera is not None and choice.differs(before, "frame", "camera"):
             self.panel.show_picture(beside_true(self._run, choice.camera, choice.frame))
@@ -160,8 +150,7 @@ class Viewer:
         rows = frame.rows(choice.min_opacity, strongest_db - choice.below_peak_db)
         self.stage.draw_gaussians(frame, rows, colors_of(frame, choice.mode, scale), choice)
         self.panel.tell(
-            f"{self._run.sequence.time_s(choice.frame):.2f} s, "
-            f"{rows.sum():,} of {len(frame):,} Gaussians",
+            f"{self.time_s(choice.frame):.2f} s, {rows.sum():,} of {len(frame):,} Gaussians",
             legend_html(choice.mode, scale),
         )
 
@@ -169,16 +158,12 @@ class Viewer:
         """Moves to the next frame; returns how long it lasts [s]."""
         now, following = self.panel.next_frame()
         self.panel.set("frame", following)
-        sequence = self._run.sequence
-        return max(sequence.time_s(following) - sequence.time_s(now), 1.0 / sequence.fps)
+        return max(self.time_s(following) - self.time_s(now), 1.0 / self._run.sequence.fps)
 
     def _look(self, client: ClientHandle | None) -> None:
         camera = self.panel.choice().camera
         if camera is not None and client is not None:
             self.stage.look_through(client, self._cameras[camera])
-
-    def _load(self, frame: int) -> ShownFrame:
-        return load_frame(self._run, frame, fitted_shader(self._run))
 
     def _draw_fixed(self, room: Room | None, radio: RadioShapes) -> None:
         if room is not None:
@@ -191,5 +176,5 @@ class Viewer:
         radio = sequence.radio_spec(name)
         return (
             f"**{sequence.name}**, {name} {radio.freq_min_hz / 1e9:g}–{radio.freq_max_hz / 1e9:g} "
-            f"GHz, {len(self.frames)} frames"
+            f"GHz, {len(self.frames.numbers)} frames"
         )

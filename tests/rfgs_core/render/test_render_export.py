@@ -7,10 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 from plyfile import PlyData
 
+from rfgs_core.cli import render as render_command
 from rfgs_core.cli.export import ExportArgs, export_run
-from rfgs_core.cli.render import RenderArgs, render_run
+from rfgs_core.cli.render import RenderArgs, render_run, render_video
 from rfgs_core.dataset.pictures import read_png_rgba
 from rfgs_core.errors import RfgsError
 from rfgs_core.render.shader import ShaderConfig
@@ -80,3 +82,28 @@ def test_export_reads_back_under_3dgs_conventions(hand_made_run, tmp_path, capsy
     np.testing.assert_allclose(np.exp(vertex["scale_2"]), 0.06, rtol=1e-5)
     assert vertex["rf_power_db"][0] == -90.0
     assert f"{len(cloud)} Gaussians of frame 2" in capsys.readouterr().out
+
+
+def test_a_video_plays_rendered_beside_true_in_the_runs_own_time(hand_made_run, tmp_path) -> None:
+    fit_run_shader(hand_made_run, QUICK)
+    file, name = tmp_path / "run.webp", str(hand_made_run.sequence.cameras[1]["name"])
+    render_video(hand_made_run, RenderArgs(hand_made_run.path, video=file, camera=name), file)
+    times_s = [hand_made_run.sequence.time_s(frame) for frame in hand_made_run.frames]
+    with Image.open(file) as video:
+        assert video.n_frames == len(hand_made_run.frames)
+        for place, frame in enumerate(hand_made_run.frames):
+            video.seek(place)
+            video.load()
+            assert video.info["duration"] == round(1e3 * (times_s[1] - times_s[0]))
+            true = hand_made_run.sequence.image(name, frame)[..., :3].astype(int)
+            factor = video.height // true.shape[0]
+            half = np.asarray(video.convert("RGB")).astype(int)[:, -true.shape[1] * factor :]
+            small = half.reshape(*true.shape[:1], factor, true.shape[1], factor, 3).mean((1, 3))
+            assert np.abs(small - true).mean() < 8
+
+
+def test_a_render_without_anything_to_write_says_what_to_give(tmp_path) -> None:
+    with pytest.raises(RfgsError, match="give --out FOLDER for pictures, --video FILE, or both"):
+        render_command.run(RenderArgs(tmp_path))
+    with pytest.raises(RfgsError, match="--camera: chooses the camera of a --video"):
+        render_command.run(RenderArgs(tmp_path, tmp_path, camera="cam00"))

@@ -113,11 +113,9 @@ def test_gaussians_are_drawn_move_and_hide(browser: Browser) -> None:
 def test_clicks_on_the_page_reach_the_viewer(browser: Browser) -> None:
     panel = browser.viewer.panel
     tick(browser, "Room", lambda: not panel.choice().room)
-    tick(browser, "True surface", lambda: not panel.choice().truth)
     tick(browser, "Play", lambda: panel.playing)
     tick(browser, "Play", lambda: not panel.playing)
     tick(browser, "Room", lambda: panel.choice().room)
-    tick(browser, "True surface", lambda: panel.choice().truth)
     assert browser.complaints == []
 
 

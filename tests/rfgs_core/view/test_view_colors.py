@@ -44,7 +44,11 @@ def test_display_shows_the_shader() -> None:
 
 @pytest.mark.parametrize(
     ("mode", "field", "colours"),
-    [("power", "power_db", "viridis"), ("error", "error_m", "turbo")],
+    [
+        ("power", "power_db", "viridis"),
+        ("error", "error_m", "turbo"),
+        ("sigma", "sigma_m", "turbo"),
+    ],
 )
 def test_ends_of_the_scale_are_ends_of_the_map(mode, field: str, colours: str) -> None:
     frame = frame_of(**{field: np.array([-9.0, 2.0, 3.0, 4.0, 99.0, np.nan])})
@@ -65,6 +69,8 @@ def test_only_modes_with_values_are_offered() -> None:
     assert list(scales_of([frame_of(power_db=np.full(3, np.nan))])) == ["display"]
     known = frame_of(power_db=np.zeros(3), error_m=np.ones(3))
     assert list(scales_of([known])) == ["display", "power", "error"]
+    sure = replace(known, sigma_m=np.full(3, 0.05, np.float32))
+    assert list(scales_of([sure])) == ["display", "power", "error", "sigma"]
 
 
 def test_one_scale_of_power_for_all_frames() -> None:

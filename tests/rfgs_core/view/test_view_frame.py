@@ -11,14 +11,18 @@ import numpy as np
 import pytest
 from known_run import OUTSIDE_M, STATIC
 
-from rfgs_core.errors import RfgsError
+from rfgs_core.arrays import save_arrays
+from rfgs_core.errors import RfgsError, RfgsFormatError
+from rfgs_core.render.side_by_side import WIDTH_PX
 from rfgs_core.render.view import fitted_shader
 from rfgs_core.run import Run
-from rfgs_core.view.frame import ShownFrame, distance_m, load_frame
-from rfgs_core.view.pictures import WIDTH_PX, beside_true
+from rfgs_core.view.frame import Mesh, ShownFrame, distance_m, load_frame
+from rfgs_core.view.frames import Frames, finished_frames, where_people_are
+from rfgs_core.view.outline import level_lines
+from rfgs_core.view.pictures import beside_true
 from rfgs_core.view.radios import radio_shapes
 from rfgs_core.view.room import cut_open, room_of
-from rfgs_core.view.viewer import finished_frames
+from rfgs_core.view.skeletons import fitted_bones
 
 
 @pytest.fixture(scope="module")
@@ -142,3 +146,42 @@ def test_the_rendered_picture_stands_left_of_the_true_one(known_run: Run) -> Non
     assert (picture[:, width // 2] > 240).all()
     true = picture[:, width // 2 + width // 26 :].astype(int)
     assert ((true[..., 0] > 150) & (true[..., 1] < 100)).any()
+
+
+def test_level_lines_of_a_box_go_round_it_at_every_level() -> None:
+    from trimesh.creation import box
+
+    solid = box(extents=(0.4, 0.6, 1.0))
+    mesh = Mesh(solid.vertices.astype(np.float32), solid.faces.astype(np.int32))
+    lines = level_lines(mesh, spacing_m=0.25)
+    assert lines[..., 2].min() == lines[..., 2].max() - 0.75, "four planes, none at an end"
+    np.testing.assert_array_equal(lines[:, 0, 2], lines[:, 1, 2])
+    length_m = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1).sum()
+    assert length_m == pytest.approx(4 * 2 * (0.4 + 0.6), rel=1e-5)
+    assert len(level_lines(Mesh(mesh.vertices, mesh.faces[:0]))) == 0
+
+
+def test_bones_go_from_each_parent_to_its_joint(tmp_path: Path) -> None:
+    joints = np.random.default_rng(2).normal(size=(2, 1, 17, 3))
+    arrays = {"frames": np.array([4, 9]), "time_s": np.zeros(2), "centroid": np.zeros((2, 1, 3))}
+    assert fitted_bones(tmp_path) == {}
+    save_arrays(tmp_path / "pose.npz", {**arrays, "joints": joints})
+    bones = fitted_bones(tmp_path)
+    assert list(bones) == [4, 9] and bones[4].shape == (16, 2, 3)
+    # Pelvis to right hip is the first, thorax to right shoulder the fourteenth.
+    np.testing.assert_allclose(bones[9][0], joints[1, 0, [0, 1]], rtol=1e-6)
+    np.testing.assert_allclose(bones[9][13], joints[1, 0, [8, 14]], rtol=1e-6)
+    save_arrays(tmp_path / "pose.npz", {**arrays, "joints": joints[:, :, :5]})
+    with pytest.raises(RfgsFormatError, match="run `rfgs pose` again"):
+        fitted_bones(tmp_path)
+
+
+def test_a_page_looks_at_people_and_not_at_what_stands_still(known_run: Run) -> None:
+    frames = Frames(known_run)
+    low, high = where_people_are(frames.samples(), known_run.sequence.bounds_m)
+    moving = np.concatenate([known_run.moving(frame).means.numpy() for frame in (1, 2)])
+    np.testing.assert_allclose(low, np.percentile(moving, 5, axis=0), atol=1e-5)
+    np.testing.assert_allclose(high, np.percentile(moving, 95, axis=0), atol=1e-5)
+    still = replace(frames.read(1), static=len(frames.read(1)))
+    bounds_m = known_run.sequence.bounds_m
+    np.testing.assert_array_equal(where_people_are([still], bounds_m), bounds_m)

@@ -49,7 +49,7 @@ def toggle(viewer: Viewer, client: Client, label: str) -> None:
 def answers(viewer: Viewer) -> None:
     """A client that comes now receives the scene and is heard."""
     with connected(viewer.server) as client:
-        client.read(lambda: "/splats" in client.nodes and "Camera" in client.controls)
+        client.read(lambda: "/points" in client.nodes and "Camera" in client.controls)
         toggle(viewer, client, "Room")
         toggle(viewer, client, "Room")
 
@@ -210,7 +210,7 @@ def test_a_frame_that_breaks_meanwhile_is_one_line(
     run = open_run(write_run(tmp_path / "run", tiny_dataset))
     with running_server("127.0.0.1", 0) as server:
         shown = Viewer(run, server)
-        shown._frame_of.cache_clear()
+        shown.frames.read.cache_clear()
         run.ply_path(2).write_text("ply")
         shown.panel.set("frame", 2)
         steps = iter([shown.step])

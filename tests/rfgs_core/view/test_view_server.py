@@ -39,9 +39,9 @@ ALL = 179
 def page(known_run: Run) -> Iterator[tuple[Viewer, Client]]:
     """A viewer and a client that has received everything."""
     with running_server("127.0.0.1", 0) as server:
-        viewer = Viewer(known_run, server)
+        viewer = Viewer(known_run, server, mode="display")
         with connected(server) as client:
-            client.read(lambda: "/splats" in client.nodes and "Camera" in client.controls)
+            client.read(lambda: "/points" in client.nodes and "Camera" in client.controls)
             yield viewer, client
 
 
@@ -55,6 +55,16 @@ def change(page: tuple[Viewer, Client], **chosen: object) -> None:
         assert time.monotonic() - begin < LIMIT_S, f"{label}: nobody told the viewer"
 
 
+@pytest.fixture
+def foggy(page: tuple[Viewer, Client]) -> Iterator[tuple[Viewer, Client]]:
+    """The same with splats, which say exactly what each Gaussian is."""
+    change(page, Draw_as="splats")
+    page[1].read(lambda: "/splats" in page[1].nodes)
+    yield page
+    change(page, Draw_as="points")
+    page[1].read(lambda: "/splats" not in page[1].nodes)
+
+
 def splats(client: Client) -> np.ndarray:
     """Rows of eight 32-bit words: centre, nothing, covariance, colour."""
     return client.nodes["/splats"]["buffer"].reshape(-1, 8)
@@ -65,12 +75,12 @@ def centres_m(client: Client) -> np.ndarray:
 
 
 def test_a_client_receives_gaussians_truth_room_and_radio(
-    page: tuple[Viewer, Client], known_run: Run
+    foggy: tuple[Viewer, Client], known_run: Run
 ) -> None:
-    _, client = page
+    _, client = foggy
     np.testing.assert_array_equal(centres_m(client), known_run.gaussians(1).means.numpy())
     vertices, _, _ = known_run.sequence.moving_mesh(1)
-    np.testing.assert_array_equal(client.nodes["/truth"]["vertices"], vertices.ravel())
+    np.testing.assert_array_equal(client.nodes["/truth/surface"]["vertices"], vertices.ravel())
     assert len(client.nodes["/room/edges"]["points"]) == 12 * 2 * 3
     elements = known_run.sequence.layout("wifi")
     for name, places in (("tx", elements.tx_xyz), ("rx", elements.rx_xyz)):
@@ -78,21 +88,23 @@ def test_a_client_receives_gaussians_truth_room_and_radio(
         np.testing.assert_array_equal(points, places.astype(np.float32))
     assert len(client.nodes["/links"]["points"]) == 12 * 2 * 3
     assert {f"/cameras/cam0{index}" for index in range(4)} <= set(client.nodes)
-    assert client.controls["Colour by"]["options"] == list(TITLES.values())
+    # A run without limbs has nothing to say of how sure they are.
+    known = [title for mode, title in TITLES.items() if mode != "sigma"]
+    assert client.controls["Colour by"]["options"] == known
 
 
-def test_the_slider_changes_the_frame(page: tuple[Viewer, Client], known_run: Run) -> None:
-    _, client = page
+def test_the_slider_changes_the_frame(foggy: tuple[Viewer, Client], known_run: Run) -> None:
+    page, client = foggy, foggy[1]
     change(page, Frame=2)
     wanted = known_run.gaussians(2).means.numpy()
     client.read(lambda: np.array_equal(centres_m(client), wanted))
-    vertices, _, _ = known_run.sequence.moving_mesh(2)
-    client.read(lambda: np.array_equal(client.nodes["/truth"]["vertices"], vertices.ravel()))
+    true = known_run.sequence.moving_mesh(2)[0].ravel()
+    client.read(lambda: np.array_equal(client.nodes["/truth/surface"]["vertices"], true))
     change(page, Frame=1)
 
 
-def test_colours_follow_the_mode(page: tuple[Viewer, Client]) -> None:
-    _, client = page
+def test_colours_follow_the_mode(foggy: tuple[Viewer, Client]) -> None:
+    page, client = foggy, foggy[1]
     before = splats(client)[:, 7].copy()
     change(page, Colour_by=TITLES["power"])
     client.read(lambda: not np.array_equal(splats(client)[:, 7], before))
@@ -105,8 +117,8 @@ def test_colours_follow_the_mode(page: tuple[Viewer, Client]) -> None:
     change(page, Colour_by=TITLES["display"])
 
 
-def test_the_opacity_threshold_hides_gaussians_and_says_so(page: tuple[Viewer, Client]) -> None:
-    _, client = page
+def test_the_opacity_threshold_hides_gaussians_and_says_so(foggy: tuple[Viewer, Client]) -> None:
+    page, client = foggy, foggy[1]
     change(page, Opacity_from=0.5)
     opacities = np.concatenate([np.full(3, 0.9), np.linspace(0.1, 0.8, ALL - 3)])
     left = int((opacities >= 0.5).sum())
@@ -116,35 +128,40 @@ def test_the_opacity_threshold_hides_gaussians_and_says_so(page: tuple[Viewer, C
     change(page, Opacity_from=0.0)
 
 
-def test_power_within_so_many_decibels_of_the_strongest(page: tuple[Viewer, Client]) -> None:
-    _, client = page
-    change(page, Power_within_dB=10.0)
+def test_power_within_so_many_decibels_of_the_strongest(foggy: tuple[Viewer, Client]) -> None:
+    page, client = foggy, foggy[1]
+    change(page, **{"Power within [dB]": 10.0})
     strong = int((np.linspace(-90, -60, ALL - 3) >= -70.0).sum()) + 3
     client.read(lambda: len(splats(client)) == strong)
-    change(page, Power_within_dB=60.0)
+    change(page, **{"Power within [dB]": 60.0})
     client.read(lambda: len(splats(client)) == ALL)
 
 
 def test_points_replace_splats_and_back(page: tuple[Viewer, Client]) -> None:
     _, client = page
+    change(page, Draw_as="splats")
+    client.read(lambda: "/splats" in client.nodes and "/points" not in client.nodes)
     change(page, Draw_as="points")
     client.read(lambda: "/points" in client.nodes and "/splats" not in client.nodes)
     assert len(client.nodes["/points"]["points"]) == 3 * ALL
-    change(page, Draw_as="splats")
-    client.read(lambda: "/splats" in client.nodes and "/points" not in client.nodes)
 
 
 def test_ticks_show_and_hide(page: tuple[Viewer, Client], known_run: Run) -> None:
     _, client = page
-    change(page, True_surface=False, Links=True)
-    client.read(lambda: not client.nodes["/truth"]["visible"] and client.nodes["/links"]["visible"])
+    change(page, Ground_truth="hidden", Links=True)
+    truth = [f"/truth/{name}" for name in ("outline", "surface", "name")]
+    seen = lambda: [client.nodes[name]["visible"] for name in truth]  # noqa: E731
+    client.read(lambda: seen() == [False, False, False] and client.nodes["/links"]["visible"])
     # What is hidden stays so when the frame changes.
     change(page, Frame=2)
     centre = known_run.sequence.moving_mesh(2)[0].mean(axis=0)
-    moved = lambda: client.nodes["/truth"]["vertices"].reshape(-1, 3).mean(axis=0)  # noqa: E731
+    moved = lambda: client.nodes["/truth/surface"]["vertices"].reshape(-1, 3).mean(axis=0)  # noqa: E731
     client.read(lambda: np.allclose(moved(), centre, atol=1e-4))
-    client.read(lambda: not client.nodes["/truth"]["visible"])
-    change(page, True_surface=True, Links=False, Frame=1)
+    client.read(lambda: seen() == [False, False, False])
+    change(page, Ground_truth="shaded surface")
+    client.read(lambda: seen() == [False, True, True])
+    change(page, Ground_truth="thin outline", Links=False, Frame=1)
+    client.read(lambda: seen() == [True, False, True])
 
 
 def test_playing_moves_to_the_next_frame_and_round(page: tuple[Viewer, Client]) -> None:
@@ -179,13 +196,26 @@ def test_what_a_capture_does_not_hold_is_not_offered(tiny_dataset: Path, tmp_pat
         viewer = Viewer(run, server)
         assert list(viewer.scales) == ["display", "power", "phase"]
         with connected(server) as client:
-            client.read(lambda: "/splats" in client.nodes and "Cameras" in client.controls)
+            client.read(lambda: "/points" in client.nodes and "Cameras" in client.controls)
             client.read(lambda: "no true picture" in str(client.labelled("GuiMarkdownMessage")))
-        assert not {"/truth", "/room/edges"} & set(client.nodes)
-        assert client.controls["True surface"]["disabled"]
-        assert not viewer.panel.choice().truth
+        assert not {"/truth/outline", "/truth/name", "/room/edges"} & set(client.nodes)
+        assert client.controls["Ground truth"]["disabled"]
+        assert viewer.panel.choice().mode == "power", "the next best to the unknown error"
         with pytest.raises(RfgsError, match="nothing to colour by error; expected one of display"):
             Viewer(run, server, mode="error")
+
+
+def test_a_page_begins_with_errors_as_points_over_a_thin_named_outline(known_run: Run) -> None:
+    with running_server("127.0.0.1", 0) as server:
+        viewer = Viewer(known_run, server, play=True)
+        choice = viewer.panel.choice()
+        assert (choice.mode, choice.drawn_as, choice.truth) == ("error", "points", "outline")
+        assert viewer.panel.playing
+        with connected(server) as client:
+            client.read(lambda: "/points" in client.nodes and "Camera" in client.controls)
+            client.read(lambda: not client.nodes["/truth/surface"]["visible"])
+            assert client.nodes["/truth/name"]["text"] == "outline: ground truth"
+            assert client.controls["Skeletons"]["disabled"]
 
 
 def test_a_taken_port_is_one_line(known_run: Run, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The frames of a run as a viewer needs them: those that are fitted by now, read once."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from jaxtyping import Float, Float32
+from tqdm import tqdm
+
+from rfgs_core.errors import RfgsError
+from rfgs_core.render.view import fitted_shader
+from rfgs_core.run import Run
+from rfgs_core.view.frame import ShownFrame, load_frame
+from rfgs_core.view.skeletons import fitted_bones
+
+#: Frames kept in memory, and frames that scales are made for.
+_KEPT = 8
+#: A progress bar is shown for what takes longer [s].
+_PATIENCE_S = 2.0
+#: Shares of the Gaussians between which people are sought.
+_MIDDLE = (5.0, 95.0)
+
+
+def finished_frames(run: Run) -> list[int]:
+    """Frames of a run that have been fitted; a run in training has some of them.
+
+    Raises:
+        RfgsError: There is none yet.
+    """
+    frames = [frame for frame in run.frames if run.ply_path(frame).is_file()]
+    if not frames:
+        raise RfgsError(f"{run.path}: no frame has been fitted yet; `rfgs train` goes on with it")
+    return frames
+
+
+class Frames:
+    """Fitted frames of a run."""
+
+    def __init__(self, run: Run) -> None:
+        """Looks which frames there are.
+
+        Raises:
+            RfgsError: There is none yet.
+        """
+        self._run = run
+        self.numbers = finished_frames(run)
+        """Blender frame numbers, ascending."""
+        self._bones = fitted_bones(run.path)
+        self.read = lru_cache(_KEPT)(self._load)
+        """Reads a frame by its number, or gives what was read of it."""
+
+    @property
+    def growing(self) -> bool:
+        """Whether a training has not finished all frames yet."""
+        return len(self.numbers) < len(self._run.frames)
+
+    @property
+    def has_skeletons(self) -> bool:
+        """Whether skeletons have been fitted."""
+        return bool(self._bones)
+
+    def bones(self, frame: int) -> Float32[np.ndarray, "bone 2 3"] | None:
+        """Fitted bones of a frame [m], if any."""
+        return self._bones.get(frame)
+
+    def grow(self) -> bool:
+        """Looks again; whether frames were finished meanwhile."""
+        before = len(self.numbers)
+        self.numbers = finished_frames(self._run)
+        return len(self.numbers) > before
+
+    def samples(self) -> list[ShownFrame]:
+        """Some frames, spread over the run."""
+        chosen = np.linspace(0, len(self.numbers) - 1, min(len(self.numbers), _KEPT))
+        bar = tqdm(chosen, desc="read", unit="frame", delay=_PATIENCE_S, leave=False)
+        return [self.read(self.numbers[round(index)]) for index in bar]
+
+    def _load(self, frame: int) -> ShownFrame:
+        return load_frame(self._run, frame, fitted_shader(self._run))
+
+
+def where_people_are(
+    samples: list[ShownFrame], bounds_m: Float[np.ndarray, "2 3"]
+) -> Float[np.ndarray, "2 3"]:
+    """Lowest and highest corner of where most moving Gaussians of some frames are [m].
+
+    Args:
+        samples: The frames.
+        bounds_m: The scene's own corners, for frames without moving Gaussians.
+    """
+    means = np.concatenate([frame.means[frame.static :] for frame in samples])
+    return np.percentile(means, _MIDDLE, axis=0) if len(means) else np.asarray(bounds_m)

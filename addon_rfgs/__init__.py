@@ -12,10 +12,13 @@ from . import command, properties, registration
 from .channels import waiting
 from .check import aging
 from .devices import overlay
-from .gaussians import file_menu
+from .gaussians import file_menu, legend, opening
 from .jobs import following
 
-_MODULES = (registration, properties, overlay, command, following, waiting, aging, file_menu)
+_MODULES = (
+    *(registration, properties, overlay, command, following, waiting, aging, file_menu),
+    *(legend, opening),
+)
 
 
 def register() -> None:

@@ -67,6 +67,13 @@ def run(arguments: Sequence[str], program: str = "rfgs", blend: Path | None = No
         program: Name for messages.
         blend: File to open first; None takes the one that is open.
     """
+    try:
+        return _run(arguments, program, blend)
+    except BrokenPipeError:  # Nobody reads the answer any more, as after `| head`.
+        return 1
+
+
+def _run(arguments: Sequence[str], program: str, blend: Path | None) -> int:
     with _quiet() as out:
         try:
             with redirect_stdout(out):  # for --help
@@ -75,6 +82,8 @@ def run(arguments: Sequence[str], program: str = "rfgs", blend: Path | None = No
                 open_blend(blend)
             out.write(options.run(options, out) + "\n")
             code = 0
+        except BrokenPipeError:
+            raise
         except AddonError as error:
             message, code = f"error: {error}\n", USER_ERROR
         except OSError as error:
@@ -96,7 +105,7 @@ def open_blend(path: Path) -> None:
     if not path.is_file():
         raise AddonError(f"{path}: no such .blend file")
     try:
-        bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), use_scripts=False, load_ui=False)
+        bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), use_scripts=False)
     except RuntimeError as error:
         raise AddonError(f"{path}: not a .blend file that Blender can read") from error
 

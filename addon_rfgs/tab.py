@@ -11,6 +11,14 @@ class Tab:
     bl_region_type = "UI"
     bl_category = "RF-GS"
 
+    @staticmethod
+    def automatic(layout: bpy.types.UILayout, settings: object, name: str, text: str) -> None:
+        """Shows a number whose zero is no number: what it stands for is written beside it."""
+        row = layout.row()
+        row.prop(settings, name)
+        if not getattr(settings, name):
+            row.label(text=text)
+
     def columns(self) -> bpy.types.UILayout:
         """The layout, with names beside values."""
         self.layout.use_property_split = True

@@ -38,7 +38,7 @@ class RFGS_UL_findings(bpy.types.UIList):
 class RFGS_PT_check(Tab, bpy.types.Panel):
     """What would go wrong."""
 
-    bl_label = "Scene Check"
+    bl_label = "2 Check"
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows the button, the list, and the active finding in full."""

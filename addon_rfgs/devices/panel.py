@@ -19,6 +19,10 @@ _ICONS = {
 }
 
 
+#: Kinds of objects that scatter or carry antennas.
+_MEANINGFUL = {"MESH", "CURVE", "SURFACE", "FONT", "META", "EMPTY"}
+
+
 class RFGS_UL_devices(bpy.types.UIList):
     """Radio devices among all objects of the file."""
 
@@ -58,7 +62,7 @@ class RFGS_UL_devices(bpy.types.UIList):
 class RFGS_PT_devices(Tab, bpy.types.Panel):
     """Radio devices of the scene."""
 
-    bl_label = "Radio Devices"
+    bl_label = "1 Radios"
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows buttons that add, the list, and buttons for what is selected."""
@@ -89,12 +93,14 @@ class RFGS_PT_object(Tab, bpy.types.Panel):
     bl_label = "Active Object"
     bl_parent_id = "RFGS_PT_devices"
 
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether the active object can mean something to the radio."""
+        return context.object is not None and context.object.type in _MEANINGFUL
+
     def draw(self, context: bpy.types.Context) -> None:
         """Shows what applies to the type of the active object."""
         layout, item = self.columns(), context.object
-        if item is None:
-            layout.label(text="No active object", icon="INFO")
-            return
         if item.type == "EMPTY":
             layout.prop(item.rfgs, "role")
             if is_device(item):
@@ -102,7 +108,6 @@ class RFGS_PT_object(Tab, bpy.types.Panel):
                 if item.rfgs.radio in OWN_RADIOS:
                     draw_fields(layout, item.rfgs.rf, item.rfgs.role)
                     layout.operator("rfgs.match_devices", icon="PASTEDOWN").device = item.name
-        if item.type in {"MESH", "CURVE", "SURFACE", "FONT", "META", "EMPTY"}:
-            layout.prop(item.rfgs, "object_class")
-            layout.prop(item.rfgs, "instance")
-            layout.prop(item.rfgs, "surface_m2")
+        layout.prop(item.rfgs, "object_class")
+        layout.prop(item.rfgs, "instance", placeholder="the object itself")
+        self.automatic(layout, item.rfgs, "surface_m2", "from its class")

@@ -20,10 +20,27 @@ def search_radios(_self: object, _context: object, text: str) -> list[str]:
     return [name for name in ("any", "scene", *RADIOS) if text.lower() in name]
 
 
+#: Stored word → what the panel calls it, and what it means.
+_WORDS = {
+    "iso": ("Isotropic", "Alike in all directions"),
+    "dipole": ("Short dipole", "Nothing along its axis"),
+    "hw_dipole": ("Half-wave dipole", "Nothing along its axis, a little narrower"),
+    "tr38901": ("Panel (TR 38.901)", "Looks ahead, as base stations do"),
+    "V": ("Vertical", "One port per element"),
+    "H": ("Horizontal", "One port per element"),
+    "VH": ("Vertical and horizontal", "Two ports per element"),
+    "cross": ("Slanted by ±45°", "Two ports per element"),
+    "included": ("Also", "A device hears its own transmitter and those of others"),
+    "only": ("Alone", "A device hears its own transmitter alone"),
+    "excluded": ("No", "A device hears others alone"),
+}
+
+
 def _choice(name: str, label: str, text: str) -> Any:
     """An enum whose stored numbers follow from the names, so a longer table shifts nothing."""
     items = [
-        (value, value, "", zlib.crc32(value.encode()) & 0x7FFFFFFF) for value in RADIO_CHOICES[name]
+        (value, *_WORDS[value], zlib.crc32(value.encode()) & 0x7FFFFFFF)
+        for value in RADIO_CHOICES[name]
     ]
     default = RADIO_DEFAULTS[name]
     return bpy.props.EnumProperty(name=label, description=text, items=items, default=default)
@@ -106,12 +123,12 @@ class RadioFields:
     tx_cols: _elements("tx_cols", "TX columns", "y")
     rx_rows: _elements("rx_rows", "RX rows", "z")
     rx_cols: _elements("rx_cols", "RX columns", "y")
-    tx_spacing_m: _spacing_m("tx_spacing_m", "TX spacing")
-    rx_spacing_m: _spacing_m("rx_spacing_m", "RX spacing")
+    tx_spacing_m: _spacing_m("tx_spacing_m", "TX spacing [m]")
+    rx_spacing_m: _spacing_m("rx_spacing_m", "RX spacing [m]")
     tx_spacing_wavelengths: _spacing_wavelengths("tx", "TX spacing [λ]")
     rx_spacing_wavelengths: _spacing_wavelengths("rx", "RX spacing [λ]")
     tx_offset_m: bpy.props.FloatVectorProperty(
-        name="TX offset",
+        name="TX offset [m]",
         description="Centre of the TX array in the Empty's axes [m]; the RX array is at its origin",
         size=3,
         default=RADIO_DEFAULTS["tx_offset_m"],
@@ -120,10 +137,13 @@ class RadioFields:
         "own_device_links", "Monostatic links", "Whether a device hears its own transmitter"
     )
     isolation_db: _number(
-        "isolation_db", "Isolation", "Of a device's receiver from its transmitter [dB]", min=0.0
+        "isolation_db",
+        "Isolation [dB]",
+        "Of a device's receiver from its transmitter [dB]",
+        min=0.0,
     )
-    power_dbm: _number("power_dbm", "Power", "Transmit power [dBm]")
-    noise_figure_db: _number("noise_figure_db", "Noise figure", "Of the receiver [dB]")
+    power_dbm: _number("power_dbm", "Power [dBm]", "Transmit power")
+    noise_figure_db: _number("noise_figure_db", "Noise figure [dB]", "Of the receiver")
     pattern: _choice("pattern", "Pattern", "Antenna pattern")
     polarization: _choice(
         "polarization", "Polarisation", "V, H, or two ports per element: VH, cross"

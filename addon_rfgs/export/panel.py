@@ -10,13 +10,16 @@ class RFGS_PT_dataset(Tab, bpy.types.Panel):
     """Bundle and ground truth."""
 
     bl_label = "Bundle and Ground Truth"
+    bl_parent_id = "RFGS_PT_generate"
     bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows settings and the two buttons."""
         layout, settings = self.columns(), context.scene.rfgs.export
-        for name in ("frames", "overrides", "cameras", "resolution"):
-            layout.prop(settings, name)
+        layout.prop(settings, "frames", placeholder="all")
+        layout.prop(settings, "overrides")
+        self.automatic(layout, settings, "cameras", "all")
+        self.automatic(layout, settings, "resolution", "from the file")
         layout.separator()
         for name in ("bundle_folder", "spans", "velocities"):
             layout.prop(settings, name)

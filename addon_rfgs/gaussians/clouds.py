@@ -69,6 +69,9 @@ def import_gaussians(scene: bpy.types.Scene, path: Path, wanted: Inspection) -> 
     try:
         for frame, file in _find_files(path):
             meshes.append(_read_mesh(frame, file))
+            # A frame without Gaussians says that nobody is there; a static set says nothing.
+            if frame is None and not meshes[-1].vertices:
+                bpy.data.meshes.remove(meshes.pop())
         count = sum(len(mesh.vertices) for mesh in meshes)
         if not count:
             raise AddonError(f"{path}: holds no Gaussians (0 points)")
@@ -78,6 +81,8 @@ def import_gaussians(scene: bpy.types.Scene, path: Path, wanted: Inspection) -> 
             bpy.data.meshes.remove(mesh)
         raise
     collection = _fresh_collection(scene)
+    for name in [name for name in collection.keys() if name.startswith("rfgs_")]:
+        del collection[name]  # said of the clouds that were here before
     objects = [_make_object(scene, mesh) for mesh in meshes]
     for item in objects:
         collection.objects.link(item)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import bpy
 import numpy as np
@@ -22,6 +22,29 @@ RAMPED = {
     "POWER": ("rf_power_db", "import a run with its features.npz"),
     "ERROR": ("error_m", "press Compare with Mesh first"),
 }
+
+
+#: What the colours of a cloud say is kept with it, for the legend.
+SCALE = "rfgs_scale"
+
+
+@dataclass(frozen=True)
+class Scale:
+    """What colours say."""
+
+    mode: str
+    """As in `Coloring`, but never AUTO."""
+    low: float = 0.0
+    """Value of the first colour of a ramp: dB, or metres for ERROR."""
+    high: float = 1.0
+    """Value of its last colour."""
+    attribute: str = ""
+    """Name of what ATTRIBUTE shows."""
+
+    @classmethod
+    def of(cls, mesh: bpy.types.Mesh) -> Scale:
+        """What the colours of a cloud say."""
+        return cls(**mesh[SCALE].to_dict())
 
 
 @dataclass(frozen=True)
@@ -64,10 +87,12 @@ def color_clouds(
         values = _needed(meshes, name, remedy)
         limits = coloring.limits or color_maps.found_range(values)
         colors = [color_maps.ramp(array, *limits) for array in values]
+    scale = Scale(mode, *(limits or (0.0, 1.0)), coloring.attribute)
     for mesh, rgb in zip(meshes, colors, strict=True):
         rgba = np.concatenate([rgb, np.ones((len(rgb), 1))], axis=1)
         attributes.put(mesh, COLOR_ATTRIBUTE, "FLOAT_COLOR", rgba)
         mesh.attributes.active_color_name = COLOR_ATTRIBUTE
+        mesh[SCALE] = asdict(scale)
         mesh.update()
     return limits
 

@@ -11,11 +11,13 @@ import numpy as np
 from mathutils.bvhtree import BVHTree
 
 from ..errors import AddonError
+from ..ownership import found_collection, own_collection
 from ..scene.frames import unit_scale
 from ..scene.state import kept, show_what_renders
 from ..scene.survey import Surface, positions, surface_of, survey
 from . import attributes
 from .cloud_mesh import FRAME
+from .clouds import COLLECTION
 from .display import Display, shown
 
 
@@ -30,12 +32,34 @@ class Comparison:
     frames: int
     """Frames compared."""
 
+    def lines(self) -> list[str]:
+        """The same for a panel, a line each."""
+        return [
+            f"Median {100 * self.median_m:.1f} cm, mean {100 * self.mean_m:.1f} cm",
+            f"{self.count} Gaussians in {self.frames} frame{'s' * (self.frames > 1)}",
+        ]
+
     def sentence(self) -> str:
         """One line for the status bar."""
         return (
             f"Distance to the true mesh: mean {100 * self.mean_m:.1f} cm, median "
             f"{100 * self.median_m:.1f} cm over {self.count} Gaussians in {self.frames} frame(s)"
         )
+
+
+#: The last result is kept on the collection of the clouds.
+_RESULT = "rfgs_compared"
+
+
+def keep_result(scene: bpy.types.Scene, found: Comparison) -> None:
+    """Keeps what was found for the panel; a new import forgets it."""
+    own_collection(scene, COLLECTION)[_RESULT] = found.lines()
+
+
+def kept_result(scene: bpy.types.Scene) -> list[str]:
+    """Lines about the last comparison of the clouds that are here; none if there was none."""
+    collection = found_collection(scene, COLLECTION)
+    return list(collection.get(_RESULT, [])) if collection else []
 
 
 def compare_with_mesh(

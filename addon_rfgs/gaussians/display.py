@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 
 from . import attributes
+from .look import SPLAT_SIGMAS
 from .nodes import GROUP, NO_POWER_DB, node_group, socket_ids
 
 
@@ -18,7 +19,7 @@ class Display:
     """How Gaussians are shown."""
 
     mode: str = "points"
-    """`points`, equal spheres, or `ellipsoids` of one standard deviation."""
+    """`points`, equal spheres, `ellipsoids` of one standard deviation, or `splats`."""
     opacity_threshold: float = 0.005
     """Those below are hidden."""
     power_threshold_db: float = NO_POWER_DB
@@ -42,12 +43,15 @@ def set_display(item: bpy.types.Object, display: Display) -> None:
     """Changes what the modifier shows."""
     modifier: Any = item.modifiers[GROUP]
     sockets = socket_ids(modifier.node_group)
+    splats = display.mode == "splats"
     for name, value in {
-        "Ellipsoids": display.mode == "ellipsoids",
+        "Ellipsoids": display.mode != "points",
+        "Splats": splats,
         "Opacity Threshold": display.opacity_threshold,
         "Power Threshold": display.power_threshold_db,
-        "Size": display.size,
-        "Solid View": display.solid_view,
+        "Size": display.size * (SPLAT_SIGMAS if splats else 1.0),
+        # The Solid view knows no opacity.
+        "Solid View": display.solid_view and not splats,
         "Crop": display.crop_box is not None,
         "Crop Box": display.crop_box,
     }.items():

@@ -18,6 +18,8 @@ _ARRAYS = {
     "track_id": ("iu", False),
     "body": ("iu", False),
     "error_m": ("f", False),
+    "bone": ("iu", False),
+    "sigma_m": ("f", False),
 }
 #: Most numbers per Gaussian of one array.
 _MAX_WIDTH = 256

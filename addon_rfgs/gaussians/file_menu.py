@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 
 from ..reporting import Progress, Undoable, chosen_path
-from .operators import import_shown
+from .operators import color_solid_views, import_shown
 
 _LABEL = "RF Gaussians (.ply)"
 
@@ -41,6 +41,7 @@ class RFGS_OT_import_ply(Undoable, bpy.types.Operator):
         path = chosen_path(self.filepath)
         told = import_shown(context.scene, path)
         context.scene.rfgs.gaussians.path = str(path)
+        color_solid_views(context)
         return told
 
 

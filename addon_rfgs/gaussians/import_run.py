@@ -5,31 +5,27 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import bpy
-import mathutils
 import numpy as np
 
 from ..errors import AddonError
 from ..export.groundtruth import can_denoise, keep_format, render_to
 from ..files import replacing
 from ..saving import save_copy
-from ..scene.cameras import look_at, picture_size
+from ..scene.cameras import picture_size
 from ..scene.frames import file_label
 from ..scene.lights import lights_ready
 from ..scene.state import Keeper, kept, show_what_renders
 from ..scene.survey import survey
-from .attributes import positions
 from .clouds import Imported, Inspection, import_gaussians
-from .compare import compare_with_mesh
-from .display import Display, shown
+from .compare import compare_with_mesh, keep_result
+from .display import Display, set_display
+from .opening import show_at_opening
+from .viewpoint import cameras_of, choose_camera
 
-#: Gaussians that vote for the picture's camera.
-_VOTERS = 200
-#: Marks a camera that is not the scene's own.
-_MADE = "rfgs_made"
 #: Kinds of rays that may see an object.
 _RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
 
@@ -63,25 +59,29 @@ def import_run(
     """
     if blend is None and picture is None:
         raise AddonError("import: give --out FILE.blend, --picture FILE.png or both")
-    if picture and picture.camera and picture.camera not in _cameras(scene):
+    if picture and picture.camera and picture.camera not in cameras_of(scene):
         raise AddonError(
             f"{file_label()}: no camera {picture.camera!r}; it has "
-            f"{', '.join(sorted(_cameras(scene))) or 'none'}"
+            f"{', '.join(sorted(cameras_of(scene))) or 'none'}"
         )
     imported = import_gaussians(scene, path, wanted)
     done = [f"imported {imported.count} Gaussians in {len(imported.objects)} clouds"]
     if compare:
         found = compare_with_mesh(scene, imported.objects, wanted.display, every_frame=True)
         scene.rfgs.gaussians.color_by = "ERROR"  # acts at once
+        keep_result(scene, found)
         done.append(found.sentence())
     if imported.frames:
         scene.frame_set(imported.frames[len(imported.frames) // 2])
-    if blend is not None:
-        save_copy(blend)
-        done.append(f"wrote {blend}")
     if picture is not None:
         camera = render_picture(scene, imported, wanted.display, picture)
         done.append(f"wrote {picture.path} (camera {camera}, frame {scene.frame_current})")
+    if blend is not None:
+        frame, moving = scene.frame_current, _moving_sources(scene)
+        scene.frame_set(frame)
+        show_at_opening(scene, imported, wanted.display, moving, picture and picture.camera)
+        save_copy(blend)
+        done.append(f"wrote {blend}")
     return "; ".join(done)
 
 
@@ -100,98 +100,36 @@ def render_picture(
         frame = scene.frame_current
         moving = _moving_sources(scene)
         scene.frame_set(frame)
-        camera = _choose_camera(scene, imported, display, picture.camera)
+        camera = choose_camera(scene, imported, display, picture.camera)
         scene.camera = camera
         _configure(keeper, scene, (width, height), picture.samples)
         halves = []
-        with lights_ready(scene), replacing(picture.path) as temporary:
+        with lights_ready(scene), replacing(picture.path) as temporary, _fine(imported, display):
             for hidden in (imported.objects, moving):
                 with _invisible(hidden):
                     render_to(scene, temporary)
                 halves.append(_read_pixels(temporary))
             _save_pixels(temporary, np.concatenate(halves, axis=1))
     name = camera.name
-    if camera.name not in _cameras(scene):
+    if camera.name not in cameras_of(scene):
         bpy.data.cameras.remove(camera.data)
         name = "made for the picture"
     return name
 
 
-def _cameras(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
-    return {
-        item.name: item
-        for item in scene.objects
-        if item.type == "CAMERA" and item.data.type == "PERSP" and not item.get(_MADE)
-    }
+@contextmanager
+def _fine(imported: Imported, display: Display) -> Iterator[None]:
+    """Shows Gaussians in fine shapes: those of the Solid view have eight faces each."""
+    for item in imported.objects:
+        set_display(item, replace(display, solid_view=False))
+    yield
+    for item in imported.objects:
+        set_display(item, display)
 
 
 def _moving_sources(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """Objects the Gaussians stand in for; none where the scene has nothing that moves."""
     return [surface.source for surface in survey(scene)[0] if surface.moving]
-
-
-def _choose_camera(
-    scene: bpy.types.Scene, imported: Imported, display: Display, wanted: str | None
-) -> bpy.types.Object:
-    """The wanted camera, else the one that sees most of the visible cloud, and sees it large."""
-    cameras = _cameras(scene)
-    if wanted:
-        return cameras[wanted]
-    points = _shown_points(imported, display)
-    scores = {name: _score(scene, item, points) for name, item in cameras.items()}
-    best = max(sorted(scores), key=lambda name: scores[name], default=None)
-    if best is not None and scores[best] > 0:
-        return cameras[best]
-    low, high = points.min(axis=0), points.max(axis=0)
-    centre, reach = 0.5 * (low + high), max(float(np.linalg.norm(high - low)), 0.5)
-    camera = bpy.data.objects.new("RFGS picture", bpy.data.cameras.new("RFGS picture"))
-    camera[_MADE] = True
-    camera.data.angle = np.radians(60)
-    place = centre + 1.6 * reach * np.array([0.6, -0.74, 0.3])
-    camera.matrix_world = mathutils.Matrix(look_at(place, centre).tolist())
-    scene.collection.objects.link(camera)
-    return camera
-
-
-def _shown_points(imported: Imported, display: Display) -> np.ndarray:
-    """World positions [M, 3] of some Gaussians of the current frame, what moves before what not."""
-    moving = [item for item in imported.objects if item.animation_data]
-    for items in ([item for item in moving if not item.hide_viewport], imported.objects):
-        found = [np.zeros((0, 3))]
-        for item in items:
-            visible = positions(item.data)[shown(item, display)]
-            found.append(visible * np.array(item.scale))
-        points = np.concatenate(found)
-        if len(points):
-            return points[:: max(1, len(points) // _VOTERS)]
-    raise AddonError(
-        "no Gaussian is left by opacity threshold "
-        f"{display.opacity_threshold}, power threshold and crop box; lower them"
-    )
-
-
-def _score(scene: bpy.types.Scene, camera: bpy.types.Object, points: np.ndarray) -> float:
-    """Share of points in view and in sight, times the square root of the area they cover."""
-    graph = bpy.context.evaluated_depsgraph_get()
-    matrix = np.array(camera.matrix_world, dtype=np.float64)
-    size = (scene.render.resolution_x, scene.render.resolution_y)
-    lens = np.array(camera.calc_matrix_camera(graph, x=size[0], y=size[1]), dtype=np.float64)
-    local = np.linalg.inv(matrix) @ np.concatenate([points, np.ones((len(points), 1))], 1).T
-    clip = lens @ local
-    plane = clip[:2] / np.where(clip[3] > 1e-6, clip[3], np.inf)
-    inside = (clip[3] > 1e-6) & (np.abs(plane) < 0.95).all(axis=0)
-    if not inside.any():
-        return 0.0
-    seen = 0
-    eye = mathutils.Vector(matrix[:3, 3])
-    for point in points[inside]:
-        line = mathutils.Vector(point) - eye
-        start = eye + line.normalized() * 0.05
-        # Half a unit is left free, so that the person does not hide its own Gaussians.
-        hit = scene.ray_cast(graph, start, line.normalized(), distance=max(line.length - 0.5, 0.01))
-        seen += not hit[0]
-    area = float(np.prod(np.ptp(plane[:, inside], axis=1) / 2))
-    return seen / len(points) * np.sqrt(min(area, 0.5))
 
 
 def _configure(keeper: Keeper, scene: bpy.types.Scene, size: tuple[int, int], samples: int) -> None:

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from .coloring import COLOR_ATTRIBUTE
-from .look import material
+from .look import material, splat_material
 
 #: Name of the node group, and of the modifiers that use it.
 GROUP = "RFGS Gaussians"
@@ -26,6 +26,7 @@ _USED = ("rf_*", "opacity", "scale", "rotation", "radius", "gid", "body", "error
 #: Input sockets: name, type, default, minimum, maximum, what it does.
 _INPUTS = (
     ("Ellipsoids", "NodeSocketBool", False, None, None, "Ellipsoids instead of equal points"),
+    ("Splats", "NodeSocketBool", False, None, None, "Ellipsoids that fade out as Gaussians do"),
     ("Opacity Threshold", "NodeSocketFloat", 0.005, 0.0, 1.0, "Hide Gaussians below this opacity"),
     ("Power Threshold", "NodeSocketFloat", NO_POWER_DB, NO_POWER_DB, 300.0,
      "Hide Gaussians known to reflect less power [dB]"),
@@ -151,8 +152,11 @@ class _Builder:
         return next(socket for socket in node.outputs if socket.enabled)
 
     def material(self, geometry: Any, domain: str) -> Any:
+        return self.with_material(geometry, material(domain, COLOR_ATTRIBUTE))
+
+    def with_material(self, geometry: Any, shown: bpy.types.Material) -> Any:
         node = self.nodes.new("GeometryNodeSetMaterial")
-        node.inputs["Material"].default_value = material(domain, COLOR_ATTRIBUTE)
+        node.inputs["Material"].default_value = shown
         self.link(geometry, node.inputs["Geometry"])
         return node.outputs["Geometry"]
 
@@ -226,7 +230,9 @@ def _shapes(build: _Builder, cloud: Any) -> Any:
         build.link(_radius(build), socket)
     node = build.nodes.new("GeometryNodeInstanceOnPoints")
     build.link(cloud, node.inputs["Points"])
-    build.link(build.material(smooth.outputs[0], "INSTANCER"), node.inputs["Instance"])
+    firm = build.material(smooth.outputs[0], "INSTANCER")
+    soft = build.with_material(smooth.outputs[0], splat_material(COLOR_ATTRIBUTE))
+    build.link(build.switch(build.input("Splats"), firm, soft), node.inputs["Instance"])
     build.link(build.attribute("rotation", "QUATERNION"), node.inputs["Rotation"])
     scale = build.switch(build.input("Ellipsoids"), ball.outputs[0], stretched, "VECTOR")
     build.link(scale, node.inputs["Scale"])

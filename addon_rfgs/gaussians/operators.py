@@ -12,8 +12,9 @@ from ..reporting import Progress, Undoable, chosen_path
 from ..scene.frames import named
 from . import commands
 from .clouds import chosen_clouds, clouds_of, import_gaussians
-from .compare import compare_with_mesh
+from .compare import compare_with_mesh, keep_result
 from .export_ply import export_gaussians
+from .opening import color_view, views_of
 from .with_clouds import WithClouds
 
 
@@ -49,17 +50,32 @@ class RFGS_OT_import_gaussians(Undoable, bpy.types.Operator):
 
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
         """Imports with the panel's settings."""
-        return import_shown(context.scene, chosen_path(context.scene.rfgs.gaussians.path))
+        told = import_shown(context.scene, chosen_path(context.scene.rfgs.gaussians.path))
+        color_solid_views(context)
+        return told
+
+
+def color_solid_views(context: bpy.types.Context) -> None:
+    """Lets the Solid views of the open screen show colours at once; other views have them."""
+    if context.scene.rfgs.gaussians.solid_view:
+        for space in views_of(context.screen):
+            if space.shading.type == "SOLID":
+                color_view(space)
 
 
 def import_shown(scene: bpy.types.Scene, path: Path) -> str:
-    """Imports with the settings of the panel; returns one line about it.
+    """Imports with the settings of the panel, at a frame that has Gaussians.
+
+    Returns:
+        One line about it.
 
     Raises:
         AddonError: There is nothing to import, or a file is damaged; nothing has changed then.
     """
     wanted = replace(scene.rfgs.gaussians.inspection(), fall_back=True)
     done = import_gaussians(scene, path, wanted)
+    if done.frames and not done.frames[0] <= scene.frame_current <= done.frames[-1]:
+        scene.frame_set(done.frames[0])
     more = f"; coloured automatically: {done.automatic}" if done.automatic else ""
     return f"Imported {done.count} Gaussians in {len(done.objects)} clouds{more}"
 
@@ -132,4 +148,5 @@ class RFGS_OT_compare_gaussians(WithClouds, bpy.types.Operator):
             progress,
         )
         settings.color_by = "ERROR"
+        keep_result(context.scene, found)
         return found.sentence()

@@ -7,12 +7,13 @@ from ..tab import Tab
 from .cloud_mesh import FRAME
 from .clouds import clouds_here
 from .coloring import RAMPED, missing
+from .compare import kept_result
 
 
 class RFGS_PT_gaussians(Tab, bpy.types.Panel):
     """Gaussians back into the scene."""
 
-    bl_label = "Gaussians"
+    bl_label = "5 Inspect"
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows the path and the buttons."""
@@ -31,6 +32,11 @@ class _Part(Tab):
     bl_parent_id = "RFGS_PT_gaussians"
     bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
     names: tuple[str, ...] = ()
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether there are Gaussians that it acts on."""
+        return bool(clouds_here(context.scene))
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows the settings `names`."""
@@ -64,6 +70,7 @@ class RFGS_PT_gaussians_color(_Part, bpy.types.Panel):
         """Shows the mode, and the range where it has one."""
         super().draw(context)
         settings = context.scene.rfgs.gaussians
+        self.layout.prop(settings, "legend")
         if settings.color_by == "ATTRIBUTE":
             self.layout.prop(settings, "color_attribute")
         clouds = [item.data for item in clouds_here(context.scene)]
@@ -104,6 +111,7 @@ class RFGS_PT_gaussians_compare(_Part, bpy.types.Panel):
     """How far Gaussians are from the true surface."""
 
     bl_label = "Compare with Mesh"
+    bl_options = set()  # noqa: RUF012
     names = ("compare_with",)
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -112,3 +120,5 @@ class RFGS_PT_gaussians_compare(_Part, bpy.types.Panel):
         row = self.layout.row(align=True)
         row.operator("rfgs.compare_gaussians", text="This Frame", icon="SNAP_NORMAL")
         row.operator("rfgs.compare_gaussians", text="All Frames").every_frame = True
+        for number, line in enumerate(kept_result(context.scene)):
+            self.layout.label(text=line, icon="BLANK1" if number else "INFO")

@@ -18,6 +18,12 @@ from .nodes import NO_POWER_DB
 DISPLAY_MODES = [
     ("points", "Points", "One sphere of equal size per Gaussian; fast", 0),
     ("ellipsoids", "Ellipsoids", "One ellipsoid per Gaussian at one standard deviation", 1),
+    (
+        "splats",
+        "Splats",
+        "As 3DGS draws them, for Material Preview and renders: opacity falls off",
+        2,
+    ),
 ]
 
 INTERPOLATIONS = [
@@ -77,6 +83,11 @@ def _recolor(settings: RFGS_PG_gaussians, coloring: Coloring) -> tuple[float, fl
         return None
 
 
+def _redraw(_settings: RFGS_PG_gaussians, context: Any) -> None:
+    for area in context.screen.areas if context.screen else []:
+        area.tag_redraw()
+
+
 def _is_empty(_settings: Any, item: bpy.types.Object) -> bool:
     return item.type == "EMPTY"
 
@@ -105,7 +116,7 @@ class RFGS_PG_gaussians(bpy.types.PropertyGroup):
         update=_show,
     )
     power_threshold_db: bpy.props.FloatProperty(
-        name="Min power",
+        name="Min power [dB]",
         description="Gaussians known to reflect less power [dB] are hidden",
         default=NO_POWER_DB,
         min=NO_POWER_DB,
@@ -126,7 +137,9 @@ class RFGS_PG_gaussians(bpy.types.PropertyGroup):
     )
     solid_view: bpy.props.BoolProperty(
         name="Real meshes",
-        description="Make real meshes of the Gaussians, which the Solid view can colour; slower",
+        description="Make real meshes of the Gaussians, which the Solid view can colour; off: "
+        "points or instances, which play faster and are white in the Solid view",
+        default=True,
         update=_show,
     )
     use_crop: bpy.props.BoolProperty(
@@ -181,6 +194,12 @@ class RFGS_PG_gaussians(bpy.types.PropertyGroup):
         items=INTERPOLATIONS,
         default="HOLD",
         update=_time,
+    )
+    legend: bpy.props.BoolProperty(
+        name="Legend",
+        description="Draw in the 3D view what the colours of Gaussians mean",
+        default=True,
+        update=_redraw,
     )
     compare_with: bpy.props.EnumProperty(
         name="True mesh",

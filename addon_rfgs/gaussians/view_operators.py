@@ -11,6 +11,7 @@ from .attributes import positions
 from .clouds import COLLECTION, clouds_of, time_clouds
 from .coloring import color_clouds
 from .display import set_display, shown
+from .opening import color_view
 from .with_clouds import WithClouds
 
 #: Share of the clouds' extent that the crop box leaves free around them.
@@ -45,7 +46,7 @@ class RFGS_OT_color_solid_view(WithClouds, bpy.types.Operator):
         space = context.space_data
         if space is None or space.type != "VIEW_3D":
             return "Gaussians are real meshes now; no 3D view is open to colour"
-        space.shading.type, space.shading.color_type = "SOLID", "VERTEX"
+        color_view(space)
         return "Gaussians are coloured in this Solid view"
 
 

@@ -35,6 +35,11 @@ class RFGS_OT_test_environment(InEnvironment, bpy.types.Operator):
     bl_label = "Test Environment"
     command = Command("environment")
 
+    @classmethod
+    def ready(cls, _context: bpy.types.Context) -> bool:
+        """Always: it says what is wrong."""
+        return True
+
     def work(self, _context: bpy.types.Context, _progress: Progress) -> str:
         """Asks in the background; without a window it waits for the answer."""
         CHECK.start(self.interpreter(), blender_program())
@@ -68,6 +73,14 @@ class RFGS_OT_generate_dataset(InEnvironment, bpy.types.Operator):
         subtype="FILE_PATH",
         options={"SKIP_SAVE"},
     )
+
+    @classmethod
+    def ready(cls, _context: bpy.types.Context) -> bool:
+        """Whether a file and an environment are there."""
+        if not bpy.data.filepath:
+            cls.poll_message_set("Save the file first: what is traced is the file on disk")
+            return False
+        return super().ready(_context)
 
     def work(self, context: bpy.types.Context, progress: Progress) -> str:
         """Saves the file if that is wanted, and begins."""

@@ -3,12 +3,13 @@
 
 import bpy
 
+from ..scene.taking_part import wanted_radios
 from ..tab import Tab
 from .following import chosen_job
 from .preferences import ADDON, draw_check, environment_path, preferences
 from .process import SUPPORTED
 from .queue import DONE, FAILED, RUNNING, STOPPED, STOPPING, WAITING
-from .starting import doing_without, traced
+from .starting import dataset_to_come, doing_without
 
 _ICONS = {
     WAITING: "SORTTIME",
@@ -39,10 +40,89 @@ class RFGS_UL_jobs(bpy.types.UIList):
         row.label(text=item.state)
 
 
+class RFGS_PT_generate(Tab, bpy.types.Panel):
+    """What is generated."""
+
+    bl_label = "3 Generate"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Shows what everybody sets, and the button."""
+        layout, settings, stored = self.columns(), context.scene.rfgs.jobs, preferences()
+        layout.prop(settings, "dataset_folder")
+        layout.prop(settings, "radios", placeholder=", ".join(wanted_radios(context.scene)))
+        if missing := doing_without(context.scene):
+            layout.label(text=missing, icon="ERROR")
+        layout.prop(settings, "frames", placeholder="all")
+        layout.prop(settings, "images")
+        if stored is not None and not environment_path():
+            layout.label(text="Choose a Python with rfgs, or run", icon="INFO")
+            layout.label(text="`rfgs addon install` there", icon="BLANK1")
+            layout.prop(stored, "python", text="Python")
+        layout.operator("rfgs.generate_dataset", icon="PLAY")
+
+
+class RFGS_PT_generate_more(Tab, bpy.types.Panel):
+    """What few change about a dataset."""
+
+    bl_parent_id = "RFGS_PT_generate"
+    bl_label = "More Settings"
+    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Shows settings of tracing, pictures and processes."""
+        layout, settings = self.columns(), context.scene.rfgs.jobs
+        self.automatic(layout, settings, "depth", "as the scene needs")
+        layout.prop(settings, "paths")
+        column = layout.column()
+        column.active = settings.images
+        self.automatic(column, settings, "cameras", "all")
+        column.prop(settings, "resolution")
+        column.prop(settings, "samples")
+        for name in ("workers", "seed", "save_first"):
+            layout.prop(settings, name)
+
+
+class RFGS_PT_train(Tab, bpy.types.Panel):
+    """What is trained."""
+
+    bl_label = "4 Train"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Shows what everybody sets and the buttons; a line as long as there is no dataset."""
+        layout, settings = self.columns(), context.scene.rfgs.jobs
+        if not dataset_to_come(context.scene):
+            layout.label(text="Needs the dataset of step 3", icon="INFO")
+            return
+        layout.prop(settings, "run_folder")
+        layout.prop(settings, "train_radio", placeholder=wanted_radios(context.scene)[0])
+        layout.operator("rfgs.train_gaussians", icon="PLAY")
+        layout.operator("rfgs.evaluate_run", icon="VIEWZOOM")
+
+
+class RFGS_PT_train_more(Tab, bpy.types.Panel):
+    """What few change about a training."""
+
+    bl_parent_id = "RFGS_PT_train"
+    bl_label = "More Settings"
+    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether there is something to train on."""
+        return dataset_to_come(context.scene)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Shows settings of the fit."""
+        layout, settings = self.columns(), context.scene.rfgs.jobs
+        layout.prop(settings, "train_frames", placeholder="all")
+        self.automatic(layout, settings, "iterations", "the recipe's")
+        self.automatic(layout, settings, "gaussians", "the recipe's")
+
+
 class RFGS_PT_jobs(Tab, bpy.types.Panel):
     """The environment and the list of jobs."""
 
-    bl_label = "Generate and Train"
+    bl_label = "Jobs"
 
     def draw(self, _context: bpy.types.Context) -> None:
         """Shows the list, and how the chosen job stands."""
@@ -52,12 +132,9 @@ class RFGS_PT_jobs(Tab, bpy.types.Panel):
             return
         if not SUPPORTED:
             layout.label(text="Jobs need Linux or macOS", icon="ERROR")
-        if not environment_path():
-            layout.label(text="Choose a Python environment", icon="INFO")
-            layout.prop(stored, "python", text="")
+        draw_check(layout)
         shown = layout.operator("preferences.addon_show", icon="PREFERENCES", text="Preferences")
         shown.module = ADDON
-        draw_check(layout)
         if not stored.jobs:
             return
         row = layout.row()
@@ -84,46 +161,3 @@ def _draw_job(layout: bpy.types.UILayout, job: object, row: object) -> None:
     buttons.operator("rfgs.stop_job", icon="CANCEL")
     buttons.operator("rfgs.resume_job", icon="PLAY")
     layout.operator("rfgs.import_result", icon="IMPORT")
-
-
-class RFGS_PT_generate(Tab, bpy.types.Panel):
-    """What is generated."""
-
-    bl_parent_id = "RFGS_PT_jobs"
-    bl_label = "Dataset"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        """Shows the settings and the button."""
-        layout, settings = self.columns(), context.scene.rfgs.jobs
-        for name in ("dataset_folder", "radios"):
-            layout.prop(settings, name)
-        for line, icon in (
-            (doing_without(context.scene), "ERROR"),
-            (traced(context.scene), "INFO"),
-        ):
-            if line:
-                layout.label(text=line, icon=icon)
-        for name in ("frames", "depth", "workers", "paths", "images"):
-            layout.prop(settings, name)
-        column = layout.column()
-        column.active = settings.images
-        for name in ("cameras", "resolution", "samples"):
-            column.prop(settings, name)
-        layout.prop(settings, "seed")
-        layout.prop(settings, "save_first")
-        layout.operator("rfgs.generate_dataset", icon="PLAY")
-
-
-class RFGS_PT_train(Tab, bpy.types.Panel):
-    """What is trained."""
-
-    bl_parent_id = "RFGS_PT_jobs"
-    bl_label = "Training"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        """Shows the settings and the buttons."""
-        layout, settings = self.columns(), context.scene.rfgs.jobs
-        for name in ("run_folder", "train_radio", "train_frames", "iterations", "gaussians"):
-            layout.prop(settings, name)
-        layout.operator("rfgs.train_gaussians", icon="PLAY")
-        layout.operator("rfgs.evaluate_run", icon="VIEWZOOM")

@@ -83,8 +83,18 @@ def draw_check(layout: bpy.types.UILayout) -> None:
             box.label(text=line, icon="BLANK1" if number else "ERROR")
     if CHECK.versions and not CHECK.problems:
         box.label(text="Ready", icon="CHECKMARK")
-    for line in textwrap.wrap(", ".join(CHECK.versions), _LINE):
+    for line in version_lines(CHECK.versions):
         box.label(text=line, icon="BLANK1")
+
+
+def version_lines(versions: list[str]) -> list[str]:
+    """Names of programs with their versions in lines, none of them torn apart."""
+    lines = [""]
+    for number, version in enumerate(versions):
+        text = version if number + 1 == len(versions) else f"{version},"
+        fits = len(f"{lines[-1]} {text}") <= _LINE
+        lines = [*lines[:-1], f"{lines[-1]} {text}".strip()] if fits else [*lines, text]
+    return [line for line in lines if line]
 
 
 def preferences() -> RFGS_AP_preferences | None:
@@ -119,6 +129,16 @@ class InEnvironment(Reporting):
         subtype="FILE_PATH",
         options={"SKIP_SAVE"},
     )
+
+    @classmethod
+    def ready(cls, _context: bpy.types.Context) -> bool:
+        """Whether an environment is chosen, and is not known to be unfit."""
+        reason = CHECK.problems[0] if CHECK.problems else ""
+        if not environment_path():
+            reason = "Choose a Python environment with rfgs, or run `rfgs addon install` in it"
+        if reason:
+            cls.poll_message_set(reason)
+        return not reason
 
     def interpreter(self) -> Path:
         """Its Python program.

@@ -55,9 +55,14 @@ def doing_without(scene: bpy.types.Scene) -> str:
     return f"left out: {', '.join(groups)}" if groups else ""
 
 
-def traced(scene: bpy.types.Scene) -> str:
-    """The line below the radios of the panel: what is traced where none is named."""
-    return "" if scene.rfgs.jobs.radios else f"Traces {', '.join(wanted_radios(scene))}"
+def dataset_to_come(scene: bpy.types.Scene) -> bool:
+    """Whether the panel's dataset is there, or on its way."""
+    folder = scene.rfgs.jobs.dataset_folder
+    if folder.startswith("//") and not bpy.data.filepath:
+        return False
+    path = Path(bpy.path.abspath(folder))
+    jobs = following.QUEUE.jobs
+    return (path / "dataset.json").is_file() or any(Path(job.plan.out) == path for job in jobs)
 
 
 def train_plan(scene: bpy.types.Scene) -> TrainPlan:

@@ -18,16 +18,16 @@ class RFGS_PT_material(Tab, bpy.types.Panel):
     """Radio meaning of the active object's material."""
 
     bl_label = "Radio Materials"
+    bl_parent_id = "RFGS_PT_check"
+    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows the carrier, the electrical model and what replaces its defaults."""
         layout = self.columns()
         settings = context.scene.rfgs.materials
-        layout.prop(settings, "carrier_ghz")
         bands = used_bands(context.scene)
-        if not settings.carrier_ghz:
-            text = ", ".join(band.text for band in bands) or "no device names a band"
-            layout.label(text=f"Devices: {text}")
+        text = ", ".join(band.text for band in bands) or "as generated"
+        self.automatic(layout, settings, "carrier_ghz", text)
         material = context.object.active_material if context.object else None
         if material is not None:
             box = layout.box()
@@ -40,9 +40,8 @@ class RFGS_PT_material(Tab, bpy.types.Panel):
                 row.alert = bool(wrong)
                 text = f"not at {wrong[0].text}: " if wrong else ""
                 row.label(text=f"{text}valid {validity(name)}", icon="ERROR" if wrong else "BLANK1")
-            box.prop(material.rfgs, "thickness_m")
-            if material.rfgs.thickness_m == 0 and name in MATERIALS:
-                box.label(text=f"{MATERIALS[name]['thickness_m']:g} m, the material's own")
+            own = f"{MATERIALS[name]['thickness_m']:g} m" if name in MATERIALS else "its own"
+            self.automatic(box, material.rfgs, "thickness_m", own)
             box.prop(material.rfgs, "scattering_coefficient")
         assign = layout.operator_menu_enum(
             "rfgs.assign_material", "radio_material", text="Set All of Selected Objects"

@@ -45,7 +45,7 @@ class RFGS_PG_material(bpy.types.PropertyGroup):
         update=_changed,
     )
     thickness_m: bpy.props.FloatProperty(
-        name="Thickness",
+        name="Thickness [m]",
         description="Thickness of the slab behind this surface [m]; 0 takes the material's own",
         min=0.0,
         soft_max=1.0,

@@ -10,6 +10,7 @@ class RFGS_PT_paths(Tab, bpy.types.Panel):
     """Ray paths as curves."""
 
     bl_label = "Ray Paths"
+    bl_parent_id = "RFGS_PT_gaussians"
     bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
 
     def draw(self, context: bpy.types.Context) -> None:

@@ -46,14 +46,14 @@ class RFGS_PG_paths(bpy.types.PropertyGroup):
         max=20000,
     )
     range_db: bpy.props.FloatProperty(
-        name="Range",
+        name="Range [dB]",
         description="Leave out paths weaker than the strongest by more than this [dB]",
         default=60.0,
         min=0.0,
         soft_max=120.0,
     )
     radius_m: bpy.props.FloatProperty(
-        name="Radius",
+        name="Radius [m]",
         # No unit subtype: Blender would take it for its own units, which need not be metres.
         description="Thickness of the curves [m]",
         default=0.004,

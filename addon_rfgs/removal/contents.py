@@ -11,6 +11,7 @@ from ..channels.image import remove_images
 from ..devices.empties import COLLECTION as DEVICES
 from ..gaussians.clouds import COLLECTION as CLOUDS
 from ..gaussians.nodes import GROUP
+from ..gaussians.viewpoint import MADE
 from ..materials.coloring import restore
 from ..ownership import collections_of, drop_empty
 from ..paths.curves import COLLECTION as PATHS
@@ -46,6 +47,7 @@ def _objects() -> list[bpy.types.Object]:
     found = [item for item in bpy.data.objects if GROUP in item.modifiers]
     for collection in collections_of(DEVICES):
         found += [item for item in collection.objects if item.rfgs.role != "NONE"]
+    found += [item for item in bpy.data.objects if item.get(MADE)]
     boxes = {scene.rfgs.gaussians.crop_box for scene in bpy.data.scenes}
     return found + [box for box in boxes if box is not None and box.name.startswith("RFGS ")]
 

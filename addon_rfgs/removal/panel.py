@@ -4,6 +4,7 @@
 import bpy
 
 from ..tab import Tab
+from ..version import version
 
 
 class RFGS_PT_file(Tab, bpy.types.Panel):
@@ -15,3 +16,4 @@ class RFGS_PT_file(Tab, bpy.types.Panel):
     def draw(self, _context: bpy.types.Context) -> None:
         """Shows the button."""
         self.layout.operator("rfgs.remove_data", icon="TRASH")
+        self.layout.label(text=f"RF-GS {version()}")

@@ -88,13 +88,14 @@ def in_room(registered: None) -> None:
 
 @pytest.fixture
 def settings(registered: None, tmp_path: Path) -> Any:
-    """The Gaussians panel's settings, after a run of three frames was imported."""
+    """The Gaussians panel's settings, after a run of three frames was imported as point clouds."""
     import bpy
     from splat_files import write_run
     from splat_scene import FRAMES
 
     bpy.ops.wm.read_factory_settings(use_empty=True)
     found = bpy.context.scene.rfgs.gaussians
+    found.solid_view = False  # What nodes do to single points is asked, not how it is drawn.
     found.path = str(write_run(tmp_path / "run", FRAMES))
     assert bpy.ops.rfgs.import_gaussians() == {"FINISHED"}
     return found

@@ -14,8 +14,11 @@ from splat_scene import FRAMES, cloud
 
 from addon_rfgs.cli import open_blend, run
 from addon_rfgs.gaussians import attributes, color_maps
-from addon_rfgs.gaussians.coloring import missing
+from addon_rfgs.gaussians.coloring import Scale, missing
+from addon_rfgs.gaussians.compare import Comparison, keep_result, kept_result
 from addon_rfgs.gaussians.display import shown
+from addon_rfgs.gaussians.legend import legend_of
+from addon_rfgs.gaussians.operators import import_shown
 
 pytestmark = pytest.mark.usefixtures("registered")
 
@@ -221,7 +224,6 @@ def test_clouds_are_keyed_on_the_timeline(settings, interpolation: str, expected
             settings.frame_offset = offset  # keyed again at this frame
             seen = [other for other in FRAMES if not cloud(other).hide_viewport]
             assert seen == clouds, "without going to another frame"
-            assert not bpy.data.objects["Gaussians static"].hide_render
     assert item.location.x == 3.0 and item.animation_data.action, "other keys stay"
 
 
@@ -230,9 +232,79 @@ def test_a_second_import_replaces_the_first_and_keeps_what_a_user_added(settings
     bpy.data.collections["RF-GS Gaussians"].objects.link(mine)
     assert bpy.ops.rfgs.import_gaussians() == {"FINISHED"}
     names = {item.name for item in bpy.data.collections["RF-GS Gaussians"].objects}
-    assert names == {"mine", "Gaussians static", *(f"Gaussians {frame:06d}" for frame in FRAMES)}
-    assert len(bpy.data.meshes) == 4
+    assert names == {"mine", *(f"Gaussians {frame:06d}" for frame in FRAMES)}
+    assert len(bpy.data.meshes) == 3
     assert len([group for group in bpy.data.node_groups if "RFGS" in group.name]) == 1
+
+
+def test_a_static_cloud_without_gaussians_is_not_there(settings) -> None:
+    assert import_shown(bpy.context.scene, Path(settings.path)) == (
+        "Imported 120 Gaussians in 3 clouds"
+    )
+
+
+def test_the_legend_says_what_the_colours_mean_with_a_unit(settings) -> None:
+    settings.color_by, settings.use_range = "POWER", True
+    settings.range_low, settings.range_high = -12.0, 30.0
+    legend = legend_of(Scale.of(cloud(5).data))
+    assert (legend.title, legend.ends) == ("Reflected power", ("-12 dB", "30 dB"))
+    assert legend.colors is not None
+    np.testing.assert_allclose(legend.colors[[0, -1]], color_maps.RAMP[[0, -1]])
+    settings.color_by = "PHASE"
+    legend = legend_of(Scale.of(cloud(5).data))
+    assert legend.ends == ("-180 °", "180 °") and legend.colors is not None
+    middle = color_maps.hues(np.array([0.0]))[0]
+    assert np.abs(legend.colors - middle).sum(axis=1).argmin() in (23, 24), "phase 0"
+    settings.color_by = "DISPLAY"
+    assert legend_of(Scale.of(cloud(5).data)).ends is None
+
+
+def test_a_comparison_is_kept_until_other_gaussians_come(settings) -> None:
+    scene = bpy.context.scene
+    assert kept_result(scene) == []
+    keep_result(scene, Comparison(0.05, 0.031, 40, 1))
+    assert kept_result(scene) == ["Median 3.1 cm, mean 5.0 cm", "40 Gaussians in 1 frame"]
+    assert bpy.ops.rfgs.import_gaussians() == {"FINISHED"}
+    assert kept_result(scene) == []
+
+
+def test_an_import_goes_to_a_frame_with_gaussians_and_stays_at_one(settings) -> None:
+    scene = bpy.context.scene
+    for before, after in ((1, 2), (6, 6), (40, 2)):
+        scene.frame_set(before)
+        import_shown(scene, Path(settings.path))
+        assert scene.frame_current == after
+
+
+def test_a_splat_fades_out_as_a_gaussian_does(tmp_path: Path) -> None:
+    """Rendered over nothing: its alpha is opacity · exp(−r²/2) at r standard deviations."""
+    rows = rows_of(COLUMNS, 1)
+    for name in rows.dtype.names:
+        rows[name] = 0.0
+    rows["rot_0"], rows["opacity"] = 1.0, np.log(0.8 / 0.2)
+    for axis in range(3):
+        rows[f"scale_{axis}"] = np.log(0.5)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    scene.rfgs.gaussians.display_mode = "splats"
+    scene.rfgs.gaussians.path = str(write(tmp_path / "one.ply", rows))
+    assert bpy.ops.rfgs.import_gaussians() == {"FINISHED"}
+    eye = bpy.data.objects.new("eye", bpy.data.cameras.new("eye"))
+    eye.data.type, eye.data.ortho_scale, eye.location.z = "ORTHO", 4.0, 5.0
+    scene.collection.objects.link(eye)
+    scene.camera, scene.render.engine, scene.render.film_transparent = eye, "CYCLES", True
+    scene.render.resolution_x = scene.render.resolution_y = 41
+    scene.cycles.samples, scene.cycles.device, scene.cycles.use_denoising = 64, "CPU", False
+    scene.render.filepath = str(tmp_path / "one.png")
+    bpy.ops.render.render(write_still=True)
+    image = bpy.data.images.load(scene.render.filepath)
+    values = np.zeros(4 * 41 * 41, np.float32)
+    image.pixels.foreach_get(values)
+    alpha = values.reshape(41, 41, 4)[20, :, 3]
+    sigmas = (np.arange(41) - 20) * (4.0 / 41) / 0.5
+    within = np.abs(sigmas) < 2.8
+    np.testing.assert_allclose(alpha[within], 0.8 * np.exp(-0.5 * sigmas[within] ** 2), atol=0.03)
+    assert alpha[~within].max() < 0.02
 
 
 def test_settings_can_be_made_before_there_are_gaussians_and_in_edit_mode(settings) -> None:

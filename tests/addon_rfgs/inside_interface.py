@@ -13,6 +13,7 @@ import pytest
 import addon_rfgs
 from addon_rfgs.cli import commands, parser, run
 from addon_rfgs.path_options import RELATIVE_PATH
+from addon_rfgs.registration import CLASSES
 
 #: Operator → the command that does the same.
 COMMANDS = {
@@ -57,7 +58,7 @@ OPTIONS = {"compare_gaussians.every_frame": "--compare", "import_ply.filepath": 
 #: Settings of panels that no command reads: of the view, and of a window that asks to be saved.
 OF_THE_WINDOW = {"devices.overlay", "devices.names", "devices.active", "jobs.save_first"}
 #: A comparison by command takes what moves: a file without a window has no selection to speak of.
-OF_THE_WINDOW |= {"gaussians.compare_with"}
+OF_THE_WINDOW |= {"gaussians.compare_with", "gaussians.legend"}
 #: Operators that leave the file as it is; all others can be undone.
 LEAVE_THE_FILE = {
     *("evaluate_run", "export_bundle", "export_gaussians", "forget_job", "generate_dataset"),
@@ -222,3 +223,56 @@ def test_the_docs_name_every_command() -> None:
     words = {word for span in re.findall(r"`([^`\n]+)`", prose) for word in span.split()}
     top = {name for name in command_words(parser("rfgs")) if " " not in name}
     assert not sorted(top - words)
+
+
+#: Numbers that are counted, shares and factors, and what their mode gives a unit: all others say
+#: theirs in their name, or Blender writes it behind the value.
+WITHOUT_UNIT = {
+    *("jobs.depth", "jobs.workers", "jobs.cameras", "jobs.samples", "jobs.seed"),
+    *("jobs.iterations", "jobs.gaussians", "export.cameras", "export.samples"),
+    *("gaussians.size", "gaussians.range_low", "gaussians.range_high", "gaussians.frame_offset"),
+    *("paths.count", "paths.tx_device", "paths.rx_device", "channels.tx_device"),
+    *("channels.rx_device", "devices.active", "material.scattering_coefficient"),
+    *("radio.num_subcarriers", "radio.tx_rows", "radio.tx_cols", "radio.rx_rows", "radio.rx_cols"),
+}
+_UNITS = re.compile(r"\[(GHz|dB|dBm|m|m²|λ|s|px|°)\]")
+
+
+def test_every_quantity_of_the_panel_has_a_unit() -> None:
+    scene = bpy.context.scene.rfgs
+    groups = {
+        row.identifier: row.fixed_type
+        for row in scene.bl_rna.properties
+        if row.identifier not in ("rna_type", "name")
+    }
+    groups["material"] = bpy.types.Material.bl_rna.properties["rfgs"].fixed_type
+    groups["object"] = bpy.types.Object.bl_rna.properties["rfgs"].fixed_type
+    groups["radio"] = groups["object"].properties["rf"].fixed_type
+    lacking = {
+        f"{group}.{spec.identifier}"
+        for group, kind in groups.items()
+        for spec in kind.properties
+        if spec.type in {"INT", "FLOAT"}
+        and not spec.is_hidden
+        and spec.subtype not in {"PIXEL", "FACTOR", "PERCENTAGE", "ANGLE"}
+        and not _UNITS.search(spec.name)
+    }
+    assert lacking == WITHOUT_UNIT
+
+
+def test_every_choice_has_words_and_every_operator_says_what_it_does() -> None:
+    for kind in (*classes(bpy.types.PropertyGroup), *classes(bpy.types.Operator)):
+        for spec in kind.bl_rna.properties:
+            if spec.type == "ENUM" and spec.identifier not in ("rna_type",):
+                for row in spec.enum_items_static:
+                    assert row.name and row.name != row.identifier, (kind, spec.identifier)
+    for name, kind in operators().items():
+        words = getattr(kind, "bl_description", "") or kind.__doc__
+        assert len(words.split()) >= 4, f"{name}: {words}"
+
+
+def test_steps_stand_in_their_order() -> None:
+    panels = [kind for kind in CLASSES if issubclass(kind, bpy.types.Panel)]
+    top = [kind.bl_label for kind in panels if not getattr(kind, "bl_parent_id", "")]
+    steps = ["1 Radios", "2 Check", "3 Generate", "4 Train", "Jobs", "5 Inspect", "This File"]
+    assert top == steps

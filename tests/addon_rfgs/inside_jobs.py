@@ -16,7 +16,8 @@ import pytest
 import addon_rfgs
 from addon_rfgs.cli import run
 from addon_rfgs.errors import AddonError
-from addon_rfgs.jobs import environment, following, queue, starting
+from addon_rfgs.jobs import following, queue, starting
+from addon_rfgs.jobs.checking import CHECK
 from addon_rfgs.jobs.plans import (
     EvaluatePlan,
     GeneratePlan,
@@ -297,61 +298,11 @@ def test_logs_of_any_bytes_are_read(tmp_path: Path) -> None:
     assert read_log(tmp_path / "none") == (None, [])
 
 
-def test_interpreters_are_found_and_others_refused(tmp_path: Path) -> None:
-    folder = tmp_path / "venv"
-    (folder / "bin").mkdir(parents=True)
-    (folder / "bin" / "python").symlink_to(sys.executable)
-    assert environment.interpreter(str(folder)) == folder / "bin" / "python"
-    assert environment.interpreter(str(folder / "bin" / "python")) == folder / "bin" / "python"
-    (tmp_path / "text").write_text("")
-    for path, words in (
-        ("", "no Python environment is set"),
-        (tmp_path, "no bin/python"),
-        (tmp_path / "gone", "no such file"),
-        (tmp_path / "text", "not a program"),
-    ):
-        with pytest.raises(AddonError, match=words):
-            environment.interpreter(str(path))
-
-
-@pytest.mark.parametrize(
-    ("code", "output", "words"),
-    [
-        (None, "", "does not answer"),
-        (1, "", "it said nothing"),
-        (2, "ls: no such file", "ls: no such file"),
-        (0, "rfgs-environment {", "no Python that works"),
-        (0, 'rfgs-environment {"versions": [], "problems": []}', "no Python that works"),
-        (0, 'rfgs-environment {"versions": {"rfgs": ""}, "problems": []}', "rfgs is not installed"),
-    ],
-)
-def test_wrong_environments_are_explained(code, output: str, words: str) -> None:
-    _, problems = environment.read_check(code, output)
-    assert problems and words in problems[0] and "\n" not in problems[0]
-
-
-def test_this_environment_is_ready() -> None:
-    command = environment.check_arguments(Path(sys.executable))
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    versions, problems = environment.read_check(done.returncode, done.stdout)
-    assert not problems and any(line.startswith("torch 2") for line in versions)
-
-
-def test_a_blender_that_does_not_start_is_a_problem() -> None:
-    command = environment.check_arguments(Path(sys.executable), "/nowhere/blender")
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    _, problems = environment.read_check(done.returncode, done.stdout)
-    assert len(problems) == 1 and "/nowhere/blender does not start" in problems[0]
-
-
 def test_operators_refuse_in_one_line_what_they_cannot_do(registered: None) -> None:
-    for name, words in (
-        ("generate_dataset", "never saved"),
-        ("test_environment", "no Python environment is set"),
-    ):
-        with pytest.raises(RuntimeError, match=words):
-            getattr(bpy.ops.rfgs, name)()
-    for name in ("stop_job", "resume_job", "forget_job", "import_result"):
+    with pytest.raises(RuntimeError, match="no Python environment is set"):
+        bpy.ops.rfgs.test_environment()
+    needy = ("generate_dataset", "train_gaussians", "evaluate_run")
+    for name in (*needy, "stop_job", "resume_job", "forget_job", "import_result"):
         assert not getattr(bpy.ops.rfgs, name).poll()
     assert not bpy.app.timers.is_registered(following._tick)
     following.follow()
@@ -359,6 +310,38 @@ def test_operators_refuse_in_one_line_what_they_cannot_do(registered: None) -> N
     addon_rfgs.unregister()
     assert not bpy.app.timers.is_registered(following._tick)
     addon_rfgs.register()
+
+
+def test_buttons_of_jobs_say_why_they_cannot_be_pressed(
+    registered: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    with pytest.raises(RuntimeError, match="Save the file first"):
+        bpy.ops.rfgs.generate_dataset()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "room.blend"))
+    for name in ("generate_dataset", "train_gaussians"):
+        with pytest.raises(RuntimeError, match="or run `rfgs addon install` in it"):
+            getattr(bpy.ops.rfgs, name)()
+    monkeypatch.setattr("addon_rfgs.jobs.preferences.environment_path", lambda: sys.executable)
+    assert bpy.ops.rfgs.generate_dataset.poll()
+    monkeypatch.setattr(CHECK, "problems", ["torch is missing"])
+    with pytest.raises(RuntimeError, match="torch is missing"):
+        bpy.ops.rfgs.train_gaussians()
+
+
+def test_training_waits_for_a_dataset(registered: None, jobs, tmp_path: Path, monkeypatch) -> None:
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    assert not starting.dataset_to_come(scene), "a file that was never saved has no folder"
+    scene.rfgs.jobs.dataset_folder = str(tmp_path / "data")
+    monkeypatch.setattr(following, "QUEUE", jobs)
+    assert not starting.dataset_to_come(scene)
+    jobs.jobs.append(queue.Job(plan(tmp_path, "data"), None))
+    assert starting.dataset_to_come(scene), "one is being made"
+    jobs.jobs.clear()
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "dataset.json").write_text("{}")
+    assert starting.dataset_to_come(scene)
 
 
 def test_a_job_is_forgotten_by_command(
@@ -386,13 +369,10 @@ def test_devices_of_one_s_own_are_what_is_generated(tmp_path: Path, registered: 
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "room.blend"))
     scene = bpy.context.scene
     assert starting.generate_plan(scene).radios == "wifi" and not starting.doing_without(scene)
-    assert starting.traced(scene) == "Traces wifi"
     bpy.ops.rfgs.add_device(role="TRANSMITTER")
     assert starting.generate_plan(scene).radios == "scene"
     assert starting.train_plan(scene).radio == "scene" and not starting.doing_without(scene)
-    assert starting.traced(scene) == "Traces scene"
     scene.rfgs.jobs.radios = "mmwave, wifi"
-    assert starting.traced(scene) == ""
     assert starting.generate_plan(scene).arguments().count("--radio=scene") == 0
     assert starting.doing_without(scene) == "left out: transmitter (radio 'scene')"
 

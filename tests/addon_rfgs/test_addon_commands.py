@@ -127,6 +127,61 @@ def write_run(folder: Path, frames: tuple[int, ...]) -> None:
         PlyData([PlyElement.describe(rows, "vertex")]).write(str(path))
 
 
+_OPENED = """
+import bpy, json, sys
+bpy.ops.wm.open_mainfile(filepath=sys.argv[1], use_scripts=False)
+scene = bpy.context.scene
+screen = bpy.context.window_manager.windows[0].screen
+views = [a.spaces.active for a in screen.areas if a.type == "VIEW_3D"]
+graph = bpy.context.evaluated_depsgraph_get()
+clouds = [i for i in scene.objects if i.name.startswith("Gaussians") and not i.hide_viewport]
+colors = [i.evaluated_get(graph).data.color_attributes for i in clouds]
+truth = [i for i in scene.objects if i.display_type == "WIRE"]
+sys.stdout.write("\\n" + json.dumps({
+    "shading": sorted({(v.shading.type, v.shading.color_type) for v in views}),
+    "through": sorted({v.region_3d.view_perspective for v in views}),
+    "sidebars": all(v.show_region_ui for v in views),
+    "camera": scene.camera.name, "frame": scene.frame_current, "clouds": len(clouds),
+    "coloured": [c.active_color.name for c in colors], "truth": sorted(i.name for i in truth),
+    "hidden": sorted(i.name for i in scene.objects if i.hide_get()),
+    "said": list(bpy.data.collections["RF-GS Gaussians"].get("rfgs_compared", [])),
+}) + "\\n")
+"""
+
+
+def test_an_inspection_opens_in_colour_through_a_camera_past_the_walls(
+    scenes: Path, addon, python, tmp_path: Path
+) -> None:
+    """The room's own camera stands behind a wall that is put there; people are thin lines."""
+    write_run(tmp_path / "run", (1, 3, 4))
+    walled, blend = tmp_path / "walled.blend", tmp_path / "inspect.blend"
+    wall = (
+        "import bpy, sys; bpy.ops.wm.open_mainfile(filepath=sys.argv[1]); s = bpy.context.scene; "
+        "c = [i for i in s.objects if i.type == 'CAMERA']; "
+        "[bpy.data.objects.remove(i) for i in c]; "
+        "c = bpy.data.objects.new('eye', bpy.data.cameras.new('eye')); "
+        "s.collection.objects.link(c); "
+        "c.location = (0, -6, 1); c.rotation_euler = (1.5708, 0, 0); "
+        "bpy.ops.mesh.primitive_cube_add(location=(0, -4, 1), scale=(4, .05, 3)); "
+        "bpy.context.object.name = 'wall'; "
+        "bpy.ops.mesh.primitive_cube_add(location=(9, 9, 1)); bpy.context.object.name = 'aside'; "
+        "bpy.ops.wm.save_as_mainfile(filepath=sys.argv[2])"
+    )
+    python("-c", wall, scenes / "room.blend", walled, must_work=True)
+    more = ("--compare", "--out", blend, "--picture", tmp_path / "a.png", "--camera", "eye")
+    more += ("--resolution", "32", "--samples", "1")
+    done = addon(walled, "import", tmp_path / "run", *more)
+    assert done.returncode == 0, done.stderr
+    seen = json.loads(python("-c", _OPENED, blend).stdout.splitlines()[-1])
+    assert seen["shading"] == [["SOLID", "VERTEX"]] and seen["through"] == ["CAMERA"]
+    assert seen["sidebars"] and seen["frame"] == 3 and seen["clouds"] == 2
+    assert seen["coloured"] == ["rfgs_color"] * 2
+    assert seen["truth"], "what moves is drawn as lines"
+    assert seen["camera"] == "eye"
+    assert "wall" in seen["hidden"] and "aside" not in seen["hidden"]
+    assert seen["said"][0].startswith("Median ") and "in 3 frames" in seen["said"][1]
+
+
 _LOOK = """
 import bpy, json, sys
 bpy.ops.wm.open_mainfile(filepath=sys.argv[1], use_scripts=False)
@@ -150,7 +205,8 @@ def test_import_saves_a_file_that_shows_each_frame_without_the_add_on(
 ) -> None:
     write_run(tmp_path / "run", (1, 3, 4))
     blend, picture = tmp_path / "inspect.blend", tmp_path / "picture.png"
-    arguments = ("--out", blend, "--picture", picture, "--resolution", "64", "--mode", "ellipsoids")
+    shapes = ("--mode", "ellipsoids", "--no-solid-view")
+    arguments = ("--out", blend, "--picture", picture, "--resolution", "64", *shapes)
     done = addon(scenes / "room.blend", "import", tmp_path / "run", *arguments)
     assert done.returncode == 0, done.stderr
     assert len(done.stdout.splitlines()) == 1

@@ -16,6 +16,7 @@ from tiny_dataset import write_tiny_dataset
 
 import rfgs_core
 from rfgs_core import open_dataset
+from rfgs_core.articulated import people
 from rfgs_core.extras import EXTRA_OF
 
 
@@ -51,6 +52,8 @@ def main() -> None:
     assert sequence.radio("wifi")["csi"].shape == (2, 4, 32, 16)
     assert np.isfinite(sequence.csi("wifi", 1)).all()
     assert sequence.depth(sequence.cameras[0]["name"], 1).shape == (24, 24)
+
+    assert people().body(np.zeros(3)).height_m > 1.5
 
     works("rfgs-factory", "validate", data)
     works("rfgs-factory", "stats", data)

@@ -27,6 +27,7 @@ def play(stage: Any) -> Iterator[float]:
     seen["imported"] = clouds()
     frame_clouds(stage)
     yield from stage.shoot("points", "VIEW")
+    seen["at_once"] = [shading.type, shading.color_type]
     yield from stage.click("rfgs.color_solid_view")
     yield 1.0
     seen["shading"] = [shading.type, shading.color_type]

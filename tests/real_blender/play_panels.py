@@ -12,6 +12,11 @@ import bpy
 
 def play(stage: Any) -> Iterator[float]:
     """Notes which panels drew, with a mesh and with an Empty as active object."""
+    run, dataset = stage.arguments
+    settings = bpy.context.scene.rfgs
+    # Panels that wait for something: Gaussians, and a dataset.
+    settings.gaussians.path, settings.jobs.dataset_folder = run, dataset
+    bpy.ops.rfgs.import_gaussians()
     yield from stage.open_tab()
     drawn: set[str] = set()
     for panel in our_panels():

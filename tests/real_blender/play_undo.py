@@ -107,7 +107,7 @@ def steps() -> list[Step]:
         Step("import_gaussians", prepare=name_files),
         Step("add_crop_box"),
         Step("update_display", prepare=spoil_display),
-        Step("color_solid_view"),
+        Step("color_solid_view", prepare=show_points),
         Step("compare_gaussians", prepare=drop_crop),
         Step("import_result", prepare=finish_job),
         Step("show_paths"),
@@ -149,6 +149,10 @@ def name_files(_stage: Any, folder: Path) -> None:
 def spoil_display(stage: Any, _folder: Path) -> None:
     display = stage.part("gaussians.display")
     display.set_display(item("Gaussians static"), display.Display(size=3.0))
+
+
+def show_points(_stage: Any, _folder: Path) -> None:
+    bpy.context.scene.rfgs.gaussians.solid_view = False
 
 
 def drop_crop(_stage: Any, _folder: Path) -> None:

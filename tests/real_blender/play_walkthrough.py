@@ -55,7 +55,7 @@ def look_from_above(stage: Any) -> None:
 
 def materials(stage: Any) -> Iterator[float]:
     """What radio sees of the room."""
-    yield from tab(stage, "RFGS_PT_material", "RFGS_PT_guesses")
+    yield from tab(stage, "RFGS_PT_check", "RFGS_PT_material", "RFGS_PT_guesses")
     bpy.context.view_layer.objects.active = bpy.data.objects["wall_north"]
     bpy.context.scene.rfgs.devices.overlay = False
     with stage.override():
@@ -114,7 +114,7 @@ def gaussians(stage: Any) -> Iterator[float]:
 
 def paths(stage: Any) -> Iterator[float]:
     """The strongest paths of one link."""
-    yield from tab(stage, "RFGS_PT_paths")
+    yield from tab(stage, "RFGS_PT_gaussians", "RFGS_PT_paths")
     said = bpy.context.scene.rfgs.paths
     said.tx_device, said.rx_device, said.count, said.radius_m = 0, 2, 40, 0.012
     bpy.ops.rfgs.show_paths()

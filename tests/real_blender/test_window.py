@@ -31,7 +31,11 @@ def tiny_blend(python, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_every_panel_is_drawn(blender, tiny_blend: Path, tmp_path: Path) -> None:
-    done = play(blender, HERE / "play_panels.py", tiny_blend, tmp_path, size=(1400, 2400))
+    run, dataset = write_run(tmp_path / "run", (1, 3)), tmp_path / "dataset"
+    dataset.mkdir()
+    (dataset / "dataset.json").write_text("{}")
+    script = HERE / "play_panels.py"
+    done = play(blender, script, tiny_blend, tmp_path, run, dataset, size=(1400, 2400))
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
     assert "Traceback" not in done.stdout + done.stderr
     drawn, expected = json.loads((tmp_path / "drawn.json").read_text())

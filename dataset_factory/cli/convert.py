@@ -16,14 +16,15 @@ class ConvertArgs:
     """Writes a dataset in another tool's format.
 
     nerfstudio and d-nerf: pictures with cameras and time. colmap: the first frame's pictures as a
-    text model with points. nerf2: angular spectra per receiving array. mat: channels and labels
-    for MATLAB. deepmimo: the paths of a dataset made with `generate --paths`, a scenario per radio
-    and a scene per frame; put them into the folder deepmimo_scenarios and load them by radio.
+    text model with points. coco: people with masks, boxes and keypoints. nerf2: angular spectra per
+    receiving array. mat: channels and labels for MATLAB. deepmimo: the paths of a dataset made with
+    `generate --paths`, a scenario per radio and a scene per frame; put them into the folder
+    deepmimo_scenarios and load them by radio.
     """
 
     dataset: tyro.conf.Positional[Path]
     """Folder of the dataset."""
-    to: Literal["nerfstudio", "d-nerf", "colmap", "nerf2", "mat", "deepmimo"]
+    to: Literal["nerfstudio", "d-nerf", "colmap", "coco", "nerf2", "mat", "deepmimo"]
     """Format."""
     out: Path
     """Folder to make."""

@@ -15,6 +15,7 @@ FORMATS: dict[str, tuple[str, tuple[str, ...]]] = {
     "nerfstudio": ("nerfstudio", ("images", "depth", "mask", "geometry")),
     "d-nerf": ("d_nerf", ("images",)),
     "colmap": ("colmap", ("images", "depth", "mask", "geometry")),
+    "coco": ("coco", ("images", "mask", "geometry")),
     "nerf2": ("nerf2", ("csi",)),
     "mat": ("mat", ("csi", "csi_static")),
     "deepmimo": ("deepmimo", ("paths",)),

@@ -14,11 +14,12 @@ from dataset_factory.make.impair import impair_radio
 from dataset_factory.make.render import render
 from dataset_factory.make.sequence import describe_sequence, write_geometry
 from dataset_factory.plan.contents import versions
-from dataset_factory.plan.disk import refuse_small_disk, space
-from dataset_factory.plan.folder import locked, open_folder
+from dataset_factory.plan.disk import Space, refuse_small_disk, space
+from dataset_factory.plan.folder import claim_taken_back, locked, note_taste, open_folder
 from dataset_factory.plan.job import Job
+from dataset_factory.plan.price import price_line
 from dataset_factory.plan.progress import progress_bar
-from dataset_factory.plan.speed_cache import remember
+from dataset_factory.plan.speed_cache import recalled, remember
 from dataset_factory.scene.bundle import Bundle, read_bundle
 from dataset_factory.scene.devices import check_scene, choose_devices
 from dataset_factory.scene.radios import SCENE_RADIO, scene_radio
@@ -66,6 +67,7 @@ def generate(job: Job) -> bool:
     logger.info("%s: %s", job.out, "continuing" if begun else "a new dataset")
     with locked(job):
         sweep(job.out, ".tmp-*", "*.partial")
+        note_taste(job, begun)
         info = DatasetInfo(versions(), asdict(job.plan), job.plan.seed, _contents(job), [job.name])
         with job.stage("export"):
             bundle = _export(job)
@@ -79,16 +81,21 @@ def generate(job: Job) -> bool:
             write_dataset_info(job.out, info)
         sequence = _prepare(job, bundle, devices, guesses)
         needed = space(job, bundle, sequence)
-        refuse_small_disk(job, needed.bytes(len(sequence.frames)))
+        with claim_taken_back(job, begun):
+            refuse_small_disk(job, needed.bytes(len(sequence.frames)))
+        logger.info("%s", _price(replace(job, plan=asked), sequence, needed))
         with job.stage("trace"):
             trace(job, bundle, sequence)
         needed = space(job, bundle, sequence)
-        if job.plan.impairments:
+        if job.plan.impairments and not job.taste:
             with job.stage("impair"):
                 _impair(job)
         if job.plan.images:
             with job.stage("render"):
                 render(job, sequence)
+        if job.taste:
+            remember(replace(job, plan=asked), len(sequence.frames), len(sequence.cameras), needed)
+            return True
         with job.stage("finish"):
             write_geometry(job.files, bundle)
             if job.plan.images:
@@ -98,10 +105,15 @@ def generate(job: Job) -> bool:
                 job.out,
                 DatasetInfo(made, info.config, info.root_seed, info.has, info.sequences),
             )
-    shutil.rmtree(job.work)
     # Later estimates ask before they know the scene's radio.
     remember(replace(job, plan=asked), len(sequence.frames), len(sequence.cameras), needed)
+    shutil.rmtree(job.work)
     return True
+
+
+def _price(job: Job, sequence: SequenceInfo, needed: Space) -> str:
+    frames, cameras = len(sequence.frames), len(sequence.cameras) if job.plan.images else 0
+    return price_line(recalled(job), frames, cameras, len(job.plan.radios), needed.bytes(frames))
 
 
 def _tell_depth(job: Job) -> None:

@@ -24,6 +24,9 @@ def render(job: Job, sequence: SequenceInfo) -> None:
     cameras = [row["name"] for row in sequence.cameras]
     rendered = job.work / "rendered"
     missing = missing_pictures(job.files, sequence.frames)
+    if job.taste:
+        # Two pictures tell the time from one to the next.
+        missing = missing[: 1 if len(cameras) > 1 else 2]
     size = ["--out", str(rendered), *job.picture_size, "--samples", str(job.plan.samples)]
     for run in frame_runs(missing):
         shutil.rmtree(rendered, ignore_errors=True)
@@ -41,7 +44,7 @@ def render(job: Job, sequence: SequenceInfo) -> None:
             arguments = [*size, "--frames", run, "--passes"]
             job.run_blender("groundtruth", *arguments, progress=encode)
         _encode(job, rendered, cameras, frames)
-    if any(not job.files.image_empty(camera).is_file() for camera in cameras):
+    if not job.taste and any(not job.files.image_empty(camera).is_file() for camera in cameras):
         with progress_bar("empty room") as progress:
             frame = str(sequence.frames[0])
             arguments = [*size, "--frames", f"{frame}:{frame}", "--empty"]

@@ -43,6 +43,8 @@ class Job:
     """Speed of the stages of this run that had enough steps to tell."""
     traced: list[tuple[str, int | None, dict[str, Any]]] = field(default_factory=list)
     """Radio, frame and answer (seconds per stage, memory) of each channel traced in this run."""
+    taste: bool = False
+    """Make only as much of each stage as tells its speed; what is made stays."""
 
     @property
     def work(self) -> Path:

@@ -110,7 +110,7 @@ def _pictures(sequence: Sequence, timeline: Timeline, folder: Path) -> list[dict
             picture_strip(sequence, timeline),
             folder / "pictures.png",
             "Pictures over time",
-            "Pictures at evenly spread moments [s]; the band says what each person does.",
+            "Pictures at evenly spread moments; the band says what each person does.",
             strip=True,
         ),
         _figure(

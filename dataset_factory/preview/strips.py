@@ -32,6 +32,8 @@ MOST_CAMERAS = 2
 PANEL_IN = 1.25
 GAP_IN = 0.16
 
+TIME_LABEL = "time [s]"
+
 _INK = "#39424f"
 _LABEL_COLOURS = ("#3d7edb", "#d9722e", "#2e9e6b", "#a25bc4", "#c9a227", "#c24b6e")
 
@@ -46,17 +48,29 @@ class Timeline:
     """Right end [s]."""
     shown: list[int]
     """Frames whose pictures are shown, evenly spread."""
+    half_s: float
+    """Half the time from one frame to the next [s]."""
 
     @staticmethod
     def of(sequence: Sequence) -> Timeline:
-        """The time axis of a sequence: half a frame beyond its first and last."""
+        """The time axis of a sequence: where the data of its radios begin and end."""
         times = [sequence.time_s(frame) for frame in sequence.frames]
-        half = 0.5 * (min(np.diff(times)) if len(times) > 1 else 1.0 / sequence.fps)
-        start, end = times[0] - half, times[-1] + half
+        half = 0.5 * float(min(np.diff(times)) if len(times) > 1 else 1.0 / sequence.fps)
+        spans = [_span_s(sequence, radio, half) for radio in sequence.radios]
+        start = min((span[0] for span in spans), default=times[0] - half)
+        end = max((span[1] for span in spans), default=times[-1] + half)
         across = min(MOST_ACROSS, len(times))
         centres = start + (np.arange(across) + 0.5) * (end - start) / across
         nearest = [int(np.abs(np.array(times) - centre).argmin()) for centre in centres]
-        return Timeline(start, end, [sequence.frames[index] for index in nearest])
+        return Timeline(start, end, [sequence.frames[index] for index in nearest], half)
+
+
+def _span_s(sequence: Sequence, radio: str, half_s: float) -> tuple[float, float]:
+    """When a radio's samples begin and end [s]; the only one of a frame lasts as long as it."""
+    ends = [sequence.sample_times_s(radio, sequence.frames[index]) for index in (0, -1)]
+    if len(ends[0]) > 1 and ends[0][1] > ends[0][0]:
+        half_s = 0.5 * float(ends[0][1] - ends[0][0])
+    return float(ends[0][0]) - half_s, float(ends[1][-1]) + half_s
 
 
 def picture_strip(sequence: Sequence, timeline: Timeline) -> Figure:
@@ -65,7 +79,7 @@ def picture_strip(sequence: Sequence, timeline: Timeline) -> Figure:
     across, (left, right) = len(timeline.shown), MARGINS
     slot = (right - left) / across
     rows = [WIDTH_IN * slot * 0.96 * row["height"] / row["width"] for row in cameras]
-    band = 0.55
+    band = 0.72
     height = sum(rows) + 0.06 * len(rows) + band
     figure = Figure(figsize=(WIDTH_IN, height))
     top = 1.0
@@ -78,14 +92,14 @@ def picture_strip(sequence: Sequence, timeline: Timeline) -> Figure:
             axis.axis("off")
         figure.text(left - 0.01, top + 0.5 * tall / height, row["name"], ha="right", va="center")
         top -= 0.06 / height
-    axis = figure.add_axes((left, 0.28 / height, right - left, 0.2 / height))
+    axis = figure.add_axes((left, 0.45 / height, right - left, 0.2 / height))
     _action_band(axis, sequence, timeline)
     return figure
 
 
 def _action_band(axis: Any, sequence: Sequence, timeline: Timeline) -> None:
     """What each person does over time, and ticks where the pictures above were taken."""
-    half = 0.5 * (timeline.end_s - timeline.start_s) / len(sequence.frames)
+    half = timeline.half_s
     rows = [sequence.actions(frame) for frame in sequence.frames]
     names = sorted({action for row in rows for action in row})
     for person in range(max(map(len, rows), default=0)):
@@ -114,6 +128,7 @@ def _action_band(axis: Any, sequence: Sequence, timeline: Timeline) -> None:
         axis.axvline(sequence.time_s(frame), ymin=1.0, ymax=1.3, color=_INK, lw=1, clip_on=False)
     axis.set(xlim=(timeline.start_s, timeline.end_s), yticks=[])
     axis.set_ylabel("action", rotation=0, ha="right", va="center", fontsize=8)
+    axis.set_xlabel(TIME_LABEL, fontsize=8, labelpad=2)
     axis.spines[:].set_visible(False)
     axis.tick_params(labelsize=7, length=2)
 
@@ -137,6 +152,7 @@ def channel_strip(sequence: Sequence, radio: str, timeline: Timeline, seen: Watc
         axis.set_xlim(timeline.start_s, timeline.end_s)
         axis.tick_params(labelsize=7, length=2, labelbottom=panel is panels[-1])
         top -= GAP_IN
+    axis.set_xlabel(TIME_LABEL, fontsize=8, labelpad=2)
     _image_row(figure, sequence, radio, timeline, seen, (0.42 / total, square / total))
     return figure
 

@@ -46,7 +46,10 @@ def trace(job: Job, bundle: Bundle, sequence: SequenceInfo) -> None:
     tasks = [
         Task(radio, frame)
         for radio in job.plan.radios
-        for frame in missing_channels(job.files, radio, sequence.frames, job.plan.paths)
+        for frame in missing_channels(job.files, radio, sequence.frames, job.plan.paths)[
+            # The first ones of each process tell its start alone.
+            : 2 * job.workers if job.taste else None
+        ]
     ]
     if not tasks:
         return

@@ -18,6 +18,7 @@ from scipy.io import loadmat
 from scipy.spatial.transform import Rotation
 
 from dataset_factory.convert import FORMATS, convert
+from dataset_factory.convert.coco import run_lengths
 from dataset_factory.make.impair import impair_dataset
 from rfgs_core.dataset import Sequence, open_dataset
 from rfgs_core.dataset.csi_store import write_csi
@@ -175,6 +176,50 @@ def test_colmap_model_projects_the_person_onto_its_mask(
     assert len(np.unique(points[:, 0])) == len(points) == 20_000
     low, high = sequence.bounds_m
     assert (points[:, 1:4] >= low - 1e-5).all() and (points[:, 1:4] <= high + 1e-5).all()
+
+
+def unrolled(found: dict[str, Any]) -> np.ndarray:
+    """The mask of a COCO annotation, by the format's own rule."""
+    height, width = found["segmentation"]["size"]
+    flat, value = [], 0
+    for count in found["segmentation"]["counts"]:
+        flat += [value] * count
+        value = 1 - value
+    flat += [0] * (height * width - len(flat))
+    return np.array(flat).reshape(width, height).T
+
+
+def test_coco_masks_boxes_and_joints_are_the_persons(
+    tiny_dataset: Path, sequence: Sequence, tmp_path: Path
+) -> None:
+    convert(tiny_dataset, "coco", tmp_path / "coco")
+    folder = tmp_path / "coco"
+    parts = [json.loads((folder / f"{name}.json").read_text()) for name in ("train", "test")]
+    images = [row for part in parts for row in part["images"]]
+    assert len(images) == 4 * len(sequence.frames) == len({row["id"] for row in images})
+    files = {row["id"]: row["file_name"] for row in images}
+    for part in parts:
+        (category,) = part["categories"]
+        assert category["keypoints"][CENTRE] == "thorax" and [9, 10] in category["skeleton"]
+        for found in part["annotations"]:
+            name, number = Path(files[found["image_id"]]).stem.split("_")
+            mask = sequence.mask(name, int(number)) == found["instance"]
+            np.testing.assert_array_equal(unrolled(found), mask)
+            assert found["area"] == mask.sum()
+            left, top, width, height = found["bbox"]
+            assert mask[top : top + height, left : left + width].sum() == mask.sum()
+            assert mask[:, left].any() and mask[top].any()
+            column, row, seen = found["keypoints"][3 * CENTRE : 3 * CENTRE + 3]
+            assert seen == 2 and on_mask(sequence, name, int(number), column, row)
+    assert sum(len(part["annotations"]) for part in parts) == len(images)
+
+
+@pytest.mark.parametrize(
+    ("mask", "counts"),
+    [([[0, 1], [0, 1]], [2, 2]), ([[1, 0], [1, 1]], [0, 2, 1, 1]), ([[0, 0], [1, 0]], [1, 1, 2])],
+)
+def test_run_lengths_go_down_the_columns(mask: list[list[int]], counts: list[int]) -> None:
+    assert run_lengths(np.array(mask, bool)) == counts
 
 
 def test_nerf2_spectra_point_at_the_transmitter(tiny_copy: Path, tmp_path: Path) -> None:

@@ -91,11 +91,25 @@ def test_shown_pictures_are_nearest_to_their_place_on_the_axis(sequence: Sequenc
     assert timeline.shown == [1, 2]
 
 
+def test_strips_end_where_the_packets_of_the_last_frame_do(
+    sequence: Sequence, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ten packets, 1 ms apart, at the beginning of each frame: nothing is known after them."""
+    packets_s = 1e-3 * np.arange(10)
+    monkeypatch.setattr(
+        Sequence, "sample_times_s", lambda self, _radio, frame: self.time_s(frame) + packets_s
+    )
+    timeline = Timeline.of(sequence)
+    assert (timeline.start_s, timeline.end_s) == pytest.approx((-0.0005, 0.1095))
+    assert timeline.half_s == pytest.approx(0.05)
+
+
 def test_every_panel_has_the_same_axis_in_the_same_place(sequence: Sequence) -> None:
     timeline, seen = Timeline.of(sequence), watch(sequence, "wifi")
     figure = channel_strip(sequence, "wifi", timeline, seen)
     panels = [axis for axis in figure.axes if np.allclose(axis.get_xlim(), (-0.05, 0.15))]
     assert len(panels) == 3
+    assert [axis.get_xlabel() for axis in panels] == ["", "", "time [s]"]
     for axis in panels:
         box = axis.get_position()
         assert (box.x0, box.x1) == pytest.approx(MARGINS)

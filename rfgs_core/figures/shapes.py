@@ -16,8 +16,10 @@ from rfgs_core.render.view import moving_gaussians
 SIDES = (("front", 0, 2), ("side", 1, 2), ("top", 0, 1))
 #: Margin around the true person and everything that is predicted [m].
 MARGIN_M = 0.25
-#: Gaussians are coloured over this range below the strongest [dB].
+#: Gaussians weaker than the strongest by more are left out [dB].
 RANGE_DB = 20.0
+#: Colours are spread between these percentiles of their powers, over at least so much [dB].
+PERCENTILES, LEAST_SPAN_DB = (5.0, 95.0), 1.0
 #: At most so many points of the true surface are drawn.
 DRAWN = 5000
 
@@ -31,6 +33,7 @@ def shape_chart(scene: Scene, frame: int) -> str:
     filtered = scene.grid.centres(best_voxels(default_score(evidence), scene.voxels))
     means, power_db = _strong_gaussians(scene, frame)
     low, high = _frame_bounds(scene, [reference, own, filtered])
+    weak_db, strong_db = _shown_range(power_db)
     titles = ("true mesh", "RF-GS Gaussians", "matched filter")
     with new_figure(10.5, 10.0) as figure:
         axes = figure.subplots(3, 3)
@@ -46,15 +49,23 @@ def shape_chart(scene: Scene, frame: int) -> str:
                     xlabel="xyz"[across] + " [m]",
                     ylabel="xyz"[up] + " [m]",
                 )
-            style = {"cmap": power_colours(), "vmin": -RANGE_DB, "vmax": 0.0, "alpha": 0.8}
+            style = {"cmap": power_colours(), "vmin": weak_db, "vmax": strong_db, "alpha": 0.8}
             shown = means[:, [across, up]].T
             points = axes[1, column].scatter(*shown, s=5, c=power_db, lw=0, **style)
             shown = filtered[:, [across, up]].T
             axes[2, column].scatter(*shown, s=5, c=BASELINE, alpha=0.35, lw=0)
         bar = figure.colorbar(points, ax=axes, shrink=0.3, pad=0.01)
-        bar.set_label("reflected power [dB]")
+        bar.set_label("reflected power, strongest Gaussian 0 [dB]")
         bar.outline.set_visible(False)  # type: ignore[operator]
         return figure_uri(figure)
+
+
+def _shown_range(power_db: Float[np.ndarray, "M"]) -> tuple[float, float]:
+    """Powers of the first and last colour [dB]: most Gaussians lie between them."""
+    if not len(power_db):
+        return -RANGE_DB, 0.0
+    low, high = np.percentile(power_db, PERCENTILES)
+    return float(min(low, high - LEAST_SPAN_DB)), float(high)
 
 
 def _strong_gaussians(

@@ -75,7 +75,7 @@ def figure_uri(figure: Figure) -> str:
     stream = io.BytesIO()
     # Without this entry the version of matplotlib would change the bytes.
     figure.savefig(stream, format="png", dpi=150, metadata={"Software": None})
-    return _uri(stream.getvalue(), "png")
+    return bytes_uri(stream.getvalue(), "png")
 
 
 def picture_uri(rgb: UInt8[np.ndarray, "h w 3"] | Float[np.ndarray, "h w 3"]) -> str:
@@ -86,13 +86,14 @@ def picture_uri(rgb: UInt8[np.ndarray, "h w 3"] | Float[np.ndarray, "h w 3"]) ->
         rgb = (np.clip(rgb, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
     stream = io.BytesIO()
     Image.fromarray(rgb).save(stream, format="png", optimize=True)
-    return _uri(stream.getvalue(), "png")
+    return bytes_uri(stream.getvalue(), "png")
 
 
 def file_uri(data: bytes) -> str:
     """The bytes of a PNG file as an embedded picture."""
-    return _uri(data, "png")
+    return bytes_uri(data, "png")
 
 
-def _uri(data: bytes, kind: str) -> str:
+def bytes_uri(data: bytes, kind: str) -> str:
+    """The bytes of a picture file of a kind, say png, as an embedded picture."""
     return f"data:image/{kind};base64,{base64.b64encode(data).decode('ascii')}"

@@ -22,9 +22,9 @@ from rfgs_core.figures.shapes import shape_chart
 from rfgs_core.figures.style import BASELINE, file_uri, picture_uri
 from rfgs_core.files import write_text
 from rfgs_core.render.view import pictures_of
+from rfgs_core.report.cards import headline_cards, in_words
 from rfgs_core.report.metrics_file import read_metrics
 from rfgs_core.report.page import (
-    Card,
     Page,
     RunSection,
     Shot,
@@ -34,7 +34,8 @@ from rfgs_core.report.page import (
     render_page,
     stage_times,
 )
-from rfgs_core.report.tables import metric_tables, show
+from rfgs_core.report.player import player_of
+from rfgs_core.report.tables import metric_tables
 
 #: Pictures of the scene and rows of rendered views, at most.
 SCENE_SHOTS, VIEW_ROWS = 4, 4
@@ -149,7 +150,8 @@ def _section(run: EvaluatedRun, metrics: dict[str, Any]) -> RunSection:
     return RunSection(
         anchor=f"run-{radio.name}",
         title=f"{radio.name}: {radio.freq_min_hz / 1e9:.4g}–{radio.freq_max_hz / 1e9:.4g} GHz",
-        cards=_cards(metrics),
+        cards=headline_cards(metrics),
+        player=player_of(run),
         verdicts=[_verdict(sentence) for sentence in metrics["verdicts"]],
         channel=Shot(
             channel_chart(scene, frame),
@@ -188,49 +190,10 @@ def _motion(run: EvaluatedRun) -> Shot | None:
     )
 
 
-def _cards(metrics: dict[str, Any]) -> list[Card]:
-    """Headline numbers: F10 with its most important baselines, position, pictures."""
-    own = metrics["geometry"]
-    cards = []
-    for key, label in (("f05", "F5"), ("f10", "F10")):
-        beside, subcarriers = [], []
-        for name in ("matched_filter", "template", "oracle_init"):
-            value = metrics["baselines"][name]["geometry"].get(key)
-            if value is not None:
-                beside.append(f"{name} {show(value, 3)}")
-                subcarriers.append(name == "oracle_init" or own[key] > value)
-        subcarrier = "" if not subcarriers else "won" if all(subcarriers) else "lost"
-        cards.append(Card(show(own[key], 3), label, ", ".join(beside), subcarrier))
-    people = metrics.get("people")
-    if people is None:
-        note = f"tracked in {show(100 * own['tracked'], 0)} % of the frames"
-        cards.append(Card(f"{show(own['centroid_m'], 2)} m", "centroid error", note))
-    else:
-        note = f"{show(100 * people['found'], 0)} % of the people found"
-        cards.append(Card(f"{show(people['centroid_m'], 2)} m", "centroid error, per person", note))
-    rf = metrics["rf"]
-    known = {
-        name: part["rf"]["element_snr_db"]
-        for name, part in metrics["baselines"].items()
-        if part["rf"]["element_snr_db"] is not None
-    }
-    mine = rf["element_snr_db"]
-    # Arrays of two columns have none to hold out.
-    if known and mine is not None:
-        best = max(known, key=lambda name: known[name])
-        subcarrier = "won" if mine > known[best] else "lost"
-        note = f"best baseline: {best} {show(known[best], 1)} dB"
-        cards.append(Card(f"{show(mine, 1)} dB", "SNR, unseen elements", note, subcarrier))
-    train_s = metrics["train_s"]
-    time = f"trained in {train_s:.0f} s" if train_s is not None else "training time not recorded"
-    cards.append(Card(f"{metrics['n_gaussians']:,}".replace(",", " "), "Gaussians", time))
-    return cards
-
-
 def _verdict(sentence: str) -> Verdict:
     for prefix, subcarrier in ((WON, "won"), (LOST, "lost"), (OPEN, "open")):
         if sentence.startswith(prefix):
-            return Verdict(subcarrier, prefix.rstrip(": "), sentence[len(prefix) :])
+            return Verdict(subcarrier, prefix.rstrip(": "), in_words(sentence[len(prefix) :]))
     return Verdict("open", "Note", sentence)
 
 

@@ -38,6 +38,24 @@ class Card:
 
 
 @dataclass(frozen=True)
+class Player:
+    """Pictures of all frames, true and fitted."""
+
+    camera: str
+    """Through which camera."""
+    seen: bool
+    """Whether the shader was fitted to some of the true pictures."""
+    frames: list[int]
+    """Blender frame numbers."""
+    time_s: list[float]
+    """Their times [s]."""
+    true: list[str]
+    """Data URI of each true picture."""
+    fitted: list[str]
+    """Data URI of the Gaussians of each frame, drawn into the empty room."""
+
+
+@dataclass(frozen=True)
 class Verdict:
     """One sentence of judgement."""
 
@@ -59,6 +77,8 @@ class RunSection:
     """Heading."""
     cards: list[Card]
     """Headline numbers."""
+    player: Player | None
+    """True beside fitted; None without pictures."""
     verdicts: list[Verdict]
     """Won and lost comparisons."""
     channel: Shot

@@ -1,18 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import base64
+import io
 import json
 import re
 import shutil
+from html import unescape
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from rfgs_core.cli.compare import CompareArgs
 from rfgs_core.cli.compare import run as compare
 from rfgs_core.errors import RfgsError, RfgsFormatError
+from rfgs_core.evaluate.baselines import BASELINES
 from rfgs_core.report import write_demo_report, write_run_report
-from rfgs_core.report.build import _cards
+from rfgs_core.report.cards import WORDS, headline_cards, in_words
 from rfgs_core.report.tables import metric_tables, show, text_table
 
 HEADINGS = (
@@ -69,10 +75,50 @@ def test_report_before_evaluation_says_what_to_do(surface_run) -> None:
 def test_radios_without_unseen_elements_have_no_card_of_them(evaluated_run) -> None:
     """Arrays of two columns hold none out, so nobody is measured on any."""
     metrics = json.loads((evaluated_run.path / "metrics.json").read_text())
-    assert any(card.label == "SNR, unseen elements" for card in _cards(metrics))
+    assert any("antennas it never heard" in card.label for card in headline_cards(metrics))
     for part in (metrics, *metrics["baselines"].values()):
         part["rf"]["element_snr_db"] = None
-    assert not any(card.label == "SNR, unseen elements" for card in _cards(metrics))
+    assert not any("antennas it never heard" in card.label for card in headline_cards(metrics))
+
+
+def test_cards_compare_with_the_strongest_baseline_whichever_it_is(evaluated_run) -> None:
+    metrics = json.loads((evaluated_run.path / "metrics.json").read_text())
+    metrics["geometry"]["f10"] = 0.80
+    for name in ("omp", "body_prior", "clean", "oracle_init"):
+        for part in metrics["baselines"].values():
+            if (part.get("geometry") or {}).get("f10") is not None:
+                part["geometry"]["f10"] = 0.5
+        metrics["baselines"].setdefault(name, {}).setdefault("geometry", {})["f10"] = 0.9
+        card = headline_cards(metrics)[0]
+        assert card.value == "80 %" and "within 10 cm" in card.label
+        if name == "oracle_init":  # the ceiling is no competitor
+            assert card.subcarrier == "won" and "strongest baseline: 50 %" in card.note
+            assert "started on the truth: 90 %" in card.note
+        else:
+            assert card.subcarrier == "lost"
+            assert f"strongest baseline: 90 %, {WORDS[name]} ({name})" in card.note
+    assert set(BASELINES) <= set(WORDS), "every baseline has words"
+
+
+def test_names_of_baselines_stand_behind_what_they_do() -> None:
+    text = in_words("F10 0.8 against 0.6 of matched_filter and template_filled (0.9); 1 of linear.")
+    assert text == (
+        "F10 0.8 against 0.6 of a plain radar image (matched_filter) and a solid standing figure "
+        "at our own place (template_filled) (0.9); 1 of a straight line between antennas (linear)."
+    )
+
+
+def test_the_player_holds_every_frame_true_and_fitted(evaluated_run) -> None:
+    html = write_run_report(evaluated_run).read_text("utf-8")
+    data = json.loads(unescape(re.search(r"data-player='([^']*)'", html)[1]))
+    assert data["frames"] == evaluated_run.frames
+    for name in ("true", "fitted"):
+        assert len(data[name]) == len(evaluated_run.frames) == len(set(data[name]))
+    camera = re.search(r"<p class=\"quiet\">(cam\d+), ", html)[1]
+    picture = base64.b64decode(data["true"][1].removeprefix("data:image/jpeg;base64,"))
+    shown = np.asarray(Image.open(io.BytesIO(picture)).convert("RGB")).astype(int)
+    true = evaluated_run.sequence.image(camera, evaluated_run.frames[1])[..., :3]
+    assert np.abs(shown - true).mean() < 8
 
 
 def test_tables_mark_the_best_and_say_who_wins(evaluated_run) -> None:

@@ -14,7 +14,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 # that neighbours, which share what is costly to set up, stay together.
 WORKERS ?= 2
 
-.PHONY: demo test test-slow test-blender test-bpy test-wheel docs lint format sync system clean
+.PHONY: demo test test-slow test-blender test-bpy test-wheel docs example release lint format sync system clean
 
 demo: $(READY) system
 	$(VENV)/rfgs demo --out demo
@@ -38,6 +38,22 @@ test-wheel:
 # The site below site/. A link or a name of the API that leads nowhere ends it.
 docs: $(READY)
 	NO_MKDOCS_2_WARNING=1 $(VENV)/mkdocs build --strict --quiet
+
+# The small dataset and run that come with the package (rfgs_core/example.zip), made anew.
+example: $(READY) system
+	rm -rf example
+	$(VENV)/rfgs-factory generate living_room_walk --radio wifi --frames 10:40:6 --cameras 3 --resolution 112 --samples 12 --out example/dataset
+	$(VENV)/rfgs train example/dataset --radio wifi --gaussians 1500 --out example/run
+	$(VENV)/rfgs eval example/run --no-oracle
+	$(VENV)/rfgs pose example/run
+	$(VENV)/python -m rfgs_core.example example
+
+# What a release consists of, below dist/: the wheel, the extension for Blender, and their digests.
+release: $(READY)
+	rm -rf dist
+	$(VENV)/python -m pip wheel --quiet --no-deps --wheel-dir dist .
+	$(VENV)/rfgs addon build --out dist
+	cd dist && sha256sum *.whl *.zip > SHA256SUMS && cat SHA256SUMS
 
 lint: $(READY)
 	$(VENV)/ruff check .

@@ -1,12 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 r"""The moving picture of the README: the true person, and beside it a run's Gaussians.
 
-These commands made docs/person.webp (about twenty minutes on two cores):
+After `make demo`, this made docs/person.webp in a few seconds:
 
-    rfgs-factory generate living_room_walk --radio wifi --frames 10:56:2 --cameras 2 \
-        --resolution 224 --out walk
-    rfgs train walk --radio wifi --iterations 20 --out walk_run
-    python docs/animate.py walk_run --camera cam01 --out docs/person.webp
+    python docs/animate.py demo/run-wifi --camera cam04 --out docs/person.webp
 
 The Gaussians are drawn over the picture of the empty room. Their places come from radio alone;
 their colours were fitted to pictures afterwards, for display.

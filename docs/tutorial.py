@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 r"""A tour of a dataset: its contents, channels, delays, angles, pictures and labels.
 
-Make a dataset first (about two minutes on two cores), then take the tour:
+    python docs/tutorial.py
+
+tours the small dataset that comes with the package; one of your own takes about two minutes:
 
     rfgs-factory generate living_room_walk --radio wifi --frames 10:30:10 --cameras 4 \
         --resolution 128 --out my_dataset
@@ -25,6 +27,7 @@ from rfgs_core import open_dataset
 from rfgs_core.dataset import Dataset, Sequence
 from rfgs_core.dataset.torch_dataset import FrameDataset
 from rfgs_core.errors import RfgsError
+from rfgs_core.example import example_folder
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.layout import rotation
 from rfgs_core.radio.levels import decibels
@@ -210,11 +213,13 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("dataset", type=Path, help="folder of the dataset")
+    parser.add_argument(
+        "dataset", type=Path, nargs="?", help="folder of the dataset; default: the package's own"
+    )
     parser.add_argument("--radio", help="which radio; default: the first")
     parser.add_argument("--out", type=Path, default=Path("tutorial.png"), help="picture to write")
     args = parser.parse_args()
     try:
-        tour(args.dataset, args.radio, args.out)
+        tour(args.dataset or example_folder() / "dataset", args.radio, args.out)
     except RfgsError as error:
         parser.exit(2, f"error: {error}\n")

@@ -22,6 +22,15 @@ STOPPED = 130
 
 MESSAGE = "\nstopped; finished work is kept, run the same command to continue\n"
 
+#: Set for a program that another one of ours has called, which says for both that it stopped.
+CALLED = "RFGS_CALLED"
+
+
+def say_stopped() -> None:
+    """Tells the user once, however many of our programs call each other."""
+    if not os.environ.get(CALLED):
+        sys.stderr.write(MESSAGE)
+
 
 def run_program(module: str) -> NoReturn:
     """Runs `main()` of a module, import included, and leaves Python with its exit code.
@@ -77,7 +86,7 @@ class _Watch:
             return self._stopped()
 
     def _stopped(self) -> int:
-        sys.stderr.write(MESSAGE)
+        say_stopped()
         return STOPPED
 
     def _interrupt(self, _number: int, _frame: FrameType | None) -> None:

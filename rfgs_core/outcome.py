@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 from rfgs_core.errors import RfgsError
 from rfgs_core.extras import how_to_install
-from rfgs_core.interrupts import MESSAGE, STOPPED
+from rfgs_core.interrupts import STOPPED, say_stopped
 
 #: The user named a place that is not theirs, no folder, or no file.
 _WRONG_PLACE = (
@@ -32,12 +32,12 @@ def run_cli(command: Callable[[], int | None]) -> int:
         output has stopped.
     """
     try:
-        return command() or 0
+        return _said(command)
     except RfgsError as error:
         sys.stderr.write(f"error: {error}\n")
         return 2
     except KeyboardInterrupt:
-        sys.stderr.write(MESSAGE)
+        say_stopped()
         return STOPPED
     except ModuleNotFoundError as error:
         remedy = how_to_install(error.name or "")
@@ -63,6 +63,17 @@ def run_cli(command: Callable[[], int | None]) -> int:
             f"error: the disk is full{where}; free some space and run the same command again\n"
         )
         return 2
+
+
+def _said(command: Callable[[], int | None]) -> int:
+    """Runs a command and empties its buffer, as somebody may have stopped reading."""
+    try:
+        code = command() or 0
+    except SystemExit:  # `--help` of a command
+        sys.stdout.flush()
+        raise
+    sys.stdout.flush()
+    return code
 
 
 def _nobody_reads() -> bool:

@@ -7,6 +7,7 @@ import importlib
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,11 @@ from rfgs_core.outcome import run_cli
 
 #: Arguments of commands that name what they write.
 _OUTPUTS = ("out", "json")
+
+
+def _say(text: str, code: int) -> int:
+    sys.stdout.write(text)
+    return code
 
 
 @dataclass(frozen=True)
@@ -45,8 +51,9 @@ class Program:
         """
         given = list(sys.argv[1:] if arguments is None else arguments)
         if not given or given[0] in ("-h", "--help"):
-            sys.stdout.write(self.overview())
-            return 0 if given else 2
+            return run_cli(lambda: _say(self.overview(), 0 if given else 2))
+        if given == ["--version"]:
+            return run_cli(lambda: _say(f"{self.name} {version('rfgs')}\n", 0))
         if given[0] not in self.commands:
             known = ", ".join(self.commands)
             sys.stderr.write(f"error: unknown command {given[0]!r}; expected one of {known}\n")
@@ -58,7 +65,8 @@ class Program:
         lines = "\n".join(self._summary(name) for name in self.commands)
         return (
             f"usage: {self.name} COMMAND ...\n\n{self.introduction}\n\ncommands:\n{lines}\n\n"
-            f"{self.closing}\n`{self.name} COMMAND --help` explains a command.\n"
+            f"{self.closing}\n`{self.name} COMMAND --help` explains a command, `{self.name} "
+            "--version` says which this is.\n"
         )
 
     def _summary(self, name: str) -> str:

@@ -267,6 +267,7 @@ def test_blender_is_taken_from_the_environment(
 #: Every command that writes what OUT names, with what it must be told before that.
 WRITING: dict[str, tuple[str, ...]] = {
     "ablate": ("data", "--radio", "wifi"),
+    "addon": ("build",),
     "compare": ("run", "run"),
     "csi": ("run",),
     "demo": (),
@@ -274,6 +275,7 @@ WRITING: dict[str, tuple[str, ...]] = {
     "export": ("run",),
     "import": ("a.dat",),
     "inspect": ("a.dat",),
+    "limbs": ("--radio", "mmwave"),
     "predict": ("run", "--tx", "0,0,1"),
     "render": ("run",),
     "study": (),

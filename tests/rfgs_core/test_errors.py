@@ -112,3 +112,59 @@ def test_a_reader_that_stops_is_no_error() -> None:
         os.close(writes)
     assert done.returncode == 1
     assert done.stderr == ""
+
+
+@pytest.mark.parametrize(
+    "program",
+    [["rfgs_core.cli"], ["rfgs_core.cli", "train"], ["dataset_factory"], ["addon_rfgs"]],
+)
+@pytest.mark.parametrize("unbuffered", ["1", ""])
+def test_help_that_nobody_reads_to_its_end_is_no_error(program: list[str], unbuffered: str) -> None:
+    """As `rfgs --help | head -1` does; with a full buffer, and with none."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    try:
+        done = subprocess.run(
+            [sys.executable, "-m", *program, "--help"],
+            stdout=writer,
+            stderr=subprocess.PIPE,
+            env={**os.environ, "PYTHONUNBUFFERED": unbuffered},
+            cwd=ROOT,
+            text=True,
+            check=False,
+        )
+    finally:
+        os.close(writer)
+    assert (done.stderr, done.returncode) == ("", 1)
+
+
+def test_a_program_that_calls_another_says_once_that_it_stopped(tmp_path: Path) -> None:
+    """Ctrl-C reaches both, as they share a terminal."""
+    (tmp_path / "inner.py").write_text(
+        "import time\n"
+        "from rfgs_core.interrupts import run_program\n"
+        "def main():\n    print('begun', flush=True)\n    time.sleep(30)\n"
+        "if __name__ == '__main__':\n    run_program('inner')\n"
+    )
+    (tmp_path / "outer.py").write_text(
+        "from rfgs_core.interrupts import run_program\n"
+        "def main():\n"
+        "    from rfgs_core.cli.calls import call\n"
+        "    from rfgs_core.outcome import run_cli\n"
+        "    return run_cli(lambda: call('inner'))\n"
+        "if __name__ == '__main__':\n    run_program('outer')\n"
+    )
+    with subprocess.Popen(
+        [sys.executable, "outer.py"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"},
+        process_group=0,
+        text=True,
+    ) as outer:
+        assert outer.stdout is not None and outer.stdout.readline() == "begun\n"
+        os.killpg(outer.pid, signal.SIGINT)
+        _, told = outer.communicate(timeout=30)
+    assert outer.returncode == 130
+    assert told.count("stopped") == 1 and "Traceback" not in told

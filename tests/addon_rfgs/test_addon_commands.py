@@ -140,7 +140,7 @@ truth = [i for i in scene.objects if i.display_type == "WIRE"]
 sys.stdout.write("\\n" + json.dumps({
     "shading": sorted({(v.shading.type, v.shading.color_type) for v in views}),
     "through": sorted({v.region_3d.view_perspective for v in views}),
-    "sidebars": all(v.show_region_ui for v in views),
+    "asks_for_tab": bool(bpy.data.collections["RF-GS Gaussians"].get("rfgs_opens_tab")),
     "camera": scene.camera.name, "frame": scene.frame_current, "clouds": len(clouds),
     "coloured": [c.active_color.name for c in colors], "truth": sorted(i.name for i in truth),
     "hidden": sorted(i.name for i in scene.objects if i.hide_get()),
@@ -174,7 +174,7 @@ def test_an_inspection_opens_in_colour_through_a_camera_past_the_walls(
     assert done.returncode == 0, done.stderr
     seen = json.loads(python("-c", _OPENED, blend).stdout.splitlines()[-1])
     assert seen["shading"] == [["SOLID", "VERTEX"]] and seen["through"] == ["CAMERA"]
-    assert seen["sidebars"] and seen["frame"] == 3 and seen["clouds"] == 2
+    assert seen["asks_for_tab"] and seen["frame"] == 3 and seen["clouds"] == 2
     assert seen["coloured"] == ["rfgs_color"] * 2
     assert seen["truth"], "what moves is drawn as lines"
     assert seen["camera"] == "eye"

@@ -93,6 +93,10 @@ class CostBar:
     def _total(self) -> float:
         return round(self._left * self._costs.frame_s(self._iterations), 2)
 
+    def _advance(self, cost_s: float) -> None:
+        # Rounding may carry the sum past the total, which tqdm complains of.
+        self._bar.update(min(cost_s, max(self._bar.total - self._bar.n, 0.0)))
+
     def skip(self) -> None:
         """A frame was fitted before."""
         self._left -= 1
@@ -107,18 +111,18 @@ class CostBar:
     def found(self, said: str) -> None:
         """Bodies are found: reflectivities are solved."""
         self._found = time.perf_counter()
-        self._bar.update(self._costs.find_s)
+        self._advance(self._costs.find_s)
         self._bar.set_postfix_str(said)
 
     def solved(self) -> None:
         """Reflectivities are solved: the refinement begins."""
         self._solved = time.perf_counter()
-        self._bar.update(self._costs.solve_s)
+        self._advance(self._costs.solve_s)
 
     def step(self, said: str) -> None:
         """A step of the refinement is done."""
         self._steps += 1
-        self._bar.update(self._costs.step_s)
+        self._advance(self._costs.step_s)
         self._bar.set_postfix_str(said)
 
     def finish_frame(self) -> None:

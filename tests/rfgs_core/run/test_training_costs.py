@@ -98,3 +98,21 @@ def test_a_damaged_note_stops_no_training(clock: Clock, run: Any, tmp_path: Path
     (note,) = (tmp_path / "cache").rglob("*.json")
     note.write_text("{")
     assert recalled(run) is None
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_bar_whose_costs_do_not_add_up_ends_at_its_total(
+    run: Any, clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """0.004 s a stage are rounded away in the total, and still counted one by one."""
+    monkeypatch.setattr(costs, "USUAL", Costs(0.004, 0.004, 0.0004))
+    bar = CostBar(run, STEPS)
+    for _ in run.frames:
+        bar.begin("finding")
+        bar.found("solving")
+        bar.solved()
+        for _ in range(STEPS):
+            bar.step("refining")
+        bar.finish_frame()
+    assert bar._bar.n == bar._bar.total
+    bar.close()

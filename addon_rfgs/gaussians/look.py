@@ -15,14 +15,9 @@ def material(domain: str, attribute: str) -> bpy.types.Material:
         domain: `GEOMETRY` for points and meshes, `INSTANCER` for instances.
         attribute: Name of the colour attribute.
     """
-    name = f"RFGS Gaussians {domain.lower()}"
-    found = bpy.data.materials.get(name)
-    if found is not None:
-        return found
-    made = bpy.data.materials.new(name)
-    if made.node_tree is None:
-        made.use_nodes = True
-    tree = made.node_tree
+    made, tree = _material(f"RFGS Gaussians {domain.lower()}")
+    if tree is None:
+        return made
     shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
     colour = tree.nodes.new("ShaderNodeAttribute")
     colour.attribute_type, colour.attribute_name = domain, attribute
@@ -49,15 +44,10 @@ def splat_material(attribute: str) -> bpy.types.Material:
     Args:
         attribute: Name of the colour attribute of the instances.
     """
-    name = "RFGS Gaussians splats"
-    found = bpy.data.materials.get(name)
-    if found is not None:
-        return found
-    made = bpy.data.materials.new(name)
-    if made.node_tree is None:
-        made.use_nodes = True
+    made, tree = _material("RFGS Gaussians splats")
+    if tree is None:
+        return made
     made.surface_render_method = "BLENDED"
-    tree = made.node_tree
     tree.nodes.clear()
     build = _Shading(tree)
     place = build.add("ShaderNodeNewGeometry")
@@ -78,6 +68,17 @@ def splat_material(attribute: str) -> bpy.types.Material:
         tree.links.new(value, socket)
     tree.links.new(mix.outputs[0], output.inputs["Surface"])
     return made
+
+
+def _material(name: str) -> tuple[bpy.types.Material, Any]:
+    """A material, and its nodes if it is new; None instead of them if it was made before."""
+    found = bpy.data.materials.get(name)
+    if found is not None:
+        return found, None
+    made = bpy.data.materials.new(name)
+    if made.node_tree is None:
+        made.use_nodes = True
+    return made, made.node_tree
 
 
 class _Shading:

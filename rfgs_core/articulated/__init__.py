@@ -13,7 +13,7 @@ from rfgs_core.articulated.inverse import fit_pose
 from rfgs_core.articulated.pose import Pose
 from rfgs_core.articulated.shape_fit import fit_shape
 from rfgs_core.articulated.space import ShapeSpace, people
-from rfgs_core.articulated.surface import facets_of
+from rfgs_core.articulated.surface import facets_of, skinned
 
 __all__ = [
     "BONES",
@@ -26,4 +26,5 @@ __all__ = [
     "fit_shape",
     "grounded",
     "people",
+    "skinned",
 ]

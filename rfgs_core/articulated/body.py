@@ -83,9 +83,12 @@ class Body:
 
     def skin(self, pose: Pose) -> np.ndarray:
         """Vertices in a pose [m], shape [V, 3]."""
+        return skinned(self.vertices, *self.weights, *self.from_rest(pose))
+
+    def from_rest(self, pose: Pose) -> tuple[np.ndarray, np.ndarray]:
+        """Rotation [B, 3, 3] and translation [B, 3] in metres of each bone from rest to a pose."""
         turns = np.ascontiguousarray(pose.turns, np.float64)
-        moves = self.heads_at(pose) - np.einsum("bij,bj->bi", turns, self.heads)
-        return skinned(self.vertices, *self.weights, turns, moves)
+        return turns, self.heads_at(pose) - np.einsum("bij,bj->bi", turns, self.heads)
 
     @cached_property
     def _steps(self) -> np.ndarray:

@@ -191,9 +191,18 @@ def _amplitude(
     if damped > _MOST_DAMPED:
         return 0.0
     sent = 0.5 * q_n if heard and c_s > 0.0 else 0.0
-    if forward > _ASLANT:
-        sent += min((forward - _ASLANT) / (_FORWARD - _ASLANT), 1.0) * screen * c_i
+    sent += shadowing(forward) * screen * c_i
     return sent * math.exp(-damped)
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def shadowing(forward: float) -> float:
+    """Share of a facet's shadow that is heard, from 0 aslant to 1 behind the body.
+
+    Args:
+        forward: Cosine between the way in and the way out.
+    """
+    return min(max((forward - _ASLANT) / (_FORWARD - _ASLANT), 0.0), 1.0)
 
 
 @numba.njit(cache=True, nogil=True, inline="always")

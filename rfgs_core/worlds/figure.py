@@ -12,7 +12,7 @@ import numba
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int64
 
-from rfgs_core.articulated import Body, Pose, people
+from rfgs_core.articulated import Body, Pose, people, skinned
 from rfgs_core.simulate.sight.bodies import picture
 from rfgs_core.simulate.surface.lloyd import triangle_areas
 from rfgs_core.simulate.surface.points import LIFT_M, SurfacePoints, surface_points
@@ -77,12 +77,11 @@ class Figure:
 
     def posed(self, pose: Pose) -> Posed:
         """The body in a pose."""
-        heads = self.body.heads_at(pose)
-        points, normals = _skin(
-            self.points, self.normals, self.bone, self.weight,
-            np.ascontiguousarray(pose.turns), self.body.heads.astype(np.float64), heads,
-        )  # fmt: skip
-        return Posed(self.body.skin(pose), points, normals)
+        turns, moves = self.body.from_rest(pose)
+        points = skinned(self.points, self.bone, self.weight, turns, moves)
+        normals = skinned(self.normals, self.bone, self.weight, turns, np.zeros_like(moves))
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        return Posed(self.body.skin(pose), points + LIFT_M * normals, normals)
 
 
 def _carried(
@@ -173,35 +172,3 @@ def _in_view(
         near = depth[y, x]
         seen[i] = near <= 0.0 or forward <= 1.0 / near + _BEHIND_M
     return seen
-
-
-@numba.njit(cache=True, nogil=True)
-def _skin(
-    points: np.ndarray,
-    normals: np.ndarray,
-    bone: np.ndarray,
-    weight: np.ndarray,
-    turns: np.ndarray,
-    rest_heads: np.ndarray,
-    heads: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Linear blend skinning of facets, lifted off the skin."""
-    places, facing = np.zeros_like(points), np.zeros_like(normals)
-    for i in range(len(points)):
-        for k in range(bone.shape[1]):
-            w, b = weight[i, k], bone[i, k]
-            if w == 0.0:
-                continue
-            for row in range(3):
-                place, face = heads[b, row], 0.0
-                for column in range(3):
-                    turn = turns[b, row, column]
-                    place += turn * (points[i, column] - rest_heads[b, column])
-                    face += turn * normals[i, column]
-                places[i, row] += w * place
-                facing[i, row] += w * face
-        length = np.sqrt(facing[i, 0] ** 2 + facing[i, 1] ** 2 + facing[i, 2] ** 2)
-        for row in range(3):
-            facing[i, row] /= length
-            places[i, row] += LIFT_M * facing[i, row]
-    return places, facing

@@ -26,13 +26,12 @@ import numpy as np
 from jaxtyping import Bool, Complex64, Complex128, Float64
 
 from rfgs_core.limbs.evidence.entries import End, Pair
+from rfgs_core.worlds.echoes import shadowing
 
 #: Shares of noise that are tried, against the mean power of the echoes.
 NOISE_SHARES = 10.0 ** np.arange(-2.5, 1.01, 0.5)
 #: Facets weaker than this, against the strongest, are left out.
 _WEAKEST = 0.05
-#: Cosine between the way in and the way out beyond which a body shadows, in full and at all.
-_FORWARD, _ASLANT = 0.75, 0.45
 
 
 class Facets(NamedTuple):
@@ -154,8 +153,7 @@ def _weight(
         whole = 2.0 - 2.0 * forward
         sine2 = max(1.0 - (c_t + c_r) ** 2 / max(whole, 1e-9), 0.0)
         sent = 0.5 * (c_t + c_r) * math.exp(-sine2 / (4.0 * lobe * lobe))
-    if forward > _ASLANT:
-        sent += min((forward - _ASLANT) / (_FORWARD - _ASLANT), 1.0) * c_t
+    sent += shadowing(forward) * c_t
     return sent / (d_t * d_r), d_t + d_r
 
 
@@ -194,8 +192,8 @@ def _responses(
     steered = tx_steered.mean() + rx_steered.mean()
     sent = np.zeros(len(tx_share), np.complex128)
     heard = np.zeros(len(rx_share), np.complex128)
-    tones = np.zeros(len(band_share), np.complex128)
-    out = np.zeros((len(used), len(sent) * len(heard) * len(tones)), np.complex64)
+    banded = np.zeros(len(band_share), np.complex128)
+    out = np.zeros((len(used), len(sent) * len(heard) * len(banded)), np.complex64)
     for row in range(len(used)):
         i = used[row]
         _add_phases(points[i], tx, tx_steered, tx_block, tx_share, middle_k, sent)
@@ -205,16 +203,16 @@ def _responses(
         turn = complex(math.cos(step_k * late), -math.sin(step_k * late))
         start = (first_k - middle_k) * late
         wave = complex(math.cos(start), -math.sin(start))
-        tones[:] = 0.0
+        banded[:] = 0.0
         for f in range(len(band)):
             if band[f] >= 0:
-                tones[band[f]] += wave * band_share[band[f]]
+                banded[band[f]] += wave * band_share[band[f]]
             wave *= turn
         e = 0
         for a in range(len(sent)):
             for b in range(len(heard)):
                 both = weight[i] * sent[a] * heard[b]
-                for f in range(len(tones)):
-                    out[row, e] = both * tones[f]
+                for f in range(len(banded)):
+                    out[row, e] = both * banded[f]
                     e += 1
     return out

@@ -14,11 +14,13 @@ from jaxtyping import Bool, Float32, Float64
 from rfgs_core.articulated import Pose, people
 from rfgs_core.encode.body_maps import CENTRE_HEIGHT_M, ArrayEnd, View, band_weights, views_of
 from rfgs_core.radio import Radio
+from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.tissue import normal_reflection, skin_permittivity
 from rfgs_core.seeds import sub_seed
 from rfgs_core.worlds.echoes import Band, Listener, Seen, mirrored
 from rfgs_core.worlds.figure import Figure, Posed, seen_from, seen_roughly
 from rfgs_core.worlds.motion import FAMILIES, random_motion
+from rfgs_core.worlds.motion.curves import Z, about
 from rfgs_core.worlds.room import Room, Sight
 
 #: Of a body in a wall's mirror every fourth facet is enough: its echo is speckle all the same.
@@ -63,7 +65,7 @@ def examples(radio: Radio, seed: int, families: tuple[str, ...] = FAMILIES) -> I
     """
     rng = np.random.default_rng(sub_seed(seed, radio.name, "worlds"))
     shares = np.array([_SHARES.get(family, _OTHERWISE) for family in families])
-    wavelength_m = _wavelength_m(radio)
+    wavelength_m = SPEED_OF_LIGHT / float(radio.freq_hz.max())
     motions = 0
     cast: list[Figure] = []
     while True:
@@ -74,12 +76,6 @@ def examples(radio: Radio, seed: int, families: tuple[str, ...] = FAMILIES) -> I
         figure = cast[int(rng.integers(len(cast)))]
         family = str(rng.choice(families, p=shares / shares.sum()))
         yield from _moments(rng, radio, figure, family)
-
-
-def _wavelength_m(radio: Radio) -> float:
-    from rfgs_core.radio.constants import SPEED_OF_LIGHT
-
-    return SPEED_OF_LIGHT / float(radio.freq_hz.max())
 
 
 @functools.lru_cache(maxsize=4)
@@ -101,7 +97,7 @@ def _moments(
             continue
         band = Band.of(sight.freq_hz, band_weights(sight.subcarriers), _skin(radio.centre_hz))
         pose = motion.at(float(rng.uniform(0.0, motion.duration_s)))
-        pose = _turned(pose, float(rng.uniform(-np.pi, np.pi)))
+        pose = pose.turned(about(Z, float(rng.uniform(-np.pi, np.pi))))
         # Wherever the motion has led, somebody is at this spot now.
         far = figure.posed(pose).centroid(figure.areas_m2)[:2]
         pose = Pose(pose.root + np.append(spot - far, 0.0), pose.turns)
@@ -109,13 +105,6 @@ def _moments(
         views = views_of(sight.layout, sight.links)
         maps = body_echoes(figure, figure.posed(pose), views, centre, band, room, sight)
         yield Example(views, maps, centre, figure.body.joints17(pose), family)
-
-
-def _turned(pose: Pose, heading: float) -> Pose:
-    """A pose turned around the vertical through the origin."""
-    c, s = np.cos(heading), np.sin(heading)
-    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    return Pose(turn @ pose.root, turn @ pose.turns)
 
 
 def body_echoes(

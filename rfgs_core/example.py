@@ -19,7 +19,7 @@ from rfgs_core.errors import RfgsError
 
 #: What is shipped, and its digest: a file that was cut short on its way is told from a whole one.
 ARCHIVE = Path(__file__).with_name("example.zip")
-SHA256 = "9b19629605699970c4b78dc97412ff18d97ace96e86e13f9a352b75d6ac25c28"
+SHA256 = "c224c14c5c33025ad6a1cddc2888f8f05cc056987ea186d60d0f749669f8dbf2"
 #: Folders in the archive.
 DATASET, RUN = "dataset", "run"
 #: Entries of an archive have the same time on every machine.

@@ -13,11 +13,7 @@ _MODULES = (
     *("channels.settings", "check.settings", "devices.properties", "devices.settings"),
     *("export.settings", "gaussians.settings", "jobs.settings", "materials.properties"),
     *("paths.settings", "properties"),
-    *(
-        "devices.operators",
-        "devices.recorded",
-        "devices.panel",
-    ),
+    *("devices.operators", "devices.chosen_operators", "devices.recorded", "devices.panel"),
     *("check.operators", "check.panel", "materials.operators", "materials.panel"),
     *("jobs.preferences", "jobs.operators", "jobs.panel", "export.operators", "export.panel"),
     *("gaussians.operators", "gaussians.file_menu", "gaussians.view_operators", "gaussians.panel"),

@@ -129,6 +129,16 @@ def duplicate(scene: bpy.types.Scene, item: bpy.types.Object) -> bpy.types.Objec
     return twin
 
 
+def select(context: bpy.types.Context, items: Sequence[bpy.types.Object]) -> None:
+    """Selects devices, and nothing else; the first becomes active."""
+    context.view_layer.update()
+    for item in context.selected_objects:
+        item.select_set(False)
+    for item in items:
+        item.select_set(True)
+    context.view_layer.objects.active = items[0] if items else None
+
+
 def remove(items: Sequence[bpy.types.Object]) -> None:
     """Removes devices, and collections of devices that are empty then.
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Buttons that add, place, copy, mirror and remove radio devices."""
+"""Buttons that add and place radio devices."""
 
 from __future__ import annotations
 
@@ -26,29 +26,6 @@ ROLES = [
     ("RECEIVER", "Receiver", "Only receives", "TRIA_LEFT", 1),
     ("ACCESS_POINT", "Access Point", "Transmits and receives", "ARROW_LEFTRIGHT", 2),
 ]
-AXES = [("X", "X", "Across the plane of constant X"), ("Y", "Y", "Across that of constant Y")]
-
-
-def _device_name() -> bpy.types.StringProperty:
-    return bpy.props.StringProperty(
-        name="Device",
-        description="Name of the device; empty takes those that are selected",
-        options={"SKIP_SAVE"},
-    )
-
-
-def _chosen(context: bpy.types.Context, name: str) -> list[bpy.types.Object]:
-    """The device of a name, else the selected ones.
-
-    Raises:
-        AddonError: There is none.
-    """
-    if name:
-        return [empties.named_device(context.scene, name)]
-    found = [item for item in empties.devices(context.scene) if item.select_get()]
-    if not found:
-        raise AddonError("no radio device is selected")
-    return found
 
 
 def _refuse_senseless(values: dict[str, Any]) -> None:
@@ -71,16 +48,6 @@ def _refuse_senseless(values: dict[str, Any]) -> None:
         wavelengths = values.pop(f"{array}_spacing_wavelengths", None)
         if wavelengths is not None:
             values[f"{array}_spacing_m"] = wavelengths * wavelength_m(band)
-
-
-def _show(context: bpy.types.Context, items: list[bpy.types.Object]) -> None:
-    """Selects devices, and nothing else; the first becomes active."""
-    context.view_layer.update()
-    for item in context.selected_objects:
-        item.select_set(False)
-    for item in items:
-        item.select_set(True)
-    context.view_layer.objects.active = items[0] if items else None
 
 
 class RFGS_OT_add_device(RadioFields, Undoable, bpy.types.Operator):
@@ -178,7 +145,7 @@ class RFGS_OT_add_device(RadioFields, Undoable, bpy.types.Operator):
             *(context.scene, self.device or self.role.lower(), self.role, self.radio),
             *(np.array(place @ turn.to_matrix().to_4x4()), fields),
         )
-        _show(context, [item])
+        empties.select(context, [item])
         return f"Added {item.name}"
 
     def _said(self) -> dict[str, object]:
@@ -241,95 +208,6 @@ class RFGS_OT_place_radio(Undoable, bpy.types.Operator):
         if self.around == "SELECTION":
             bounds = authoring.around(scene, chosen, self.margin_m)
         placed = authoring.place_radio(scene, self.radio, (bounds, meshes, room), keep=self.keep)
-        _show(context, placed)
+        empties.select(context, placed)
         more = authoring.others_of(scene, self.radio)
         return f"Placed {len(placed)} devices of {self.radio}{more}"
-
-
-class RFGS_OT_duplicate_device(Undoable, bpy.types.Operator):
-    """Copy radio devices in place, with their radio."""
-
-    bl_label = "Duplicate Device"
-    command = Command("devices duplicate", words={"device": "device"}, saves=True)
-
-    device: _device_name()
-    offset: bpy.props.FloatVectorProperty(
-        name="Offset",
-        description="From the device to its copy, along the scene's axes",
-        default=(0.0, 0.0, 0.5),
-        subtype="TRANSLATION",
-        size=3,
-    )
-
-    def work(self, context: bpy.types.Context, _progress: Progress) -> str:
-        """Copies what is chosen."""
-        twins = [empties.duplicate(context.scene, item) for item in _chosen(context, self.device)]
-        context.view_layer.update()
-        for twin in twins:
-            matrix = twin.matrix_world.copy()
-            matrix.translation += mathutils.Vector(self.offset)
-            twin.matrix_world = matrix
-        _show(context, twins)
-        return f"Added {', '.join(twin.name for twin in twins)}"
-
-
-class RFGS_OT_mirror_device(Undoable, bpy.types.Operator):
-    """Mirror radio devices at the middle of the scene's bounds."""
-
-    bl_label = "Mirror Device"
-    command = Command(
-        "devices mirror",
-        words={"device": "device"},
-        needs=("axis",),
-        means={"--move": {"copy": False}},
-        saves=True,
-    )
-
-    device: _device_name()
-    axis: bpy.props.EnumProperty(
-        name="Axis", description="Coordinate that changes its sign", items=AXES
-    )
-    copy: bpy.props.BoolProperty(
-        name="Copy", description="Mirror a copy and leave the device", default=True
-    )
-
-    def work(self, context: bpy.types.Context, _progress: Progress) -> str:
-        """Mirrors what is chosen."""
-        chosen = _chosen(context, self.device)
-        twins = authoring.mirror_devices(
-            context.scene, chosen, "XY".index(self.axis), copy=self.copy
-        )
-        _show(context, twins)
-        return f"Mirrored {', '.join(item.name for item in twins)}"
-
-
-class RFGS_OT_remove_device(Undoable, bpy.types.Operator):
-    """Remove radio devices from the file."""
-
-    bl_label = "Remove Device"
-    command = Command("devices remove", words={"device": "device"}, saves=True)
-
-    device: _device_name()
-
-    def work(self, context: bpy.types.Context, _progress: Progress) -> str:
-        """Removes what is chosen."""
-        chosen = _chosen(context, self.device)
-        names = ", ".join(item.name for item in chosen)
-        empties.remove(chosen)
-        return f"Removed {names}"
-
-
-class RFGS_OT_match_devices(Undoable, bpy.types.Operator):
-    """Give every device of the scene's own radio the band, arrays and power of this one."""
-
-    bl_label = "Copy Radio to All"
-    command = Command("devices match", words={"device": "device"}, saves=True)
-
-    device: _device_name()
-
-    def work(self, context: bpy.types.Context, _progress: Progress) -> str:
-        """Copies the properties."""
-        source, *more = _chosen(context, self.device)
-        if more:
-            raise AddonError("select the one device that the others shall be like")
-        return f"Changed {authoring.match_devices(context.scene, source)} devices"

@@ -84,11 +84,7 @@ class Viewer:
             has_room=room is not None,
             has_links=len(radio.links) > 0,
         )
-        start = Selection(
-            frame=begin,
-            mode=mode,
-            camera=next(iter(self._cameras), None),
-        )
+        start = Selection(frame=begin, mode=mode, camera=next(iter(self._cameras), None))
         self.stage = Stage(server, where_people_are(samples, run.sequence.bounds_m))
         self.panel = Panel(server, offer, start, play=play)
         self._drawn: Selection | None = None

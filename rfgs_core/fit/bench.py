@@ -79,12 +79,15 @@ def bench_training(
     losses, train_s, steps, still = [_validation(whole, aside, start, config)], start_s, 0, False
     lengths = range(WINDOW, LIMIT + 1, WINDOW) if bench.steps is None else [bench.steps]
     with tqdm(total=lengths[-1], desc="bench training", unit="step") as bar:
+
+        def on_step(_loss: float, _count: int) -> None:
+            bar.update(1)
+
         for steps in lengths:
             # From the start each time: what is timed is one training of so many steps.
             bar.reset()
             begin = time.perf_counter()
-            so_many = replace(config, iterations=steps)
-            state = refine(seen, start, so_many, seed, on_step=lambda *_: bar.update())
+            state = refine(seen, start, replace(config, iterations=steps), seed, on_step=on_step)
             finish_device()
             train_s = start_s + time.perf_counter() - begin
             losses.append(_validation(whole, aside, state, config))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rfgs_core.simulate.paths.path_set import PathSet
-from rfgs_core.simulate.shadow.kirchhoff import Outline
+from rfgs_core.simulate.shadow.outline import Outline
 from rfgs_core.simulate.surface.direct import PosedPoints
 
 

@@ -25,7 +25,8 @@ from rfgs_core.simulate.packets import sampled
 from rfgs_core.simulate.paths.path_set import PathSet
 from rfgs_core.simulate.paths.steering import steer
 from rfgs_core.simulate.shadow.environment import environment_channel
-from rfgs_core.simulate.shadow.kirchhoff import Outline, Shadow, transmission
+from rfgs_core.simulate.shadow.kirchhoff import Shadow, transmission
+from rfgs_core.simulate.shadow.outline import Outline
 from rfgs_core.simulate.surface.direct import PosedPoints, direct_channel
 
 

@@ -31,13 +31,9 @@ from rfgs_core.simulate.shadow.environment import (
 )
 from rfgs_core.simulate.shadow.frequencies import fine_grid
 from rfgs_core.simulate.shadow.in_view import segments_in_view
-from rfgs_core.simulate.shadow.kirchhoff import (
-    Outline,
-    Shadow,
-    coarse_mesh,
-    near_segments,
-    transmission,
-)
+from rfgs_core.simulate.shadow.kirchhoff import Shadow, transmission
+from rfgs_core.simulate.shadow.near import near_segments
+from rfgs_core.simulate.shadow.outline import Outline, coarse_mesh
 from rfgs_core.simulate.sight.free import free_segments
 from rfgs_core.simulate.surface.bodies import BodySurface
 from rfgs_core.simulate.surface.movers import Movers
@@ -196,12 +192,12 @@ class FastTracer:
         """What casts the shadow of each person."""
         posed, outlines = self._people.posed(vertices), []
         with self._timed("shadow"):
-            for kept, faces in self._outlines:
+            for kept, mesh in self._outlines:
                 body = posed[kept]
                 near = near_segments(paths, body, float(self._grid.max()))
                 free = partial(free_segments, standing)
-                beside = segments_in_view(free, paths.vertices, body, faces, near)
-                outlines.append(Outline(body, faces, beside))
+                beside = segments_in_view(free, paths.vertices, body, mesh.faces, near)
+                outlines.append(Outline(body, mesh, beside))
         return outlines
 
     def _look(self, room: Room) -> Surroundings:

@@ -22,7 +22,7 @@ from dataset_factory.trace.rays.scene import (
 from rfgs_core.radio import Radio
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.simulate.shadow.in_view import segments_in_view
-from rfgs_core.simulate.shadow.kirchhoff import Outline, coarse_mesh
+from rfgs_core.simulate.shadow.outline import Outline, coarse_mesh
 from rfgs_core.simulate.surface.direct import PosedPoints
 from rfgs_core.simulate.surface.points import SurfacePoints, surface_points
 
@@ -93,8 +93,8 @@ class Bodies:
         posed = self.people.posed(vertices)
         in_sight = partial(visible, scene.mi_scene)
         return [
-            Outline(posed[kept], faces, segments_in_view(in_sight, corners, posed[kept], faces))
-            for kept, faces in self._outlines
+            Outline(posed[kept], mesh, segments_in_view(in_sight, corners, posed[kept], mesh.faces))
+            for kept, mesh in self._outlines
         ]
 
     def gamma(self, freq_hz: np.ndarray) -> dict[int, np.ndarray]:

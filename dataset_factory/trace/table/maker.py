@@ -27,7 +27,8 @@ from rfgs_core.radio.sites import centres, owners
 from rfgs_core.simulate.paths.path_set import PathSet, empty, merged
 from rfgs_core.simulate.paths.steering import resampled
 from rfgs_core.simulate.shadow.environment import WIDE_BAND_NODES, node_frequencies
-from rfgs_core.simulate.shadow.kirchhoff import Outline, Shadow, transmission
+from rfgs_core.simulate.shadow.kirchhoff import Shadow, transmission
+from rfgs_core.simulate.shadow.outline import Outline
 
 #: Decimals of a delay [s] that are kept: femtoseconds, 0.3 µm.
 DELAY_DIGITS = 15

@@ -21,21 +21,13 @@ from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.simulate.paths.path_set import PathSet
 from rfgs_core.simulate.shadow import silhouette
 from rfgs_core.simulate.shadow.frequencies import Nodes, nodes_for
+from rfgs_core.simulate.shadow.fresnel import FRESNEL, screen_factors
+from rfgs_core.simulate.shadow.lattice import MOST_PLACES, lattice_factors, places_needed
+from rfgs_core.simulate.shadow.near import FAR, near_segments, reach, relative_amplitude
+from rfgs_core.simulate.shadow.outline import Outline
 from rfgs_core.simulate.shadow.unfold import unfold
 
 Shadow = Literal["kirchhoff", "hard"]
-
-
-@dataclass(frozen=True)
-class Outline:
-    """What casts a shadow, and on what."""
-
-    vertices: np.ndarray
-    """Vertices [m], shape (V, 3)."""
-    faces: np.ndarray
-    """Triangles, shape (T, 3)."""
-    beside: np.ndarray
-    """Which segments of the paths it may shade, bool, shape (path, segment)."""
 
 
 @dataclass(frozen=True)
@@ -51,59 +43,8 @@ class Passed:
     """Frequencies of the factors [Hz], shape (grid,); linear in between."""
 
 
-#: Detail of the mesh that casts shadows [m]; far below the first Fresnel zone of any preset.
-DETAIL_M = 0.015
-#: Shadows that change a device pair by less than this share of its strongest path are left out.
-NEGLIGIBLE = 1e-3
-
-
-def coarse_mesh(
-    vertices: np.ndarray, faces: np.ndarray, detail_m: float = DETAIL_M
-) -> tuple[np.ndarray, np.ndarray]:
-    """Thins out a mesh for its silhouette by joining vertices within cells.
-
-    Args:
-        vertices: Rest pose [m], shape (V, 3).
-        faces: Triangles, shape (T, 3).
-        detail_m: Size of the cells [m].
-
-    Returns:
-        Indices of the vertices that are kept and triangles over them.
-    """
-    used = np.unique(faces)
-    cells = np.floor(vertices[used].astype(np.float64) / detail_m).astype(np.int64)
-    _, cell = np.unique(cells, axis=0, return_inverse=True)
-    cell = cell.ravel()
-    size = np.bincount(cell)
-    mean = np.stack([np.bincount(cell, vertices[used, i]) / size for i in range(3)], axis=1)
-    away = np.linalg.norm(vertices[used] - mean[cell], axis=1)
-    order = np.lexsort((away, cell))
-    kept = used[order[np.unique(cell[order], return_index=True)[1]]]
-    of_vertex = np.zeros(len(vertices), dtype=np.int64)
-    of_vertex[used] = cell
-    thin = of_vertex[faces]
-    flat = (thin[:, 0] == thin[:, 1]) | (thin[:, 1] == thin[:, 2]) | (thin[:, 2] == thin[:, 0])
-    thin = thin[~flat]
-    _, first = np.unique(np.sort(thin, axis=1), axis=0, return_index=True)
-    return kept, thin[np.sort(first)]
-
-
-def _relative(paths: PathSet) -> np.ndarray:
-    """Amplitude of each path relative to the strongest of its pair of sites, shape (path,)."""
-    strength = np.abs(paths.amplitude).max(axis=(1, 2))
-    pair = paths.tx * (int(paths.rx.max(initial=0)) + 1) + paths.rx
-    strongest = np.zeros(int(pair.max(initial=0)) + 1)
-    np.maximum.at(strongest, pair, strength)
-    return strength / np.maximum(strongest[pair], 1e-300)
-
-
-@numba.njit(cache=True)
-def _reach(relative: float) -> float:
-    """Fresnel coordinate up to which a shadow on a path of some relative amplitude matters.
-
-    At ν from its edge a screen changes a path by about 1/(√2 π ν) of its amplitude.
-    """
-    return min(relative / (np.sqrt(2.0) * np.pi * NEGLIGIBLE), silhouette.FAR)
+#: Work of one look into the Fresnel table, relative to one complex product.
+LOOK_UP = 4
 
 
 def transmission(
@@ -124,12 +65,9 @@ def transmission(
     """
     tx_places = _places(layout.tx_xyz, layout.tx_site, layout.tx_port)
     rx_places = _places(layout.rx_xyz, layout.rx_site, layout.rx_port)
-    lines, relative = unfold(paths), _relative(paths)
+    lines, relative = unfold(paths), relative_amplitude(paths)
     near = [
-        outline.beside
-        & _near(
-            paths.vertices, lines[0], lines[1], relative, *_ball(outline.vertices), grid_hz.max()
-        )
+        outline.beside & near_segments(paths, outline.vertices, grid_hz.max())
         for outline in outlines
     ]
     shaded = np.flatnonzero(np.any([rows.any(axis=1) for rows in near], axis=0))
@@ -142,35 +80,16 @@ def transmission(
         _shade(
             some.vertices,
             rows[shaded],
-            (
-                lines[0][shaded],
-                lines[1][shaded],
-                lines[2][shaded],
-                lines[3][shaded],
-                relative[shaded],
-            ),
+            (*(line[shaded] for line in lines), relative[shaded]),
             (tx, rx),
             np.ascontiguousarray(outline.vertices, dtype=np.float64),
-            np.ascontiguousarray(outline.faces, dtype=np.int64),
+            (outline.mesh.faces, outline.mesh.edges, outline.mesh.edge_of),
             nodes_for(grid_hz),
-            silhouette.FRESNEL,
+            FRESNEL,
             mode == "hard",
             out,
         )
     return Passed(shaded, out, grid_hz)
-
-
-def near_segments(paths: PathSet, vertices: np.ndarray, highest_hz: float) -> np.ndarray:
-    """Which segments of paths a body may shade, walls or not, bool, shape (path, segment).
-
-    Args:
-        paths: Environment paths.
-        vertices: Vertices of the body [m], shape (V, 3).
-        highest_hz: Highest frequency [Hz].
-    """
-    before, after, _, _ = unfold(paths)
-    ball = _ball(vertices)
-    return _near(paths.vertices, before, after, _relative(paths), *ball, highest_hz)
 
 
 def _places(xyz: np.ndarray, site: np.ndarray, port: np.ndarray) -> np.ndarray:
@@ -180,47 +99,6 @@ def _places(xyz: np.ndarray, site: np.ndarray, port: np.ndarray) -> np.ndarray:
     return xyz[first][order].reshape(site.max() + 1, -1, 3)
 
 
-def _ball(vertices: np.ndarray) -> tuple[np.ndarray, float]:
-    """Centre and radius of a ball around a body [m]."""
-    centre = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0)).astype(np.float64)
-    return centre, float(np.linalg.norm(vertices - centre, axis=1).max())
-
-
-@numba.njit(cache=True)
-def _near(
-    corners: np.ndarray,
-    before: np.ndarray,
-    after: np.ndarray,
-    relative: np.ndarray,
-    centre: np.ndarray,
-    radius: float,
-    freq_hz: float,
-) -> np.ndarray:
-    """Which segments a ball may come nearer to than the reach, bool, shape (path, segment).
-
-    Fresnel coordinates grow towards the ends of the unfolded line: what counts is their scale
-    where the ball is nearest to its middle.
-    """
-    near = np.zeros(before.shape, dtype=np.bool_)
-    for p in range(near.shape[0]):
-        for i in range(near.shape[1]):
-            way = corners[p, i + 1] - corners[p, i]
-            to = centre - corners[p, i]
-            length = np.sqrt((way * way).sum())
-            if length < 1e-6:
-                continue
-            depth = (to * way).sum() / length
-            low, high = max(depth - radius, 0.0), min(depth + radius, length)
-            if low >= high:
-                continue
-            beside = np.sqrt(max((to * to).sum() - depth * depth, 0.0)) - radius
-            whole = before[p, i] + length + after[p, i]
-            at = min(max(0.5 * whole, before[p, i] + low), before[p, i] + high)
-            per_m = np.sqrt(2.0 * (1.0 / at + 1.0 / (whole - at)) * freq_hz / SPEED_OF_LIGHT)
-            near[p, i] = beside * per_m <= _reach(relative[p])
-    return near
-
-
 @numba.njit(cache=True, parallel=True)
 def _shade(
     corners: np.ndarray,
@@ -228,7 +106,7 @@ def _shade(
     lines: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray],
     offsets: tuple[np.ndarray, np.ndarray],
     vertices: np.ndarray,
-    faces: np.ndarray,
+    mesh: tuple[np.ndarray, np.ndarray, np.ndarray],
     nodes: Nodes,
     table: np.ndarray,
     hard: bool,
@@ -250,11 +128,12 @@ def _shade(
             if scale == 0.0:
                 continue
             per_m = np.sqrt(2.0 * scale * nodes.hz[-1] / SPEED_OF_LIGHT)
-            reach = _reach(relative[p])
-            window = min(silhouette.WINDOW, silhouette.WINDOW_PER_REACH * reach)
+            within = reach(relative[p])
+            # What weak paths do not hear of at all counts as unbounded, too.
+            window = silhouette.WINDOW * min(1.0, within / FAR)
             pitch = silhouette.ROW / max(relative[p], 1e-6) / per_m
             runs, heights = silhouette.runs_of(
-                xy, between, faces, window / per_m, reach / per_m, pitch
+                xy, between, mesh, window / per_m, within / per_m, pitch
             )
             if not len(runs):
                 continue
@@ -267,21 +146,38 @@ def _shade(
             to_rx = (axes @ rx_turn[p, i]) * (d_1 / (d_1 + d_2))
             shifts = _shifts(to_tx, to_rx, tx_offset[p], rx_offset[p])
             # Seconds that the farthest edge answers later, by which its share turns.
-            late = silhouette.farthest(runs, heights, shifts) ** 2 * scale / (2.0 * SPEED_OF_LIGHT)
+            x_m, y_m, corner_m = silhouette.farthest(runs, heights, shifts)
+            late = corner_m**2 * scale / (2.0 * SPEED_OF_LIGHT)
             choice = _choice(nodes.counts, np.pi * band * late)
             first = nodes.counts[:choice].sum()
             count = nodes.counts[choice]
-            every = np.zeros((2, shifts.shape[1] * count))
-            per_m_of = np.zeros(every.shape[1])
-            for line in range(every.shape[1]):
-                every[:, line] = shifts[:, line // count]
-                wave = nodes.hz[first + line % count] / SPEED_OF_LIGHT
-                per_m_of[line] = np.sqrt(2.0 * scale * wave)
-            flat = silhouette.screen_factors(table, runs, heights, every, per_m_of)
+            per_m_at = np.sqrt(2.0 * scale * nodes.hz[first : first + count] / SPEED_OF_LIGHT)
+            factors = _of_pairs(table, runs, heights, shifts, (x_m, y_m), per_m_at)
             weights, n_rx = nodes.weights[first : first + count], rx_offset.shape[1]
             for e in range(shifts.shape[1]):
-                factors = flat[e * count : (e + 1) * count]
-                _times(out[p, e // n_rx, e % n_rx], factors, weights)
+                _times(out[p, e // n_rx, e % n_rx], factors[e], weights)
+
+
+@numba.njit(cache=True)
+def _of_pairs(
+    table: np.ndarray,
+    runs: np.ndarray,
+    heights: np.ndarray,
+    shifts: np.ndarray,
+    farthest_m: tuple[float, float],
+    per_m: np.ndarray,
+) -> np.ndarray:
+    """Factors at pairs of elements and frequencies, whichever way is less work, (pair, node)."""
+    pairs, count = shifts.shape[1], len(per_m)
+    n_x = places_needed(0.5 * np.ptp(shifts[0]), farthest_m[0], per_m.max())
+    n_y = places_needed(0.5 * np.ptp(shifts[1]), farthest_m[1], per_m.max())
+    if max(n_x, n_y) <= MOST_PLACES and LOOK_UP * (2 * n_x + n_y) + n_x * n_y < LOOK_UP * 3 * pairs:
+        return lattice_factors(table, runs, heights, shifts, (n_x, n_y), per_m)
+    every, per_m_of = np.zeros((2, pairs * count)), np.zeros(pairs * count)
+    for line in range(pairs * count):
+        every[:, line] = shifts[:, line // count]
+        per_m_of[line] = per_m[line % count]
+    return screen_factors(table, runs, heights, every, per_m_of).reshape(pairs, count)
 
 
 @numba.njit(cache=True)

@@ -1,10 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fresnel integral over the silhouette of a mesh, as seen along one straight segment.
-
-In Fresnel coordinates ν = ρ √(2 s/λ) the Kirchhoff factor of a screen is
-T = 1 − (j/2) ∬ e^{−jπν²/2} d²ν. The integrand separates in x and y, so a silhouette that is
-cut into rows needs the one-dimensional Fresnel integral at the ends of its runs only.
-"""
+"""The silhouette of a mesh as seen along one straight segment, cut into rows."""
 
 from __future__ import annotations
 
@@ -12,56 +7,14 @@ import math
 
 import numba
 import numpy as np
-from scipy.special import fresnel
 
 #: Height of the rows that a silhouette is cut into, in Fresnel coordinates; level edges are off
 #: by half of it, which is 0.003 of a path past a person.
 ROW = 0.02
 #: Fewest and most rows.
 LEAST_ROWS, MOST_ROWS = 40, 2048
-#: Silhouettes wholly beyond this Fresnel coordinate change a path by less than −33 dB.
-FAR = 10.0
 #: Beyond this coordinate a silhouette counts as unbounded.
 WINDOW = 20.0
-#: And so it does, relative to how far silhouettes matter at all, on weaker paths.
-WINDOW_PER_REACH = WINDOW / FAR
-_TABLE_END = 30.0
-_TABLE_PER_UNIT = 512
-#: Gaps between triangles smaller than this are rounding, not light [m].
-_GAP_M = 1e-4
-
-
-def _fresnel_table() -> np.ndarray:
-    """F(ν) = ∫_0^ν e^{−jπt²/2} dt for ν ≥ 0 as rows real, imaginary; the limit at the end."""
-    nu = np.arange(int(_TABLE_END * _TABLE_PER_UNIT) + 2) / _TABLE_PER_UNIT
-    sine, cosine = fresnel(nu)
-    table = np.stack([cosine, -sine])
-    table[:, -2:] = [[0.5], [-0.5]]
-    return table
-
-
-FRESNEL = _fresnel_table()
-
-
-@numba.njit(cache=True, fastmath={"contract", "nsz"})
-def _add_fresnel(
-    table: np.ndarray,
-    edge: float,
-    shift: np.ndarray,
-    per_m: np.ndarray,
-    sign: float,
-    out: np.ndarray,
-) -> None:
-    """Adds sign · F((edge − shift) · per_m) for many shifts; `out` holds real and imaginary."""
-    last = table.shape[1] - 2
-    for e in range(len(shift)):
-        nu = (edge - shift[e]) * per_m[e]
-        place = min(abs(nu) * _TABLE_PER_UNIT, last - 0.0)
-        i = np.int32(place)
-        share = place - i
-        signed = math.copysign(sign, nu) if sign > 0.0 else -math.copysign(sign, nu)
-        out[0, e] += signed * (table[0, i] + (table[0, i + 1] - table[0, i]) * share)
-        out[1, e] += signed * (table[1, i] + (table[1, i + 1] - table[1, i]) * share)
 
 
 @numba.njit(cache=True)
@@ -140,100 +93,95 @@ def _box(
 
 
 @numba.njit(cache=True)
-def _crossing(xy: np.ndarray, face: np.ndarray, y: float) -> tuple[float, float]:
-    """Where the line at height y enters and leaves a triangle; an empty span outside."""
-    low, high = math.inf, -math.inf
-    for e in range(3):
-        a, b = face[e], face[(e + 1) % 3]
-        ya, yb = xy[a, 1], xy[b, 1]
-        if (ya <= y) != (yb <= y):
-            x = xy[a, 0] + (y - ya) / (yb - ya) * (xy[b, 0] - xy[a, 0])
-            low, high = min(low, x), max(high, x)
-    return low, high
+def _contour(
+    xy: np.ndarray,
+    between: np.ndarray,
+    faces: np.ndarray,
+    edge_of: np.ndarray,
+    count: int,
+) -> np.ndarray:
+    """How many more triangles lie to the left of each edge than to its right, int64, shape (E,).
 
-
-@numba.njit(cache=True)
-def _spans(
-    xy: np.ndarray, between: np.ndarray, faces: np.ndarray, y0: float, pitch: float, rows: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Spans of every triangle in every row, grouped by row: offsets (rows + 1) and (N, 2)."""
-    counts = np.zeros(rows + 1, dtype=np.int64)
-    first = np.zeros(len(faces), dtype=np.int64)
-    last = np.full(len(faces), -1, dtype=np.int64)
+    Every triangle counts, whichever side it shows. An edge between two that lie side by side has
+    none: only contours and folds are left, a tenth of all edges or less.
+    """
+    more = np.zeros(count, dtype=np.int64)
     for t in range(len(faces)):
         a, b, c = faces[t]
         if not (between[a] and between[b] and between[c]):
             continue
-        low = min(xy[a, 1], xy[b, 1], xy[c, 1])
-        high = max(xy[a, 1], xy[b, 1], xy[c, 1])
-        first[t] = max(math.ceil((low - y0) / pitch - 0.5), 0)
-        last[t] = min(math.floor((high - y0) / pitch - 0.5), rows - 1)
-        for row in range(first[t], last[t] + 1):
-            counts[row + 1] += 1
-    for row in range(rows):
-        counts[row + 1] += counts[row]
-    spans = np.zeros((counts[rows], 2))
-    filled = counts[:-1].copy()
-    for t in range(len(faces)):
-        for row in range(first[t], last[t] + 1):
-            low, high = _crossing(xy, faces[t], y0 + (row + 0.5) * pitch)
-            spans[filled[row], 0], spans[filled[row], 1] = low, high
-            filled[row] += 1
-    return counts, spans
+        area = (xy[b, 0] - xy[a, 0]) * (xy[c, 1] - xy[a, 1])
+        area -= (xy[b, 1] - xy[a, 1]) * (xy[c, 0] - xy[a, 0])
+        if area == 0.0:
+            continue
+        side = 1 if area > 0.0 else -1
+        for k in range(3):
+            edge = edge_of[t, k]
+            more[edge >> 1] += -side if edge & 1 else side
+    return more
 
 
 @numba.njit(cache=True)
-def _joined(runs: np.ndarray, at: int, count: int) -> int:
-    """Joins a run that has grown with those after it that it now meets; returns how many remain."""
-    last = at + 1
-    while last < count and runs[last, 0] <= runs[at, 1] + _GAP_M:
-        runs[at, 1] = max(runs[at, 1], runs[last, 1])
-        last += 1
-    gone = last - at - 1
-    if gone:
-        for i in range(last, count):
-            runs[i - gone, 0], runs[i - gone, 1] = runs[i, 0], runs[i, 1]
-    return count - gone
+def _crossings(
+    xy: np.ndarray, edges: np.ndarray, more: np.ndarray, y0: float, pitch: float, rows: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where contours cross the middle of rows: offsets (rows + 1), x [m] and what is entered."""
+    offsets = np.zeros(rows + 1, dtype=np.int64)
+    for filling in range(2):
+        if filling:
+            x = np.zeros(offsets[rows])
+            entered = np.zeros(offsets[rows], dtype=np.int64)
+            filled = offsets[:-1].copy()
+        for e in range(len(edges)):
+            if more[e] == 0:
+                continue
+            a, b = edges[e]
+            ya, yb = (xy[a, 1] - y0) / pitch - 0.5, (xy[b, 1] - y0) / pitch - 0.5
+            first = max(math.ceil(min(ya, yb)), 0)
+            # An edge that ends at the middle of a row is left to the one that begins there.
+            last = min(math.ceil(max(ya, yb)) - 1, rows - 1)
+            for row in range(first, last + 1):
+                if not filling:
+                    offsets[row + 1] += 1
+                    continue
+                at = filled[row]
+                x[at] = xy[a, 0] + (row - ya) / (yb - ya) * (xy[b, 0] - xy[a, 0])
+                entered[at] = more[e] if yb < ya else -more[e]
+                filled[row] += 1
+        if not filling:
+            for row in range(rows):
+                offsets[row + 1] += offsets[row]
+    return offsets, x, entered
 
 
 @numba.njit(cache=True)
-def _merged(spans: np.ndarray, window: float, runs: np.ndarray) -> int:
-    """Fills in the union of one row's spans as disjoint runs, clipped ends pushed to infinity.
-
-    Neighbouring triangles follow each other, so that most spans meet the run of the one before:
-    that is faster than sorting them.
+def _covered(x: np.ndarray, entered: np.ndarray, window: float, runs: np.ndarray) -> int:
+    """Fills in where at least one triangle covers a row, clipped ends pushed to infinity.
 
     Args:
-        spans: From and to, shape (span, 2).
+        x: Crossings of the row [m], shape (crossing,); sorted in place.
+        entered: How many triangles each of them enters, negative where it leaves; sorted along.
         window: Half width beyond which the silhouette counts as unbounded [m].
-        runs: Filled, ascending, shape (span, 2) or longer.
+        runs: Filled, ascending and disjoint, shape (crossing / 2, 2) or longer.
 
     Returns:
         Number of runs.
     """
-    count, at = 0, 0
-    for s in range(len(spans)):
-        low, high = spans[s, 0], spans[s, 1]
-        if low > high:
-            continue
-        at = min(at, count)
-        while at > 0 and runs[at - 1, 1] + _GAP_M >= low:
-            at -= 1
-        while at < count and runs[at, 1] + _GAP_M < low:
-            at += 1
-        if at == count or runs[at, 0] > high + _GAP_M:
-            for i in range(count, at, -1):
-                runs[i, 0], runs[i, 1] = runs[i - 1, 0], runs[i - 1, 1]
-            runs[at, 0], runs[at, 1] = low, high
-            count += 1
-            continue
-        runs[at, 0], runs[at, 1] = min(runs[at, 0], low), max(runs[at, 1], high)
-        count = _joined(runs, at, count)
-    for i in range(count):
-        if runs[i, 0] <= -window:
-            runs[i, 0] = -math.inf
-        if runs[i, 1] >= window:
-            runs[i, 1] = math.inf
+    for i in range(1, len(x)):
+        at, enters, k = x[i], entered[i], i - 1
+        # Where one ends and another begins there is no gap.
+        while k >= 0 and (x[k] > at or (x[k] == at and entered[k] < enters)):
+            x[k + 1], entered[k + 1] = x[k], entered[k]
+            k -= 1
+        x[k + 1], entered[k + 1] = at, enters
+    count, depth = 0, 0
+    for i in range(len(x)):
+        if depth == 0:
+            runs[count, 0] = -math.inf if x[i] <= -window else x[i]
+        depth += entered[i]
+        if depth == 0:
+            runs[count, 1] = math.inf if x[i] >= window else x[i]
+            count += runs[count, 1] > runs[count, 0]
     return count
 
 
@@ -241,7 +189,7 @@ def _merged(spans: np.ndarray, window: float, runs: np.ndarray) -> int:
 def runs_of(
     xy: np.ndarray,
     between: np.ndarray,
-    faces: np.ndarray,
+    mesh: tuple[np.ndarray, np.ndarray, np.ndarray],
     window: float,
     far: float,
     pitch: float,
@@ -251,7 +199,7 @@ def runs_of(
     Args:
         xy: Plane coordinates [m], shape (V, 2).
         between: Which vertices count, shape (V,).
-        faces: Triangles, shape (T, 3).
+        mesh: Triangles, edges and edges of the triangles, see `ShadowMesh`.
         window: Half width beyond which the silhouette counts as unbounded [m].
         far: Distance beyond which there is no silhouette [m].
         pitch: Largest height of a row, within the limits of their number [m].
@@ -267,11 +215,14 @@ def runs_of(
         return nothing, nothing
     rows = min(max(math.ceil((y1 - y0) / pitch), LEAST_ROWS), MOST_ROWS)
     pitch = (y1 - y0) / rows
-    offsets, spans = _spans(xy, between, faces, y0, pitch, rows)
-    runs, heights = np.zeros_like(spans), np.zeros_like(spans)
+    faces, edges, edge_of = mesh
+    more = _contour(xy, between, faces, edge_of, len(edges))
+    offsets, x, entered = _crossings(xy, edges, more, y0, pitch, rows)
+    runs, heights = np.zeros((len(x) // 2 + 1, 2)), np.zeros((len(x) // 2 + 1, 2))
     count = 0
     for row in range(rows):
-        end = count + _merged(spans[offsets[row] : offsets[row + 1]], window, runs[count:])
+        here = slice(offsets[row], offsets[row + 1])
+        end = count + _covered(x[here], entered[here], window, runs[count:])
         low, high = y0 + row * pitch, y0 + (row + 1) * pitch
         if row == 0 and y0 <= -window:
             low = -math.inf
@@ -284,78 +235,32 @@ def runs_of(
 
 
 @numba.njit(cache=True)
-def _add_boundary(
-    table: np.ndarray,
-    edge: float,
-    shift: np.ndarray,
-    per_m: np.ndarray,
-    below: np.ndarray,
-    above: np.ndarray,
-    at: np.ndarray,
-    total: np.ndarray,
-) -> None:
-    """Adds F at the boundary of two rows times what the lower one has more; `at` is scratch."""
-    at[:] = 0.0
-    _add_fresnel(table, edge, shift, per_m, 1.0, at)
-    for e in range(len(total)):
-        re, im = below[0, e] - above[0, e], below[1, e] - above[1, e]
-        total[e] += complex(at[0, e] * re - at[1, e] * im, at[0, e] * im + at[1, e] * re)
-
-
-@numba.njit(cache=True)
-def screen_factors(
-    table: np.ndarray, runs: np.ndarray, heights: np.ndarray, shifts: np.ndarray, per_m: np.ndarray
-) -> np.ndarray:
-    """Kirchhoff factors T of a silhouette for lines through its plane, each at its frequency.
-
-    Args:
-        table: `FRESNEL`.
-        runs: Runs of the silhouette [m], shape (N, 2).
-        heights: Rows of the runs [m], shape (N, 2).
-        shifts: Where each line crosses the plane [m], rows x and y, shape (2, line).
-        per_m: Fresnel coordinate per metre for each line, √(2 s/λ), shape (line,).
-
-    Returns:
-        Factors on the amplitudes, complex128, shape (line,); 1 without a silhouette.
-    """
-    # The integral over y of each row is a difference of two values, so that each boundary
-    # between rows takes one value, times how the rows differ.
-    total = np.zeros(shifts.shape[1], dtype=np.complex128)
-    shape = (2, shifts.shape[1])
-    across, before, at = np.zeros(shape), np.zeros(shape), np.zeros(shape)
-    for i in range(len(runs) + 1):
-        first = i == 0 or i == len(runs) or heights[i, 0] != heights[i - 1, 0]
-        if first and i > 0:
-            _add_boundary(table, heights[i - 1, 0], shifts[1], per_m, before, across, at, total)
-            before, across = across, before
-            across[:] = 0.0
-            if i == len(runs) or heights[i, 0] != heights[i - 1, 1]:
-                _add_boundary(table, heights[i - 1, 1], shifts[1], per_m, before, across, at, total)
-                before[:] = 0.0
-        if i < len(runs):
-            _add_fresnel(table, runs[i, 1], shifts[0], per_m, 1.0, across)
-            _add_fresnel(table, runs[i, 0], shifts[0], per_m, -1.0, across)
-    return 1.0 - 0.5j * total
-
-
-@numba.njit(cache=True)
-def farthest(runs: np.ndarray, heights: np.ndarray, shifts: np.ndarray) -> float:
-    """Distance of the farthest corner within bounds from any of the lines' crossings [m].
+def farthest(
+    runs: np.ndarray, heights: np.ndarray, shifts: np.ndarray
+) -> tuple[float, float, float]:
+    """Distances of the farthest edges within bounds from any of the lines' crossings [m].
 
     Args:
         runs: As `runs_of` gives them.
         heights: Likewise.
-        shifts: As `screen_factors` takes them.
+        shifts: Where lines cross the plane [m], rows x and y, shape (2, line).
+
+    Returns:
+        Along x, along y, and that of the farthest corner.
     """
-    most = 0.0
+    far_x, far_y, corner = 0.0, 0.0, 0.0
     ways = np.abs(shifts[0]).max(), np.abs(shifts[1]).max()
     for i in range(len(runs)):
+        across, along = 0.0, 0.0
         for x in runs[i]:
-            for y in heights[i]:
-                across = abs(x) + ways[0] if math.isfinite(x) else 0.0
-                along = abs(y) + ways[1] if math.isfinite(y) else 0.0
-                most = max(most, math.sqrt(across * across + along * along))
-    return most
+            if math.isfinite(x):
+                across = max(across, abs(x) + ways[0])
+        for y in heights[i]:
+            if math.isfinite(y):
+                along = max(along, abs(y) + ways[1])
+        far_x, far_y = max(far_x, across), max(far_y, along)
+        corner = max(corner, math.sqrt(across * across + along * along))
+    return far_x, far_y, corner
 
 
 @numba.njit(cache=True)

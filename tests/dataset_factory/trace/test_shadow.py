@@ -8,7 +8,8 @@ import trimesh
 from rfgs_core.radio import Layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.simulate.paths.path_set import PathSet
-from rfgs_core.simulate.shadow.kirchhoff import Outline, coarse_mesh, transmission
+from rfgs_core.simulate.shadow.kirchhoff import transmission
+from rfgs_core.simulate.shadow.outline import Outline, ShadowMesh, coarse_mesh
 
 FREQ_HZ = np.array([5.8e9])
 D_1, D_2 = 2.5, 3.5
@@ -42,7 +43,9 @@ def shaded(
     paths: PathSet, layout: Layout, body: tuple[np.ndarray, np.ndarray], mode: str = "kirchhoff"
 ) -> np.ndarray:
     everywhere = np.ones((len(paths), paths.vertices.shape[1] - 1), bool)
-    passed = transmission(paths, layout, [Outline(*body, everywhere)], FREQ_HZ, mode)
+    passed = transmission(
+        paths, layout, [Outline(body[0], ShadowMesh.of(body[1]), everywhere)], FREQ_HZ, mode
+    )
     out = np.ones((len(paths), *passed.factor.shape[1:]), np.complex128)
     out[passed.path] = passed.factor
     return out
@@ -118,7 +121,8 @@ def test_reflected_path_is_shaded_on_its_unfolded_line() -> None:
 
 def test_coarse_mesh_keeps_the_outline() -> None:
     ball = trimesh.creation.icosphere(subdivisions=5, radius=0.2)
-    kept, faces = coarse_mesh(ball.vertices, ball.faces)
+    kept, mesh = coarse_mesh(ball.vertices, ball.faces)
+    faces = mesh.faces
     assert len(faces) < 0.5 * len(ball.faces)
     fine = (np.asarray(ball.vertices) + np.array([D_1, 0.1, 0.2]), np.asarray(ball.faces))
     assert abs(factor((fine[0][kept], faces)) - factor(fine)) < 0.01

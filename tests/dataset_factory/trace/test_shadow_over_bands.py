@@ -14,9 +14,13 @@ from dataset_factory.verify.closed_forms import fresnel_integral
 from rfgs_core.radio import PRESETS, Layout, Radio, preset
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.simulate.paths.path_set import PathSet
+from rfgs_core.simulate.shadow import silhouette
 from rfgs_core.simulate.shadow.environment import environment_channel, node_frequencies
 from rfgs_core.simulate.shadow.frequencies import COUNTS, fine_grid, nodes_for
-from rfgs_core.simulate.shadow.kirchhoff import Outline, transmission
+from rfgs_core.simulate.shadow.fresnel import FRESNEL, screen_factors
+from rfgs_core.simulate.shadow.kirchhoff import transmission
+from rfgs_core.simulate.shadow.lattice import lattice_factors, places_needed
+from rfgs_core.simulate.shadow.outline import Outline, ShadowMesh
 from rfgs_core.simulate.shadow.silhouette import WINDOW
 
 D_1, D_2 = 2.5, 3.5
@@ -57,12 +61,12 @@ def straight(radio: Radio) -> tuple[PathSet, Layout]:
     return PathSet(zero, zero, amplitude, ends, none, none, none), elements
 
 
-def screen(box: tuple[float, ...], top_hz: float) -> tuple[np.ndarray, np.ndarray]:
+def screen(box: tuple[float, ...], top_hz: float) -> tuple[np.ndarray, ShadowMesh]:
     """The rectangle as a mesh across the path, D_1 from its start."""
     per_m = np.sqrt(2.0 * (1 / D_1 + 1 / D_2) * top_hz / SPEED_OF_LIGHT)
     x0, x1, y0, y1 = np.array(box) / per_m
     corners = [[D_1, x0, y0], [D_1, x1, y0], [D_1, x1, y1], [D_1, x0, y1]]
-    return np.array(corners), np.array([[0, 1, 2], [0, 2, 3]])
+    return np.array(corners), ShadowMesh.of(np.array([[0, 1, 2], [0, 2, 3]]))
 
 
 @pytest.mark.parametrize("name", sorted(PRESETS))
@@ -183,7 +187,7 @@ def test_a_figure_is_shaded_as_a_sum_over_its_picture_says(name: str, side) -> N
     paths, elements = straight(radio)
     paths = replace(paths, vertices=np.stack([tx, rx])[None])
     elements = replace(elements, tx_xyz=tx[None], rx_xyz=rx[None])
-    outline = Outline(vertices, faces, np.ones((1, 1), bool))
+    outline = Outline(vertices, ShadowMesh.of(faces), np.ones((1, 1), bool))
     free = environment_channel(paths, radio, elements)[0, 0]
     grid = fine_grid(node_frequencies(radio))
     passed = transmission(paths, elements, [outline], grid, "kirchhoff")
@@ -199,3 +203,57 @@ def test_a_figure_is_shaded_as_a_sum_over_its_picture_says(name: str, side) -> N
         row = np.exp(-1j * np.pi * rate * x**2) @ covered
         expected = 1.0 - 1j * rate * px**2 * (row @ np.exp(-1j * np.pi * rate * y**2))
         assert abs(found[n] - expected) < limit, (n, found[n], expected)
+
+
+@pytest.mark.parametrize("name", ["wifi24", "wifi", "mmwave"])
+@pytest.mark.parametrize("tilt_deg", [0.0, 35.0])
+def test_an_array_sees_from_a_lattice_what_each_element_sees(name: str, tilt_deg: float) -> None:
+    radio = preset(name)
+    rng = np.random.default_rng(7)
+    per_m = np.sqrt(2.0 * (1 / D_1 + 1 / D_2) * radio.freq_max_hz / SPEED_OF_LIGHT)
+    low = rng.uniform(-9.0, 8.0, (60, 2)) / per_m
+    runs = np.sort(np.concatenate([low[:, :1], low[:, :1] + rng.exponential(1.0, (60, 1))], 1), 1)
+    runs[5, 1] = np.inf
+    levels = np.linspace(-7.0, 6.0, 61) / per_m
+    heights = np.stack([levels[:-1], levels[1:]], axis=1)
+    heights[0, 0] = -np.inf
+    # Eight by eight elements half a wave apart, seen from half way and turned about the path.
+    grid = 0.25 * SPEED_OF_LIGHT / radio.freq_max_hz * (np.arange(8) - 3.5)
+    tilt = np.radians(tilt_deg)
+    turn = np.array([[np.cos(tilt), -np.sin(tilt)], [np.sin(tilt), np.cos(tilt)]])
+    shifts = turn @ np.stack(np.meshgrid(grid, grid)).reshape(2, -1)
+    at_hz = np.array([radio.freq_min_hz, radio.centre_hz, radio.freq_max_hz])
+    per_m_at = np.sqrt(2.0 * (1 / D_1 + 1 / D_2) * at_hz / SPEED_OF_LIGHT)
+    farthest_m = silhouette.farthest(runs, heights, shifts)[:2]
+    halves = 0.5 * np.ptp(shifts, axis=1)
+    counts = tuple(
+        places_needed(half, far, per_m_at.max())
+        for half, far in zip(halves, farthest_m, strict=True)
+    )
+    found = lattice_factors(FRESNEL, runs, heights, shifts, counts, per_m_at)
+    alone = screen_factors(
+        FRESNEL, runs, heights, np.repeat(shifts, 3, axis=1), np.tile(per_m_at, 64)
+    ).reshape(64, 3)
+    assert np.ptp(np.abs(alone), axis=0).min() > 0.01
+    assert np.abs(found - alone).max() < 2e-3
+    few = lattice_factors(FRESNEL, runs, heights, shifts, (2, 2), per_m_at)
+    assert np.abs(few - alone).max() > 5e-3
+
+
+def test_parts_that_overlap_count_once() -> None:
+    # Two squares of either orientation over each other, as an arm before a body, and one beside.
+    squares = [(-1.0, 1.0, 1), (0.5, 2.0, -1), (2.0, 3.0, 1), (4.0, 5.0, -1)]
+    xy = np.concatenate([[[a, 0.0], [b, 0.0], [b, 1.0], [a, 1.0]] for a, b, _ in squares])
+    faces = np.concatenate(
+        [
+            np.array([[0, 1, 2], [0, 2, 3]])[:, ::way] + 4 * n
+            for n, (_, _, way) in enumerate(squares)
+        ]
+    )
+    mesh = ShadowMesh.of(faces)
+    runs, heights = silhouette.runs_of(
+        xy, np.ones(len(xy), bool), (mesh.faces, mesh.edges, mesh.edge_of), 10.0, 10.0, 0.1
+    )
+    rows = len(runs) // 2
+    np.testing.assert_allclose(runs, [[-1.0, 3.0], [4.0, 5.0]] * rows, atol=1e-12)
+    np.testing.assert_allclose(heights[::2, 0], np.arange(rows) / rows, atol=1e-12)

@@ -74,8 +74,7 @@ def bench_training(
     config = TrainConfig(num_gaussians=bench.gaussians, device=bench.device)
     seed = sub_seed(0, "bench training", "fit")
     begin = time.perf_counter()
-    start = solved_frame(seen, config, seed)
-    start_s = time.perf_counter() - begin
+    start, start_s = solved_frame(seen, config, seed), time.perf_counter() - begin
     losses, train_s, steps, still = [_validation(whole, aside, start, config)], start_s, 0, False
     lengths = range(WINDOW, LIMIT + 1, WINDOW) if bench.steps is None else [bench.steps]
     with tqdm(total=lengths[-1], desc="bench training", unit="step") as bar:

@@ -11,6 +11,7 @@ code; what single precision could not tell, the whole way between the centres, i
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -23,6 +24,36 @@ from rfgs_core.simulate.scatter.elements import (
     spread_values,
 )
 from rfgs_core.simulate.scatter.grid import BETA, WIDTH
+
+
+class Patches(NamedTuple):
+    """Facets of one body as they scatter."""
+
+    points: np.ndarray
+    """Positions [m], shape (facet, 3)."""
+    normals: np.ndarray
+    """Unit normals, shape (facet, 3)."""
+    areas: np.ndarray
+    """Areas [m²], shape (facet,)."""
+    gamma: np.ndarray
+    """Reflection coefficient of each material, complex64, shape (material, node)."""
+    material: np.ndarray
+    """Material of each, shape (facet,)."""
+
+
+class Arrays(NamedTuple):
+    """Transmitting arrays, or their images, and the receiving one."""
+
+    tx_centre: np.ndarray
+    """Centres [m], shape (way, 3)."""
+    tx_offset: np.ndarray
+    """Elements from there, as `see_elements` takes them, shape (way, 4, element)."""
+    rx_centre: np.ndarray
+    """Centre of the receiving array [m], shape (3,)."""
+    rx_offset: np.ndarray
+    """Its elements, shape (4, element)."""
+    size_m: float
+    """Size of two arrays together [m]."""
 
 
 @numba.njit(cache=True, nogil=True)
@@ -98,7 +129,7 @@ def _damp(
     to_tx: tuple[float, float, float],
     to_rx: tuple[float, float, float],
     n: tuple[float, float, float],
-    scale: float,
+    size: tuple[float, float],
     node_k: np.ndarray,
     weight: np.ndarray,
 ) -> None:
@@ -108,7 +139,7 @@ def _damp(
         to_tx: Unit vector to the centre of the transmitting array.
         to_rx: That to the receiving one.
         n: Normal.
-        scale: Area / 24 [m²].
+        size: Area / 24 [m²] and the length of the way to the transmitter [m].
         node_k: Wavenumbers of the nodes [rad/m].
         weight: Changed, shape (node,).
     """
@@ -117,21 +148,17 @@ def _damp(
     qx, qy, qz = to_tx[0] + to_rx[0], to_tx[1] + to_rx[1], to_tx[2] + to_rx[2]
     q_t2 = max(qx * qx + qy * qy + qz * qz - c * c, 0.0)
     for m in range(len(weight)):
-        weight[m] *= c * math.exp(-scale * q_t2 * node_k[m] * node_k[m])
+        weight[m] *= c * math.exp(-size[0] * q_t2 * node_k[m] * node_k[m]) / size[1]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def spread_facets(
-    points: np.ndarray,
-    normals: np.ndarray,
-    areas: np.ndarray,
-    gamma: np.ndarray,
-    material: np.ndarray,
+    patches: Patches,
     used: np.ndarray,
     from_rx: np.ndarray,
     from_tx: tuple[np.ndarray, np.ndarray],
-    ends: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
-    grid: tuple[float, float, np.ndarray, float],
+    arrays: Arrays,
+    grid: tuple[float, float, np.ndarray],
     exact: np.ndarray,
     onto: np.ndarray,
     out: np.ndarray,
@@ -139,62 +166,69 @@ def spread_facets(
     """Adds facets between one array and several others to the grids of their links.
 
     Args:
-        points: Positions [m], shape (facet, 3).
-        normals: Unit normals, shape (facet, 3).
-        areas: Areas [m²], shape (facet,).
-        gamma: Reflection coefficient of each material, complex64, shape (material, node).
-        material: Material of each facet, shape (facet,).
+        patches: The facets.
         used: Facets that the receiving array hears, int64.
         from_rx: θ and φ of what reaches each facet from it, complex64, shape (facet, 2, node).
         from_tx: The same of all transmitting arrays, 0 where a facet is hidden, shape
             (way, facet, 2, node), and which of them to take.
-        ends: Centres [m] and offsets of the transmitting arrays, shapes (way, 3) and
-            (way, 4, element), and those of the receiving one, as `see_elements` takes them.
-        grid: Path length of a cell [m], middle wavenumber, those of the nodes [rad/m], and the
-            size of both arrays together [m].
+        arrays: The arrays.
+        grid: Path length of a cell [m], middle wavenumber and those of the nodes [rad/m].
         exact: Whether amplitudes of a way are those of each pair of elements, shape (way,).
         onto: Grid that each transmitting array adds to, shape (way,).
         out: Real and imaginary part at each node, cell and link, float32, shape
             (grid, node, 2, cell, tx · rx).
     """
     tx_fields, ways = from_tx
-    tx_centre, tx_offset, rx_centre, rx_offset = ends
-    cell_m, centre_k, node_k, size_m = grid
-    nodes, n_tx, n_rx = len(node_k), tx_offset.shape[2], rx_offset.shape[1]
+    cell_m, centre_k, node_k = grid
+    nodes, n_tx, n_rx = len(node_k), arrays.tx_offset.shape[2], arrays.rx_offset.shape[1]
     turns = np.concatenate((np.array([centre_k]), node_k - centre_k)) / (2.0 * math.pi)
     tx_seen, sent = _room_for(n_tx, nodes)
     rx_seen, heard = _room_for(n_rx, nodes)
     values = np.zeros((2, n_tx * n_rx), dtype=np.float32)
     kernel, weight = np.zeros(WIDTH, dtype=np.float32), np.zeros(nodes, dtype=np.complex128)
     for i in used:
-        b, scale = from_rx[i], areas[i] / 24.0
-        n = normals[i, 0], normals[i, 1], normals[i, 2]
-        to_rx, d_r = _towards(points[i], rx_centre)
+        b, area, scale = from_rx[i], patches.areas[i], patches.areas[i] / 24.0
+        n = patches.normals[i, 0], patches.normals[i, 1], patches.normals[i, 2]
+        to_rx, d_r = _towards(patches.points[i], arrays.rx_centre)
         ready = False
         for w in ways:
             a = tx_fields[w, i]
             if a[0, 0] == 0.0 and a[1, 0] == 0.0:
                 continue
-            to_tx, d_t = _towards(points[i], tx_centre[w])
-            spread = size_m / min(d_t, d_r)
+            to_tx, d_t = _towards(patches.points[i], arrays.tx_centre[w])
+            spread = arrays.size_m / min(d_t, d_r)
             if not seen_from_centres(to_tx, to_rx, n, scale * node_k[0] ** 2, spread):
                 continue
             if not ready:
-                see_elements(to_rx, d_r, n, rx_offset, turns, rx_seen, heard)
+                see_elements(to_rx, d_r, n, arrays.rx_offset, turns, rx_seen, heard)
                 ready = True
-            see_elements(to_tx, d_t, n, tx_offset[w], turns, tx_seen, sent)
+            see_elements(to_tx, d_t, n, arrays.tx_offset[w], turns, tx_seen, sent)
             first = _window((d_t + d_r) / cell_m, kernel)
-            _weights(a, b, gamma[material[i]], d_t + d_r, centre_k, areas[i], weight)
+            gamma = patches.gamma[patches.material[i]]
+            _weights(a, b, gamma, d_t + d_r, centre_k, area, weight)
             if not exact[w]:
-                _damp(to_tx, to_rx, n, scale, node_k, weight)
-                weight /= d_t
+                _damp(to_tx, to_rx, n, (scale, d_t), node_k, weight)
+            seen, fields, damping = (tx_seen, rx_seen), (sent, heard), scale * node_k**2
             for m in range(nodes):
-                if exact[w]:
-                    damping = scale * node_k[m] ** 2
-                    exact_values(tx_seen, rx_seen, sent[m], heard[m], weight[m], damping, values)
-                else:
-                    centre_values(rx_seen, sent[m], heard[m], weight[m], values)
+                _values_at(m, seen, fields, weight[m], damping[m], exact[w], values)
                 spread_values(values, kernel, first, out[onto[w], m])
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _values_at(
+    m: int,
+    seen: tuple[np.ndarray, np.ndarray],
+    fields: tuple[np.ndarray, np.ndarray],
+    weight: complex,
+    damping: float,
+    exact: bool,
+    values: np.ndarray,
+) -> None:
+    """Fills in what a facet adds to every link at node m, see `exact_values`."""
+    if exact:
+        exact_values(seen[0], seen[1], fields[0][m], fields[1][m], weight, damping, values)
+    else:
+        centre_values(seen[1], fields[0][m], fields[1][m], weight, values)
 
 
 @numba.njit(cache=True, nogil=True)

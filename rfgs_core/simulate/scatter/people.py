@@ -13,7 +13,7 @@ from rfgs_core.radio.sites import measured_pairs, ports
 from rfgs_core.simulate.geometry.room import Room
 from rfgs_core.simulate.geometry.surroundings import Surroundings
 from rfgs_core.simulate.scatter.grid import array_reach, delay_grid, to_subcarriers
-from rfgs_core.simulate.scatter.kernel import spread_facets
+from rfgs_core.simulate.scatter.kernel import Arrays, Patches, spread_facets
 from rfgs_core.simulate.scatter.sites import look_around, tabled_slabs
 from rfgs_core.simulate.scatter.ways import Scope, Ways, bodies_of, find_ways, pictures_of
 from rfgs_core.simulate.surface.posed import Facets
@@ -129,20 +129,24 @@ class PeopleChannel:
         grid, span = self._grid, body.span
         sent, heard = body.sent[port[0]], body.heard[port[1]]
         onto = np.cumsum(self._pairs[:, b]) - 1
+        patches = Patches(
+            facets.points[span],
+            facets.normals[span],
+            facets.areas[span],
+            gamma,
+            facets.material[span],
+        )
+        size_m = self._scope.size_m
         for way in np.flatnonzero(heard.site == b):
             walls = sent.walls + heard.walls[way]
             take = np.flatnonzero(self._pairs[sent.site, b] & (walls < self._scope.depth))
             spread_facets(
-                facets.points[span],
-                facets.normals[span],
-                facets.areas[span],
-                gamma,
-                facets.material[span],
+                patches,
                 np.flatnonzero(np.abs(heard.field[way, :, :, 0]).any(axis=1)),
                 heard.field[way],
                 (sent.field, take),
-                (sent.centre, sent.offset, heard.centre[way], heard.offset[way]),
-                (grid.cell_m, grid.centre_k, grid.node_k, self._scope.size_m),
+                Arrays(sent.centre, sent.offset, heard.centre[way], heard.offset[way], size_m),
+                (grid.cell_m, grid.centre_k, grid.node_k),
                 walls == 0,
                 onto[sent.site],
                 cells,

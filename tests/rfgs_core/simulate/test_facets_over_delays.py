@@ -13,7 +13,7 @@ from rfgs_core.simulate.paths.fields import past_slab
 from rfgs_core.simulate.scatter.antenna import CODES, Antenna, sent_towards
 from rfgs_core.simulate.scatter.arrivals import past
 from rfgs_core.simulate.scatter.grid import array_reach, delay_grid, to_subcarriers
-from rfgs_core.simulate.scatter.kernel import spread_facets
+from rfgs_core.simulate.scatter.kernel import Arrays, Patches, spread_facets
 from rfgs_core.simulate.scatter.ways import _offsets
 from rfgs_core.simulate.surface.facets import facet_sum
 
@@ -48,22 +48,17 @@ def _spread(points, normals, areas, tx, rx, grid) -> np.ndarray:
     fields[:, :, 0] = 1.0
     cells = np.zeros((1, nodes, 2, grid.cells, len(tx) * len(rx)), dtype=np.float32)
     size_m = sum(array_reach(xyz, np.zeros(len(xyz), dtype=int)) for xyz in (tx, rx))
+    ones, material = np.ones((1, nodes), dtype=np.complex64), np.zeros(len(points), dtype=np.int64)
+    tx_centre, rx_centre = tx.mean(axis=0), rx.mean(axis=0)
+    tx_offset = _offsets(np.ascontiguousarray(tx.T), tx_centre)
+    rx_offset = _offsets(np.ascontiguousarray(rx.T), rx_centre)
     spread_facets(
-        points,
-        normals,
-        areas,
-        np.ones((1, nodes), dtype=np.complex64),
-        np.zeros(len(points), dtype=np.int64),
+        Patches(points, normals, areas, ones, material),
         np.arange(len(points)),
         fields[0],
         (fields, np.zeros(1, dtype=np.int64)),
-        (
-            tx.mean(axis=0)[None],
-            _offsets(np.ascontiguousarray(tx.T), tx.mean(axis=0))[None],
-            rx.mean(axis=0),
-            _offsets(np.ascontiguousarray(rx.T), rx.mean(axis=0)),
-        ),
-        (grid.cell_m, grid.centre_k, grid.node_k, size_m),
+        Arrays(tx_centre[None], tx_offset[None], rx_centre, rx_offset, size_m),
+        (grid.cell_m, grid.centre_k, grid.node_k),
         np.ones(1, dtype=bool),
         np.zeros(1, dtype=np.int64),
         cells,

@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 
 from ..reporting import Progress, Undoable, chosen_path
-from .operators import color_solid_views, import_shown
+from .operators import import_shown
 
 _LABEL = "RF Gaussians (.ply)"
 
@@ -39,9 +39,8 @@ class RFGS_OT_import_ply(Undoable, bpy.types.Operator):
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
         """Imports, and lets the panel name what is here."""
         path = chosen_path(self.filepath)
-        told = import_shown(context.scene, path)
+        told = import_shown(context, path)
         context.scene.rfgs.gaussians.path = str(path)
-        color_solid_views(context)
         return told
 
 

@@ -50,21 +50,11 @@ class RFGS_OT_import_gaussians(Undoable, bpy.types.Operator):
 
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
         """Imports with the panel's settings."""
-        told = import_shown(context.scene, chosen_path(context.scene.rfgs.gaussians.path))
-        color_solid_views(context)
-        return told
+        return import_shown(context, chosen_path(context.scene.rfgs.gaussians.path))
 
 
-def color_solid_views(context: bpy.types.Context) -> None:
-    """Lets the Solid views of the open screen show colours at once; other views have them."""
-    if context.scene.rfgs.gaussians.solid_view:
-        for space in views_of(context.screen):
-            if space.shading.type == "SOLID":
-                color_view(space)
-
-
-def import_shown(scene: bpy.types.Scene, path: Path) -> str:
-    """Imports with the settings of the panel, at a frame that has Gaussians.
+def import_shown(context: bpy.types.Context, path: Path) -> str:
+    """Imports with the settings of the panel, at a frame that has Gaussians, seen in colour.
 
     Returns:
         One line about it.
@@ -72,10 +62,16 @@ def import_shown(scene: bpy.types.Scene, path: Path) -> str:
     Raises:
         AddonError: There is nothing to import, or a file is damaged; nothing has changed then.
     """
+    scene = context.scene
     wanted = replace(scene.rfgs.gaussians.inspection(), fall_back=True)
     done = import_gaussians(scene, path, wanted)
     if done.frames and not done.frames[0] <= scene.frame_current <= done.frames[-1]:
         scene.frame_set(done.frames[0])
+    if scene.rfgs.gaussians.solid_view:
+        # Solid views alone have to be told of colours.
+        for space in views_of(context.screen):
+            if space.shading.type == "SOLID":
+                color_view(space)
     more = f"; coloured automatically: {done.automatic}" if done.automatic else ""
     return f"Imported {done.count} Gaussians in {len(done.objects)} clouds{more}"
 

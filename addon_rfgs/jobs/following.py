@@ -50,6 +50,8 @@ def show() -> None:
             stored.jobs.remove(len(stored.jobs) - 1)
         while len(stored.jobs) < len(QUEUE.jobs):
             stored.jobs.add()
+            # Whoever begins a job looks at that one next.
+            stored.active_job = len(stored.jobs) - 1
         for row, job in zip(stored.jobs, QUEUE.jobs, strict=True):
             row.name = row.title = job.title
             row.state, row.message = job.state, job.message

@@ -257,7 +257,7 @@ class RFGS_OT_import_result(_OnChosenJob, Undoable, bpy.types.Operator):
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
         """Imports with the settings of the Gaussians panel, and points that at the run."""
         folder = following.chosen_job().plan.out
-        told = import_shown(context.scene, Path(folder))
+        told = import_shown(context, Path(folder))
         context.scene.rfgs.gaussians.path = folder
         return told
 

@@ -17,7 +17,8 @@ class RFGS_PG_jobs(bpy.types.PropertyGroup):
     radios: bpy.props.StringProperty(
         name="Radios",
         description="Presets to trace, with commas between; 'scene' is the one that the Empties "
-        "describe. Empty: 'scene' where some device is of that radio, else wifi",
+        "describe. Empty: 'scene' where some device is of that radio, else wifi, or the presets of "
+        "the devices where none takes part in wifi",
         search=_search_radios,
         search_options={"SUGGESTION"},
     )

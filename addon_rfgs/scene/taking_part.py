@@ -21,12 +21,16 @@ def wanted_radios(scene: bpy.types.Scene) -> list[str]:
     """Radios that a dataset of this scene is made with: the panel's, else those of its devices.
 
     Devices of the radio `scene` are somebody's own: they are meant where nothing else is said.
+    Where no device takes part in the usual radio, the presets that devices name are meant.
     """
     said = [name.strip() for name in scene.rfgs.jobs.radios.split(",") if name.strip()]
     if said:
         return said
-    own = any(item.rfgs.role != "NONE" and radio_of(item) == OWN for item in scene.objects)
-    return [OWN if own else _USUAL]
+    found = {radio_of(item) for item in scene.objects if item.rfgs.role != "NONE"}
+    if OWN in found:
+        return [OWN]
+    named = [name for name in RADIOS if name in found]
+    return [_USUAL] if found & {_USUAL, ANY} or not named else named
 
 
 def radio_of(item: bpy.types.Object) -> str:

@@ -238,9 +238,7 @@ def test_a_second_import_replaces_the_first_and_keeps_what_a_user_added(settings
 
 
 def test_a_static_cloud_without_gaussians_is_not_there(settings) -> None:
-    assert import_shown(bpy.context.scene, Path(settings.path)) == (
-        "Imported 120 Gaussians in 3 clouds"
-    )
+    assert import_shown(bpy.context, Path(settings.path)) == ("Imported 120 Gaussians in 3 clouds")
 
 
 def test_the_legend_says_what_the_colours_mean_with_a_unit(settings) -> None:
@@ -272,7 +270,7 @@ def test_an_import_goes_to_a_frame_with_gaussians_and_stays_at_one(settings) -> 
     scene = bpy.context.scene
     for before, after in ((1, 2), (6, 6), (40, 2)):
         scene.frame_set(before)
-        import_shown(scene, Path(settings.path))
+        import_shown(bpy.context, Path(settings.path))
         assert scene.frame_current == after
 
 

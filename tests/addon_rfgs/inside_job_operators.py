@@ -113,6 +113,12 @@ def test_devices_of_one_s_own_are_what_is_generated(tmp_path: Path, registered: 
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "room.blend"))
     scene = bpy.context.scene
     assert starting.generate_plan(scene).radios == "wifi" and not starting.doing_without(scene)
+    bpy.ops.rfgs.add_device(role="ACCESS_POINT")
+    device = bpy.context.object
+    for radio, meant in (("mmwave", "mmwave"), ("wifi", "wifi"), ("any", "wifi"), ("mine", "wifi")):
+        device.rfgs.radio = radio
+        assert starting.generate_plan(scene).radios == meant
+    bpy.data.objects.remove(device)
     bpy.ops.rfgs.add_device(role="TRANSMITTER")
     assert starting.generate_plan(scene).radios == "scene"
     assert starting.train_plan(scene).radio == "scene" and not starting.doing_without(scene)

@@ -116,3 +116,11 @@ def programs(blender: RealBlender, tmp_path: Path) -> tuple[Path, Path]:
     for program in (environment, opener):
         program.chmod(0o755)
     return environment, opener
+
+
+@pytest.fixture
+def tiny_blend(python, tmp_path: Path) -> Path:
+    """A box that walks through an empty room."""
+    builder = ROOT / "tests" / "dataset_factory" / "build_tiny_scene.py"
+    python(builder, tmp_path / "tiny.blend", "moving", "concrete", "1.0", must_work=True)
+    return tmp_path / "tiny.blend"

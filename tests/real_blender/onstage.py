@@ -25,6 +25,8 @@ import bpy
 EXTENSION = "bl_ext.user_default.addon_rfgs"
 #: Pixels between the places where a button is looked for; buttons are 20 high.
 _SEARCH_PX = 13
+#: How far below a button the first item of its menu lies.
+_MENU_PX = 30
 
 
 class Stage:
@@ -112,6 +114,24 @@ class Stage:
             self.window.event_simulate(type="LEFTMOUSE", value=value, x=found[0], y=found[1])
             yield 0.2
 
+    def choose_first(self, beside: str) -> Iterator[float]:
+        """Clicks the menu at the left of an operator's button, and then its first item.
+
+        Blender tells operators below the pointer, but no menus of operators.
+        """
+        found = yield from self._find(beside)
+        if found is None:
+            raise LookupError(f"no button of {beside} in the sidebar")
+        x, y = self.sidebar.x + self.sidebar.width // 5, found[1]
+        for down in (0, _MENU_PX):
+            for kind, value in (
+                ("MOUSEMOVE", "NOTHING"),
+                ("LEFTMOUSE", "PRESS"),
+                ("LEFTMOUSE", "RELEASE"),
+            ):
+                self.window.event_simulate(type=kind, value=value, x=x, y=y - down)
+                yield 0.3
+
     def forget_places(self) -> None:
         """Looks for buttons anew: they have moved."""
         self._places.clear()
@@ -122,7 +142,7 @@ class Stage:
         place = self._places.get(operator)
         if place is not None and (yield from self._hover(*place)) == operator:
             return place
-        for x in (region.x + region.width // 2, region.x + region.width // 6):
+        for x in (region.x + region.width * part // 6 for part in (3, 1, 5)):
             for y in range(region.y + region.height - 10, region.y, -_SEARCH_PX):
                 seen = yield from self._hover(x, y)
                 self._places[seen] = (x, y)

@@ -17,14 +17,6 @@ pytestmark = [pytest.mark.blender, pytest.mark.slow]
 HERE = Path(__file__).parent
 
 
-@pytest.fixture
-def tiny_blend(python, tmp_path: Path) -> Path:
-    """A box that walks through an empty room."""
-    builder = HERE.parent / "dataset_factory" / "build_tiny_scene.py"
-    python(builder, tmp_path / "tiny.blend", "moving", "concrete", "1.0", must_work=True)
-    return tmp_path / "tiny.blend"
-
-
 def test_a_job_runs_from_the_button_to_the_import(
     blender, programs: tuple[Path, Path], tiny_blend: Path, tmp_path: Path
 ) -> None:

@@ -55,6 +55,8 @@ class Clock:
 
     at_once: int = 1
     """Steps that are worked on at the same time; the first of each process tell the start only."""
+    first: int = 0
+    """Steps before those that tell of the start only too, as they are unlike the others."""
     now: Callable[[], float] = time.perf_counter
     """The time [s]."""
     began_s: float | None = None
@@ -73,10 +75,11 @@ class Clock:
     def speed(self) -> Speed | None:
         """The speed, None where too few steps have ended to know."""
         assert self.began_s is not None
-        counted = len(self.ends_s) - self.at_once
+        start = self.at_once + self.first
+        counted = len(self.ends_s) - start
         if counted < self.at_once:
             return None
-        step_s = (self.ends_s[-1] - self.ends_s[self.at_once - 1]) / counted
+        step_s = (self.ends_s[-1] - self.ends_s[start - 1]) / counted
         start_s = max(self.ends_s[-1] - self.began_s - step_s * len(self.ends_s), 0.0)
         return Speed(round(start_s, 3), round(step_s, 4))
 

@@ -147,13 +147,14 @@ class _Speeds:
     def __init__(self, job: Job) -> None:
         self._job = job
         self._radio = ""
-        self._clock = Clock(job.workers)
+        # The static channel meets none of the kernels that a first frame compiles or loads.
+        self._clock = Clock(job.workers, first=1)
 
     def step(self, task: Task) -> None:
         """A frame is done."""
         if self._radio not in ("", task.radio):
             self._note()
-            self._clock = Clock(self._job.workers, began_s=self._clock.ends_s[-1])
+            self._clock = Clock(self._job.workers, first=1, began_s=self._clock.ends_s[-1])
         self._radio = task.radio
         self._clock.step()
 

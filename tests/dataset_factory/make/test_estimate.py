@@ -34,9 +34,9 @@ MakeJob = Callable[..., Job]
 Factory = Callable[..., subprocess.CompletedProcess[str]]
 
 
-def measured(ends_s: list[float], at_once: int) -> Speed | None:
+def measured(ends_s: list[float], at_once: int, first: int = 0) -> Speed | None:
     times = iter([0.0, *ends_s])
-    clock = Clock(at_once, now=lambda: next(times))
+    clock = Clock(at_once, first, now=lambda: next(times))
     for _ in ends_s:
         clock.step()
     return clock.speed()
@@ -50,6 +50,12 @@ def test_the_pace_of_equal_frames_is_exact(processes: int) -> None:
     assert speed is not None
     assert speed.step_s == pytest.approx(3.0 / processes, rel=0.01)
     assert speed.seconds(400 * processes) == pytest.approx(7.0 + 1200.0, rel=0.01)
+
+
+def test_a_first_frame_that_compiles_is_part_of_the_start() -> None:
+    speed = measured([1.0, 61.0, 64.0, 67.0], 1, first=1)
+    assert speed == Speed(55.0, 3.0)
+    assert measured([1.0, 61.0], 1, first=1) is None
 
 
 def test_too_few_frames_tell_nothing() -> None:

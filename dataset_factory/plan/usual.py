@@ -55,8 +55,8 @@ RENDER_START_S = 0.7
 #: A picture without its pixels [s], and each sample of a pixel [s].
 _PICTURE_S, _SAMPLE_S = 0.07, 2.75e-6
 
-#: Geometry of a scene [B], and of what moves, for each person and frame [B].
-GEOMETRY_BYTES, PERSON_BYTES = 3.0e5, 4.7e4
+#: What is written once for a scene [B], and for what moves, for each person and frame [B].
+GEOMETRY_BYTES, PERSON_BYTES = 1.1e6, 5.2e4
 
 
 def render_step_s(pixels: float, samples: int) -> float:

@@ -91,7 +91,7 @@ def test_plan_tells_the_pace_of_a_cluster(
     commands = ("plan", "generate", "plan")
     answers = [factory(command, *arguments, **cache) for command in commands]
     assert [answer.returncode for answer in answers] == [0, 0, 0], answers[1].stderr
-    assert "frames  4, 0 cameras, 2 workers" in answers[0].stdout
+    assert "frames  4, 0 cameras, 0 pictures, 2 workers" in answers[0].stdout
     assert f"on {cluster.scheduler_address}: estimated from usual speeds" in answers[0].stdout
     assert "trace wifi estimated" not in answers[2].stdout
 

@@ -48,7 +48,7 @@ TRACE: dict[tuple[str, str, int], Speed] = {
 #: What each further packet of a frame takes, as a share of its first.
 PACKET = {"sionna": 0.05, "fast": 0.05}
 #: How much longer a frame takes whose paths are stored too.
-PATHS = 1.5
+PATHS = 1.25
 
 #: Blender's start, with the scene made ready to render [s].
 RENDER_START_S = 0.7

@@ -167,6 +167,12 @@ def test_a_study_says_what_is_left_and_learns_how_long_it_takes(
     assert "0 evaluations to make; at most 0.0 MB; about 0 s;" in price_line(chosen, tmp_path)
 
 
+def test_every_case_has_a_price(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    line = price_line(cases(list(SCENES), list(CONDITIONS), list(RADIOS), 1), tmp_path)
+    assert "30 cases" in line and " h, estimated" in line
+
+
 def test_work_that_failed_or_went_on_tells_no_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

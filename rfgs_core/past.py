@@ -119,7 +119,7 @@ class Forecast:
     seconds: dict[str, float]
     """Wall time by stage [s]."""
     measured: frozenset[str]
-    """Stages like one that ran here before."""
+    """Stages all of which ran here before; those of one name count together."""
     scaled: bool
     """Whether the rest is usual speeds times what this machine took of them."""
 
@@ -141,17 +141,16 @@ class Forecast:
 
 def forecast(stages: Iterable[Stage]) -> Forecast:
     """What stages will take, from what stages like them took here, else from what is usual."""
-    seconds, measured, scaled = {}, set(), False
+    seconds, guessed, scaled = {}, set(), False
     for stage in stages:
-        if (speed := past_speed(stage)) is not None:
-            measured.add(stage.name)
-        else:
+        if (speed := past_speed(stage)) is None:
+            guessed.add(stage.name)
             factor = _of_usual(stage.kind)
             scaled = scaled or factor is not None
             speed = stage.usual.times(factor or 1.0)
         total_s = speed.seconds(stage.steps) + (stage.starts - 1) * speed.start_s
         seconds[stage.name] = seconds.get(stage.name, 0.0) + (total_s if stage.steps else 0.0)
-    return Forecast(seconds, frozenset(measured), scaled)
+    return Forecast(seconds, frozenset(seconds) - guessed, scaled)
 
 
 def past_speed(stage: Stage) -> Speed | None:

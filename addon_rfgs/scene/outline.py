@@ -28,7 +28,7 @@ def outline(
     Returns:
         `frames`, a list of numbers; `devices`, rows with name, radio and role; and what time and
         disk go by: `cameras`, how many would render, `aspect`, shorter by longer side of a
-        picture, and `people`, how many there seem to be.
+        picture, `people`, how many there seem to be, and `fps`.
 
     Raises:
         AddonError: There is no such range of frames, or a name matches nothing.
@@ -40,13 +40,14 @@ def outline(
         devices, _ = find_devices(scene, overrides.devices)
         ring = overrides.cameras.ring if overrides.cameras else 0
         size = picture_size(scene, None)
-        people = _people(scene)
+        people, fps = _people(scene), scene.render.fps / scene.render.fps_base
     return {
         "frames": numbers,
         "devices": [{name: row[name] for name in ("name", "radio", "role")} for row in devices],
         "cameras": ring or len(perspective_cameras(scene)) or GUESSED_CAMERAS,
         "aspect": min(size) / max(size),
         "people": people,
+        "fps": fps,
     }
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -17,7 +18,8 @@ from dataset_factory.plan.usual import EXPORT, PACKET, PATHS, RENDER_START_S, TR
 from dataset_factory.scene.outline import Outline, device_radios
 from rfgs_core.dataset.schema import SequenceInfo, device_pose
 from rfgs_core.past import Speed, Stage, note_speed
-from rfgs_core.radio import PRESETS, DevicePose, Layout, Radio, layout
+from rfgs_core.radio import PRESETS, DevicePose, Layout, Radio, frame_samples, layout
+from rfgs_core.simulate.packets import TRACE_STEP_S
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,8 @@ class Size:
     """Pixels of a frame, all cameras together."""
     people: int
     """People, or other things that move where nobody does."""
+    fps: float
+    """Frames per second."""
     layouts: dict[str, Layout]
     """Antenna elements of each radio; where they stand may not be known yet."""
 
@@ -49,6 +53,7 @@ def size_of(plan: Plan, sequence: SequenceInfo) -> Size:
         len(cameras),
         sum(row["width"] * row["height"] for row in cameras),
         max(sum(bool(row["person"]) for row in sequence.instances), 1),
+        sequence.fps,
         {
             name: layout(plan.radio(name), [device_pose(row) for row in rows])
             for name, rows in sequence.devices.items()
@@ -61,7 +66,8 @@ def size_of_outline(plan: Plan, outline: Outline) -> Size:
     cameras = (plan.cameras or outline.cameras) if plan.images else 0
     pixels = plan.resolution * round(plan.resolution * outline.aspect)
     spreads = {name: _spread(plan.radio(name), outline.devices) for name in plan.radios}
-    return Size(len(outline.frames), cameras, cameras * pixels, max(outline.people, 1), spreads)
+    people = max(outline.people, 1)
+    return Size(len(outline.frames), cameras, cameras * pixels, people, outline.fps, spreads)
 
 
 def _spread(radio: Radio, rows: Sequence[dict[str, Any]]) -> Layout:
@@ -100,13 +106,14 @@ def _trace(job: Job, size: Size, name: str, scene: Any) -> Stage:
     like = _preset_like(radio, plan.tracer, depth)
     known = TRACE[plan.tracer, like.name, depth]
     pairs = heard_pairs(size.layouts[name]) / heard_pairs(_spread(like, []))
-    step_s = known.step_s * size.people * pairs
-    more = radio.samples_per_frame - like.samples_per_frame
+    step_s = known.step_s * size.people * pairs * (PATHS if plan.paths else 1.0)
     if radio.antennas_move:
         step_s *= radio.samples_per_frame / like.samples_per_frame
-    else:
-        step_s *= 1.0 + PACKET[plan.tracer] * max(more, 0)
-    step_s *= PATHS if plan.paths else 1.0
+    elif radio.samples_per_frame > 1:
+        # Traced anew every so often, and summed for every packet.
+        span_s = frame_samples(radio, size.fps).offset_s[-1]
+        traces = 1 + math.ceil(span_s / TRACE_STEP_S)
+        step_s *= traces + PACKET[plan.tracer] * (radio.samples_per_frame - 1)
     # Speeds are of two workers, each on a core of its own.
     cores = job.workers if job.scheduler else min(job.workers, os.cpu_count() or 1)
     usual = Speed(known.start_s, step_s * 2.0 / cores)

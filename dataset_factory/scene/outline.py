@@ -33,6 +33,8 @@ class Outline:
     """Shorter by longer side of a picture."""
     people: int
     """How many people there seem to be."""
+    fps: float
+    """Frames per second."""
 
 
 def read_outline(

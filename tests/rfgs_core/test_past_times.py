@@ -50,6 +50,12 @@ def test_a_stage_that_is_stopped_leaves_what_it_knows() -> None:
     assert past_speed(stage(size=3)) is None, "one step tells the start alone"
 
 
+def test_stages_of_one_name_are_measured_if_all_of_them_were() -> None:
+    note_speed(stage(size=1), Speed(0.0, 4.0))
+    both = forecast([stage(size=1, steps=2), stage(size=2, steps=2)])
+    assert both.seconds == {"walk": pytest.approx(8.0 + 16.0)} and not both.measured
+
+
 def test_nothing_left_takes_no_time() -> None:
     assert forecast([stage(steps=0)]).total_s == 0.0
 

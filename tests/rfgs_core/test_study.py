@@ -170,7 +170,7 @@ def test_a_study_says_what_is_left_and_learns_how_long_it_takes(
 def test_every_case_has_a_price(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     line = price_line(cases(list(SCENES), list(CONDITIONS), list(RADIOS), 1), tmp_path)
-    assert "30 cases" in line and " h, estimated" in line
+    assert "30 cases" in line and " min, estimated from usual" in line
 
 
 def test_work_that_failed_or_went_on_tells_no_time(

@@ -23,7 +23,7 @@ from dataset_factory.plan.job import Job
 from dataset_factory.plan.price import price_line
 from dataset_factory.plan.stages import Size, size_of_outline, speeds_noted, stages
 from dataset_factory.plan.tracers import TracerName
-from dataset_factory.plan.usual import render_step_s
+from dataset_factory.plan.usual import PACKET, render_step_s
 from dataset_factory.scene.outline import Outline
 from rfgs_core import interrupts
 from rfgs_core.errors import RfgsError
@@ -113,7 +113,7 @@ def no_past(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def size(job: Job, frames: int = 100) -> Size:
     """A scene of one person and four access points, pictures of the job's resolution."""
     devices = [{"name": str(n), "radio": "any", "role": "ACCESS_POINT"} for n in range(4)]
-    return size_of_outline(job.plan, Outline(list(range(frames)), devices, 3, 0.5, 1))
+    return size_of_outline(job.plan, Outline(list(range(frames)), devices, 3, 0.5, 1, 10.0))
 
 
 def run_of(job: Job, **speeds: Speed) -> None:
@@ -175,12 +175,13 @@ def test_more_people_packets_and_devices_take_longer(make_job: MakeJob, tmp_path
         job = make_job(tmp_path, **options)
         job = replace(job, plan=replace(job.plan, packets_per_frame=packets))
         rows = [{"name": str(n), "radio": "any", "role": "ACCESS_POINT"} for n in range(devices)]
-        outline = Outline([1], rows, 1, 1.0, people)
+        outline = Outline([1], rows, 1, 1.0, people, 10.0)
         return stages(job, size_of_outline(job.plan, outline))[1].usual.step_s
 
     assert step_s(people=4) == pytest.approx(4.0 * step_s())
     assert step_s(devices=2) == pytest.approx(0.25 * step_s())
-    assert step_s(packets=9) > step_s()
+    # 8 packets within 87.5 ms: traced six times, and seven more sums.
+    assert step_s(packets=8) == pytest.approx((6 + 7 * PACKET["sionna"]) * step_s())
     assert step_s(workers=1) == pytest.approx(2.0 * step_s(workers=2))
 
 

@@ -6,8 +6,8 @@ set -euo pipefail
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 bin=${1:-.venv/bin}
-exec >"$folder/log" 2>&1
-trap 'cat "$folder/log" >/dev/stderr' ERR
+exec 3>&2 >"$folder/log" 2>&1
+trap 'cat "$folder/log" >&3' ERR
 "$bin"/python -m dataset_factory generate living_room_walk --radio wifi --frames 10 --workers 1 \
   --no-images --out "$folder/data"
 example=$("$bin"/python -c 'from rfgs_core.example import example_folder; print(example_folder())')

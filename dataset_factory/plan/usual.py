@@ -2,9 +2,9 @@
 """What the stages of `generate` usually take, for machines that have not measured their own.
 
 Seconds of two workers, each with a core of an AMD EPYC for itself (2026-11-24): one person in
-`living_room_walk`, every second frame from 10 to 22. Processor time was counted, as others were at
-work on the machine; a start includes loading, not the one compilation of kernels after
-installation.
+`living_room_walk`, every second frame from 10 to 22 (at depth 3 to 14). Processor time was counted,
+as others were at work on the machine (of `sar`, of three frames, wall time less their share); a
+start includes loading, not the one compilation of kernels after installation.
 """
 
 from __future__ import annotations

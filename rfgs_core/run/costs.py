@@ -34,12 +34,12 @@ class Costs:
 
 
 #: Frames of Wi-Fi, 4 x 256 antenna elements and 64 subcarriers, on two cores of an
-#: AMD EPYC @MODEL@; `rfgs train` of the README's quick start.
+#: AMD EPYC, 2026-11-24; `rfgs train` of the README's quick start.
 USUAL = Costs(find_s=1.3, solve_s=0.77, step_s=0.049)
 #: Gaussians of a frame there.
 USUAL_GAUSSIANS = 6000
 #: Looks at a frame there while people are posed [s].
-USUAL_LOOK_S = 0.6
+USUAL_LOOK_S = 0.5
 #: PLY, features and checkpoint of a Gaussian of a frame [B].
 BYTES_PER_GAUSSIAN = 420.0
 

@@ -4,6 +4,7 @@ SHELL := /bin/bash
 PYTHON ?= python3.11
 VENV := .venv/bin
 READY := .venv/.ready
+KERNELS := .venv/.kernels
 # A machine with only `python3` is fine as long as that is Python 3.11.
 PYTHON_FOUND := $(shell command -v $(PYTHON) || command -v python3)
 
@@ -14,15 +15,17 @@ export OPENBLAS_NUM_THREADS ?= 1
 # that neighbours, which share what is costly to set up, stay together.
 WORKERS ?= 2
 
-.PHONY: demo test test-slow test-blender test-bpy test-wheel docs example release lint format sync system clean
+.PHONY: setup demo test test-slow test-blender test-bpy test-wheel docs example release lint format sync system clean
 
-demo: $(READY) system
+setup: $(KERNELS)
+
+demo: $(KERNELS)
 	$(VENV)/rfgs demo --out demo
 
-test: $(READY) system
+test: $(KERNELS)
 	$(VENV)/pytest -m "not slow and not blender" -n $(WORKERS) --dist worksteal tests
 
-test-slow: $(READY) system
+test-slow: $(KERNELS)
 	$(VENV)/pytest -m "slow and not blender" tests
 
 test-blender: $(READY) system
@@ -80,6 +83,12 @@ $(READY): pyproject.toml constraints.txt
 	@echo "Installing the pinned packages (about 4 GB on disk, several minutes) ..."
 	$(VENV)/python -m pip install --quiet --constraint constraints.txt --editable ".[dev]"
 	@touch $(READY)
+
+# Once, so that neither the first run nor each of its workers waits for compilers.
+$(KERNELS): $(READY) | system
+	@echo "Compiling kernels once (some two minutes) ..."
+	@bash .ci/compile_kernels.sh $(VENV)
+	@touch $(KERNELS)
 
 clean:
 	rm -rf .venv .blender demo site

@@ -21,15 +21,25 @@ from typing import Any, NoReturn
 STOPPED = 130
 
 MESSAGE = "\nstopped; finished work is kept, run the same command to continue\n"
+_NOTHING = "\nstopped; nothing was made\n"
 
 #: Set for a program that another one of ours has called, which says for both that it stopped.
 CALLED = "RFGS_CALLED"
 
 
+_message = MESSAGE
+
+
+def nothing_is_made() -> None:
+    """Says of this program that there will be nothing to keep where it is stopped."""
+    global _message
+    _message = _NOTHING
+
+
 def say_stopped() -> None:
     """Tells the user once, however many of our programs call each other."""
     if not os.environ.get(CALLED):
-        sys.stderr.write(MESSAGE)
+        sys.stderr.write(_message)
 
 
 def run_program(module: str) -> NoReturn:

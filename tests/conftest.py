@@ -27,6 +27,9 @@ ROOT = Path(__file__).resolve().parents[1]
 # numba's cache cannot store the wrapper.
 install_import_hook(["rfgs_core.radio", "rfgs_core.gaussians"], "beartype.beartype")
 
+# How fast tests go tells nothing of how fast this machine is: their notes are kept apart.
+os.environ.setdefault("XDG_CACHE_HOME", str(Path.home() / ".cache" / "rfgs-tests"))
+
 if not torch.cuda.is_available():
     # Kernels for a GPU then run in Triton's interpreter; triton reads it when it is imported.
     os.environ["TRITON_INTERPRET"] = "1"

@@ -100,8 +100,8 @@ def run(args: GenerateArgs) -> int:
     return 0
 
 
-def job_of(args: GenerateArgs) -> tuple[Job, Scene]:
-    """The job that arguments ask for, and its scene; says which devices it does without.
+def job_of(args: GenerateArgs) -> tuple[Job, Outline]:
+    """The job that arguments ask for, and its scene's outline; says which devices it does without.
 
     Raises:
         RfgsError: An argument is out of range, or names nothing.
@@ -147,7 +147,7 @@ def job_of(args: GenerateArgs) -> tuple[Job, Scene]:
     for sentence in left_out(seen.devices, radios):
         logger.warning("%s", sentence)
     memory_gb = args.worker_memory
-    return Job(args.out, plan, blender, args.workers, memory_gb, args.scheduler, source), scene
+    return Job(args.out, plan, blender, args.workers, memory_gb, args.scheduler, source), seen
 
 
 def _plan(

@@ -14,12 +14,12 @@ from dataset_factory.make.impair import impair_radio
 from dataset_factory.make.render import render
 from dataset_factory.make.sequence import describe_sequence, write_geometry
 from dataset_factory.plan.contents import versions
-from dataset_factory.plan.disk import Space, refuse_small_disk, space
-from dataset_factory.plan.folder import claim_taken_back, locked, note_taste, open_folder
+from dataset_factory.plan.disk import keep_space, refuse_small_disk, space
+from dataset_factory.plan.folder import claim_taken_back, locked, open_folder
 from dataset_factory.plan.job import Job
 from dataset_factory.plan.price import price_line
 from dataset_factory.plan.progress import progress_bar
-from dataset_factory.plan.speed_cache import recalled, remember
+from dataset_factory.plan.stages import size_of, speeds_noted
 from dataset_factory.scene.bundle import Bundle, read_bundle
 from dataset_factory.scene.devices import check_scene, choose_devices
 from dataset_factory.scene.radios import SCENE_RADIO, scene_radio
@@ -61,13 +61,12 @@ def generate(job: Job) -> bool:
         return False
     if job.scheduler:
         # A cluster that is not there is known before the scene is exported for it.
-        count_workers(job.scheduler)
+        job.workers = count_workers(job.scheduler)
     asked = job.plan
     begun = (job.out / "dataset.json").exists()
     logger.info("%s: %s", job.out, "continuing" if begun else "a new dataset")
     with locked(job):
         sweep(job.out, ".tmp-*", "*.partial")
-        note_taste(job, begun)
         info = DatasetInfo(versions(), asdict(job.plan), job.plan.seed, _contents(job), [job.name])
         with job.stage("export"):
             bundle = _export(job)
@@ -83,19 +82,12 @@ def generate(job: Job) -> bool:
         needed = space(job, bundle, sequence)
         with claim_taken_back(job, begun):
             refuse_small_disk(job, needed.bytes(len(sequence.frames)))
-        logger.info("%s", _price(replace(job, plan=asked), sequence, needed))
-        with job.stage("trace"):
-            trace(job, bundle, sequence)
-        needed = space(job, bundle, sequence)
-        if job.plan.impairments and not job.taste:
-            with job.stage("impair"):
-                _impair(job)
-        if job.plan.images:
-            with job.stage("render"):
-                render(job, sequence)
-        if job.taste:
-            remember(replace(job, plan=asked), len(sequence.frames), len(sequence.cameras), needed)
-            return True
+        # Later estimates ask before they know the scene's radio.
+        known, size = replace(job, plan=asked), size_of(job.plan, sequence)
+        logger.info("%s", price_line(known, size, needed.bytes(size.frames)))
+        with speeds_noted(known, size):
+            _fill(job, bundle, sequence)
+        keep_space(known, space(job, bundle, sequence))
         with job.stage("finish"):
             write_geometry(job.files, bundle)
             if job.plan.images:
@@ -105,15 +97,20 @@ def generate(job: Job) -> bool:
                 job.out,
                 DatasetInfo(made, info.config, info.root_seed, info.has, info.sequences),
             )
-    # Later estimates ask before they know the scene's radio.
-    remember(replace(job, plan=asked), len(sequence.frames), len(sequence.cameras), needed)
     shutil.rmtree(job.work)
     return True
 
 
-def _price(job: Job, sequence: SequenceInfo, needed: Space) -> str:
-    frames, cameras = len(sequence.frames), len(sequence.cameras) if job.plan.images else 0
-    return price_line(recalled(job), frames, cameras, len(job.plan.radios), needed.bytes(frames))
+def _fill(job: Job, bundle: Bundle, sequence: SequenceInfo) -> None:
+    """Makes the channels and pictures that are missing."""
+    with job.stage("trace"):
+        trace(job, bundle, sequence)
+    if job.plan.impairments:
+        with job.stage("impair"):
+            _impair(job)
+    if job.plan.images:
+        with job.stage("render"):
+            render(job, sequence)
 
 
 def _tell_depth(job: Job) -> None:

@@ -10,9 +10,9 @@ from dataset_factory.make.encode import encode_empty, encode_frame, rendered_who
 from dataset_factory.plan.contents import frame_runs, missing_pictures
 from dataset_factory.plan.job import Job
 from dataset_factory.plan.progress import progress_bar
-from dataset_factory.plan.speed import Clock
 from rfgs_core.dataset.schema import SequenceInfo
 from rfgs_core.frames import parse_frames
+from rfgs_core.past import Clock
 
 
 def render(job: Job, sequence: SequenceInfo) -> None:
@@ -24,9 +24,6 @@ def render(job: Job, sequence: SequenceInfo) -> None:
     cameras = [row["name"] for row in sequence.cameras]
     rendered = job.work / "rendered"
     missing = missing_pictures(job.files, sequence.frames)
-    if job.taste:
-        # Two pictures tell the time from one to the next.
-        missing = missing[: 1 if len(cameras) > 1 else 2]
     size = ["--out", str(rendered), *job.picture_size, "--samples", str(job.plan.samples)]
     for run in frame_runs(missing):
         shutil.rmtree(rendered, ignore_errors=True)
@@ -44,7 +41,7 @@ def render(job: Job, sequence: SequenceInfo) -> None:
             arguments = [*size, "--frames", run, "--passes"]
             job.run_blender("groundtruth", *arguments, progress=encode)
         _encode(job, rendered, cameras, frames)
-    if not job.taste and any(not job.files.image_empty(camera).is_file() for camera in cameras):
+    if any(not job.files.image_empty(camera).is_file() for camera in cameras):
         with progress_bar("empty room") as progress:
             frame = str(sequence.frames[0])
             arguments = [*size, "--frames", f"{frame}:{frame}", "--empty"]

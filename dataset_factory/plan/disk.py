@@ -4,15 +4,19 @@
 from __future__ import annotations
 
 import shutil
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
 from dataset_factory.plan.job import Job
+from dataset_factory.plan.stages import Size, heard_pairs
+from dataset_factory.plan.usual import GEOMETRY_BYTES, PERSON_BYTES
 from dataset_factory.scene.bundle import Bundle, frame_file
 from rfgs_core.dataset.csi_store import open_csi
 from rfgs_core.dataset.schema import SequenceInfo, device_pose
 from rfgs_core.errors import RfgsError
+from rfgs_core.past import keep, recalled, size_in_words
 from rfgs_core.radio import layout
 
 #: Picture, depth, normals and mask of one pixel as they are stored [B]; 5.5 in a furnished room.
@@ -73,9 +77,37 @@ def _path_bytes(job: Job, radio: str, sequence: SequenceInfo) -> float:
     if sizes:
         return max(sizes)
     spread = layout(job.plan.radio(radio), [device_pose(row) for row in sequence.devices[radio]])
-    tx, rx = np.nonzero(spread.measured)
-    pairs = np.unique(np.stack([spread.tx_site[tx], spread.rx_site[rx]]), axis=1).shape[1]
-    return PATH_BYTES_PER_PAIR * pairs
+    return PATH_BYTES_PER_PAIR * heard_pairs(spread)
+
+
+def expected_space(job: Job, size: Size) -> Space:
+    """What a scene needs of which only the outline is known: as it did before, else from above."""
+    if known := recalled("space", _what(job), Space):
+        return known
+    plan, copies = job.plan, 2.0 if job.plan.impairments else 1.0
+    once = GEOMETRY_BYTES + BYTES_PER_PIXEL * size.pixels
+    frame_bytes = 2.0 * PERSON_BYTES * size.people + BYTES_PER_PIXEL * size.pixels
+    for name, spread in size.layouts.items():
+        radio = plan.radio(name)
+        one = float(spread.measured.sum()) * radio.num_subcarriers * np.complex64().nbytes
+        frame_bytes += copies * one * radio.samples_per_frame
+        once += one * (radio.samples_per_frame if radio.antennas_move else 1)
+        if plan.paths:
+            once += PATH_BYTES_PER_PAIR * heard_pairs(spread)
+            frame_bytes += PATH_BYTES_PER_PAIR * heard_pairs(spread)
+    return Space(once, frame_bytes)
+
+
+def keep_space(job: Job, needed: Space) -> None:
+    """Keeps what a job needed for `expected_space`."""
+    keep("space", _what(job), needed)
+
+
+def _what(job: Job) -> dict[str, Any]:
+    """What decides how much disk a frame takes."""
+    return {
+        name: value for name, value in asdict(job.plan).items() if name not in ("frames", "seed")
+    }
 
 
 def refuse_small_disk(job: Job, needed_bytes: float) -> None:
@@ -89,11 +121,6 @@ def refuse_small_disk(job: Job, needed_bytes: float) -> None:
     free = shutil.disk_usage(folder).free
     if needed_bytes - there > free:
         raise RfgsError(
-            f"{job.out}: the dataset needs about {gigabytes(needed_bytes - there)} more, "
-            f"{gigabytes(free)} are free; take fewer --frames or --cameras, or another --out"
+            f"{job.out}: the dataset needs about {size_in_words(needed_bytes - there)} more, "
+            f"{size_in_words(free)} are free; take fewer --frames or --cameras, or another --out"
         )
-
-
-def gigabytes(size: float) -> str:
-    """A size in megabytes or gigabytes."""
-    return f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{size / 1e6:.1f} MB"

@@ -6,7 +6,6 @@ from __future__ import annotations
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import asdict
 from pathlib import Path
 
 from dataset_factory.plan.contents import refuse_other_plan
@@ -28,11 +27,6 @@ def open_folder(job: Job) -> bool:
         raise RfgsError(f"{links[0]}: a symbolic link; expected a file or folder of the dataset")
     if file.is_file():
         stored = read_dataset_info(file)
-        if _tasted(job) and stored.config != asdict(job.plan):
-            # Only `plan` was here, for other settings: nothing that anybody asked for.
-            for entry in job.out.iterdir():
-                shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
-            return True
         made_with = {} if stored.manifest_sha256 else stored.versions
         refuse_other_plan(job.out, job.plan, stored.config, made_with)
         if stored.manifest_sha256:
@@ -69,27 +63,6 @@ def locked(job: Job) -> Iterator[None]:
             if not (job.out / "dataset.json").exists():
                 _take_back(job, made)
             raise
-
-
-def note_taste(job: Job, begun: bool) -> None:
-    """Keeps in mind that a dataset was begun by a `plan` alone, until it is really asked for.
-
-    Args:
-        job: The run, whose folder is `locked`.
-        begun: Whether an earlier run began the dataset.
-    """
-    if job.taste and not begun:
-        _taste_file(job).touch()
-    elif not job.taste:
-        _taste_file(job).unlink(missing_ok=True)
-
-
-def _tasted(job: Job) -> bool:
-    return _taste_file(job).is_file()
-
-
-def _taste_file(job: Job) -> Path:
-    return job.work / "tasted"
 
 
 @contextmanager

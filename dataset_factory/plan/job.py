@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from dataset_factory.plan.contents import Plan
-from dataset_factory.plan.speed import Clock, Speed
 from dataset_factory.scene.blender import Blender, Progress
 from dataset_factory.scene.bundle import sanitised
 from dataset_factory.scene.overrides import overrides_file
 from rfgs_core.dataset.names import SequenceFiles
 from rfgs_core.files import write_json
+from rfgs_core.past import Clock, Speed
 
 
 @dataclass
@@ -43,8 +43,6 @@ class Job:
     """Speed of the stages of this run that had enough steps to tell."""
     traced: list[tuple[str, int | None, dict[str, Any]]] = field(default_factory=list)
     """Radio, frame and answer (seconds per stage, memory) of each channel traced in this run."""
-    taste: bool = False
-    """Make only as much of each stage as tells its speed; what is made stays."""
 
     @property
     def work(self) -> Path:
@@ -80,8 +78,10 @@ class Job:
     def clock(self, name: str) -> Iterator[Clock]:
         """Measures a stage step by step."""
         clock = Clock()
-        yield clock
-        self.note_speed(name, clock)
+        try:
+            yield clock
+        finally:
+            self.note_speed(name, clock)
 
     def note_speed(self, name: str, clock: Clock) -> None:
         """Keeps what a clock has to say."""

@@ -21,12 +21,20 @@ ANY_RADIO = "any"
 
 @dataclass(frozen=True)
 class Outline:
-    """Frames and devices of a file."""
+    """Frames and devices of a file, and what time and disk go by."""
 
     frames: list[int]
     """Frames that were asked for."""
     devices: list[dict[str, Any]]
     """Name, radio and role of each device."""
+    cameras: int
+    """Cameras that it would be rendered with."""
+    aspect: float
+    """Shorter by longer side of a picture."""
+    people: int
+    """How many people there seem to be."""
+    fps: float
+    """Frames per second."""
 
 
 def read_outline(
@@ -49,7 +57,7 @@ def read_outline(
         file = Path(name) / "outline.json"
         blender.run("outline", "--out", str(file), *asked, *more)
         found = read_json(file)
-    return Outline(found["frames"], found["devices"])
+    return Outline(**found)
 
 
 def usual_radios(devices: Iterable[dict[str, Any]]) -> tuple[str, ...]:

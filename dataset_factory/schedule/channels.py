@@ -22,7 +22,6 @@ from tqdm import tqdm
 
 from dataset_factory.plan.contents import missing_channels, versions
 from dataset_factory.plan.job import Job
-from dataset_factory.plan.speed import Clock
 from dataset_factory.scene.bundle import Bundle, frame_file
 from dataset_factory.schedule.worker import Answer, Request, Task, trace_frame
 from dataset_factory.schedule.workers import Workers, workers_here, workers_of
@@ -31,6 +30,7 @@ from rfgs_core.dataset.names import SequenceFiles
 from rfgs_core.dataset.schema import SequenceInfo, device_pose
 from rfgs_core.files import write_bytes
 from rfgs_core.links import refuse_link
+from rfgs_core.past import Clock
 
 if TYPE_CHECKING:
     from distributed import Future
@@ -46,10 +46,7 @@ def trace(job: Job, bundle: Bundle, sequence: SequenceInfo) -> None:
     tasks = [
         Task(radio, frame)
         for radio in job.plan.radios
-        for frame in missing_channels(job.files, radio, sequence.frames, job.plan.paths)[
-            # The first ones of each process tell its start alone.
-            : 2 * job.workers if job.taste else None
-        ]
+        for frame in missing_channels(job.files, radio, sequence.frames, job.plan.paths)
     ]
     if not tasks:
         return
@@ -87,7 +84,7 @@ def _trace(
         return client.submit(trace_frame, request, scene, moving, task, pure=False)
 
     speed, spent = _Speeds(job), Counter()
-    with tqdm(total=len(tasks), desc="trace", unit="frame") as bar:
+    with speed, tqdm(total=len(tasks), desc="trace", unit="frame") as bar:
         for task, answer in workers.answers(tasks, submit):
             start = time.perf_counter()
             _write(job.files, sequence, task, answer)
@@ -98,7 +95,6 @@ def _trace(
             speed.step(task)
             told = {"seconds": seconds, "memory_bytes": answer.memory_bytes}
             job.traced.append((task.radio, task.frame, told))
-    speed.note()
     job.seconds.update({f"trace.{name}": round(value, 3) for name, value in sorted(spent.items())})
 
 
@@ -151,16 +147,24 @@ class _Speeds:
     def __init__(self, job: Job) -> None:
         self._job = job
         self._radio = ""
-        self._clock = Clock(job.workers)
+        # The static channel meets none of the kernels that a first frame compiles or loads.
+        self._clock = Clock(job.workers, first=1)
 
     def step(self, task: Task) -> None:
         """A frame is done."""
         if self._radio not in ("", task.radio):
-            self.note()
-            self._clock = Clock(self._job.workers, began_s=self._clock.ends_s[-1])
+            self._note()
+            self._clock = Clock(self._job.workers, first=1, began_s=self._clock.ends_s[-1])
         self._radio = task.radio
         self._clock.step()
 
-    def note(self) -> None:
+    def __enter__(self) -> None:
+        """Tracing begins."""
+
+    def __exit__(self, *_error: object) -> None:
+        """Tracing has ended, or was stopped."""
+        self._note()
+
+    def _note(self) -> None:
         """Keeps the speed of the last radio."""
         self._job.note_speed(f"trace {self._radio}", self._clock)

@@ -3,7 +3,7 @@
 
 Call `dataset_factory.trace.setup.prepare` first, then import `Tracer`, `ApertureTracer` for a
 radio whose antennas move, or `FastBundleTracer` from here, which imports them on demand, since
-Sionna RT reads its settings from the environment at import.
+Sionna RT reads its settings from the environment at import. `sionna_scene` prepares by itself.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from dataset_factory.plan.tracers import TracerName
+from dataset_factory.trace.sionna_scene import sionna_scene
 from rfgs_core.radio import Radio
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
     AnyTracer: TypeAlias = Tracer | ApertureTracer | FastBundleTracer
 
-__all__ = ["ApertureTracer", "FastBundleTracer", "Tracer", "tracer_class"]
+__all__ = ["ApertureTracer", "FastBundleTracer", "Tracer", "sionna_scene", "tracer_class"]
 
 
 def tracer_class(name: TracerName, radio: Radio) -> Any:

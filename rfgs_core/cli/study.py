@@ -19,9 +19,9 @@ class StudyArgs:
     Scenes: living_room_walk, two_crossing, through_wall, office_sit_stand; four frames of each.
     Conditions: clean (direct paths only), impaired (noise, 10 bits, phase noise), walls (wall
     bounces; not for uwb). What is finished is kept: the same command continues where it stopped,
-    and with more seeds or scenes it adds them. A case takes some five minutes on two cores. One
-    that fails is named below the table, and the others go on: behind concrete nobody is heard at
-    60 GHz.
+    and with more seeds or scenes it adds them. Says before it begins what is left and how
+    long that takes. A case that fails is named below the table, and the others go on: behind
+    concrete nobody is heard at 60 GHz.
     """
 
     out: tyro.conf.Positional[Path]
@@ -47,10 +47,12 @@ def run(args: StudyArgs) -> int:
     from rfgs_core.files import write_json, write_text
     from rfgs_core.report.metrics_file import read_metrics
     from rfgs_core.study import cases, study_table, summarise
+    from rfgs_core.study.price import price_line, timed_work
 
     chosen = cases(args.scenes, args.conditions, args.radios, args.seeds)
     if args.out.exists() and not args.out.is_dir():
         raise RfgsError(f"{args.out} is a file; expected a folder, choose another")
+    sys.stderr.write(f"{price_line(chosen, args.out)}\n")
     results, failed = [], {}
     with tqdm(chosen, desc="study", unit="case") as bar:
         for case in bar:
@@ -59,9 +61,12 @@ def run(args: StudyArgs) -> int:
             try:
                 if not metrics.exists():
                     if not (dataset / "dataset.json").exists():
-                        call(*case.generate(args.out))
-                    call(*case.train(args.out))
-                    call(*case.evaluate(args.out))
+                        with timed_work("generate", case, args.out):
+                            call(*case.generate(args.out))
+                    with timed_work("train", case, args.out):
+                        call(*case.train(args.out))
+                    with timed_work("evaluate", case, args.out):
+                        call(*case.evaluate(args.out))
                 results.append((case, read_metrics(args.out / case.run)))
             except RfgsError as error:
                 failed[case.run.name] = str(error)

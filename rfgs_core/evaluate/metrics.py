@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -20,6 +21,7 @@ from rfgs_core.evaluate.image import IMAGE_KEYS
 from rfgs_core.evaluate.oracle import oracle_scores
 from rfgs_core.evaluate.people import FramePeople, people_metrics
 from rfgs_core.evaluate.pictures import Values, has_pictures, mean_of, picture_metrics
+from rfgs_core.evaluate.price import frames_stage, price_line
 from rfgs_core.evaluate.provenance import conditions, hardware, limits, now, versions
 from rfgs_core.evaluate.residual import GAUSSIANS_ALONE, Answer, with_residual
 from rfgs_core.evaluate.rf import RF_KEYS, frame_rf, pool_rf, rf_values
@@ -27,6 +29,7 @@ from rfgs_core.evaluate.scene import EvaluatedRun, Scene
 from rfgs_core.evaluate.verdicts import verdicts
 from rfgs_core.files import write_json
 from rfgs_core.measure.observations import Kept
+from rfgs_core.past import timed
 from rfgs_core.render.view import pictures_of
 
 SCHEMA = "rfgs-metrics/2"
@@ -49,10 +52,13 @@ def evaluate_run(run: EvaluatedRun, *, oracle: bool = True) -> dict[str, Any]:
     scene = Scene.of(run)
     table, room = _Table(), Backgrounds.of(scene)
     pictures = pictures_of(run, "test") if has_pictures(run) else []
+    sys.stderr.write(f"{price_line(run, len(pictures), oracle=oracle)}\n")
     steps = len(run.frames) * (1 + len(BASELINES)) + len(pictures)
     with tqdm(total=steps, desc="evaluate", unit="step") as bar:
-        for frame in run.frames:
-            _evaluate_frame(scene, frame, table, room, bar.update)
+        with timed(frames_stage(run)) as clock:
+            for frame in run.frames:
+                _evaluate_frame(scene, frame, table, room, bar.update)
+                clock.step()
         image, image_reasons = ({}, {})
         if pictures:
             image, image_reasons = picture_metrics(run, bar.update)

@@ -3,24 +3,17 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import os
-import platform
-import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import Any
 
 from tqdm import tqdm
 
-from rfgs_core.cache import cache_folder
-from rfgs_core.errors import RfgsError
-from rfgs_core.files import write_json
-from rfgs_core.records import read_record
+from rfgs_core.dataset import Sequence
+from rfgs_core.past import Speed, Stage, forecast, in_words, note_speed, size_in_words
+from rfgs_core.run.config import RunConfig
 from rfgs_core.run.folder import Run
 
 
@@ -40,38 +33,62 @@ class Costs:
         return self.find_s + self.solve_s + iterations * self.step_s
 
 
-#: Where nothing was measured yet: one access point room on one core; only the ratios count.
-USUAL = Costs(find_s=7.0, solve_s=3.0, step_s=0.07)
+#: Frames of Wi-Fi, 4 x 256 antenna elements and 64 subcarriers, on two cores of an
+#: AMD EPYC, 2026-11-24; `rfgs train` of the README's quick start.
+USUAL = Costs(find_s=1.3, solve_s=0.77, step_s=0.049)
+#: Gaussians of a frame there.
+USUAL_GAUSSIANS = 6000
+#: Looks at a frame there while people are posed [s].
+USUAL_LOOK_S = 0.5
+#: PLY, features and checkpoint of a Gaussian of a frame [B].
+BYTES_PER_GAUSSIAN = 420.0
 
 
-def recalled(run: Run) -> Costs | None:
-    """What trainings like this one have cost on this machine, None if there was none."""
-    # A note that cannot be read or written is no reason not to train.
-    with suppress(RfgsError, OSError):
-        file = _file(run)
-        return read_record(file, Costs, "delete it") if file.is_file() else None
-    return None
+def stages(config: RunConfig, sequence: Sequence, frames: int, iterations: int) -> list[Stage]:
+    """The stages of so many frames of a training."""
+    settings, radio = config.settings, config.radio
+    shape = sequence.layout(radio).measured.shape
+    what = {**asdict(settings), "radio": radio, "shape": shape}
+    for free in ("seed", "iterations"):
+        what.pop(free)
+    share = settings.num_gaussians / USUAL_GAUSSIANS
+    steps = {"find": frames, "solve": frames, "step": frames * iterations}
+    usual = {"find": USUAL.find_s, "solve": USUAL.solve_s, "step": share * USUAL.step_s}
+    return [
+        Stage(name, f"train-{name}", what, count, Speed(0.0, usual[name]))
+        for name, count in steps.items()
+    ]
 
 
-def price_line(run: Run) -> str:
+def expected(run: Run) -> Costs:
+    """What a frame is taken to cost: as trainings like this did here, else as usual."""
+    each = forecast(stages(run.config, run.sequence, 1, 1)).seconds
+    return Costs(each["find"], each["solve"], each["step"])
+
+
+def pose_stage(run: Run, looks: int) -> Stage:
+    """Posing people before frames are fitted, in so many looks at frames."""
+    what = [run.config.radio, run.sequence.layout(run.config.radio).measured.shape]
+    return Stage("pose", "train-pose", what, looks, Speed(0.0, USUAL_LOOK_S))
+
+
+def price_line(run: Run, looks: int = 0) -> str:
     """One line before a training begins: how much, how long, and what would be less.
 
     Args:
         run: The run; its settings say how many steps and Gaussians.
+        looks: How often frames are looked at to pose people.
     """
-    settings, known = run.config.settings, recalled(run)
+    settings = run.config.settings
     frames = sum(not run.ply_path(frame).is_file() for frame in run.frames)
-    disk_mb = frames * settings.num_gaussians * BYTES_PER_GAUSSIAN / 1e6
-    what = f"{frames} frames to fit, {settings.iterations} steps each, about {disk_mb:.0f} MB"
-    if known is None:
-        return f"{what}; how long is known after the first; fewer --frames make it less"
-    seconds = frames * known.frame_s(settings.iterations)
-    took = f"{seconds:.0f} s" if seconds < 100.0 else f"{seconds / 60.0:.0f} min"
-    return f"{what}; about {took}, as measured here before; fewer --frames or --iterations are less"
+    size = size_in_words(frames * settings.num_gaussians * BYTES_PER_GAUSSIAN)
+    posing = [pose_stage(run, looks)] if looks and frames else []
+    found = forecast([*posing, *stages(run.config, run.sequence, frames, settings.iterations)])
+    return (
+        f"{frames} frames to fit, {settings.iterations} steps each, about {size}; about "
+        f"{in_words(found.total_s)}, {found.source}; fewer --frames or --iterations are less"
+    )
 
-
-#: PLY, features and checkpoint of a Gaussian of a frame [B].
-BYTES_PER_GAUSSIAN = 420.0
 
 _FORMAT = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}<{remaining}{postfix}"
 
@@ -82,7 +99,7 @@ class CostBar:
     def __init__(self, run: Run, iterations: int) -> None:
         """Begins with what is remembered, or what is usual."""
         self._run, self._iterations = run, iterations
-        self._costs = recalled(run) or USUAL
+        self._costs = expected(run)
         self._left = len(run.frames)
         self._begin = self._found = self._solved = 0.0
         self._steps = 0
@@ -136,8 +153,9 @@ class CostBar:
                 self._solved - self._found,
                 (now - self._solved) / max(self._steps, 1),
             )
-            with suppress(RfgsError, OSError):
-                write_json(_file(self._run), asdict(self._costs))
+            one = stages(self._run.config, self._run.sequence, 1, 1)
+            for stage, cost_s in zip(one, asdict(self._costs).values(), strict=True):
+                note_speed(stage, Speed(0.0, cost_s))
         self._bar.total = self._bar.n + self._total()
         self._bar.refresh()
 
@@ -149,21 +167,8 @@ class CostBar:
 @contextmanager
 def cost_bar(run: Run, iterations: int) -> Iterator[CostBar]:
     """A bar for as long as the block runs."""
-    sys.stderr.write(f"{price_line(run)}\n")
     bar = CostBar(run, iterations)
     try:
         yield bar
     finally:
         bar.close()
-
-
-def _file(run: Run) -> Path:
-    """Where costs of trainings like this one lie; frames, seed and steps do not count."""
-    settings: dict[str, Any] = asdict(run.config.settings)
-    for name in ("seed", "iterations"):
-        settings.pop(name)
-    machine = [platform.node(), platform.machine(), os.cpu_count()]
-    shape = run.sequence.layout(run.config.radio).measured.shape
-    what = [settings, run.config.radio, shape, machine]
-    key = hashlib.sha256(json.dumps(what, sort_keys=True, default=str).encode()).hexdigest()
-    return cache_folder("costs") / f"{key[:32]}.json"

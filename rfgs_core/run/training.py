@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -25,9 +26,11 @@ from rfgs_core.fit.frame import FrameState, start_frame, start_on_skins
 from rfgs_core.fit.refine import need_sample_points
 from rfgs_core.fit.stages import fit_frame
 from rfgs_core.gaussians.ply import GaussianCloud, read_ply, write_ply
+from rfgs_core.limbs.weights import Trained
 from rfgs_core.links import refuse_link
 from rfgs_core.locks import alone_in
 from rfgs_core.measure.offsets import Offsets
+from rfgs_core.past import Speed, note_speed
 from rfgs_core.run.calibration import (
     calibration_path,
     need_shared_links,
@@ -36,7 +39,7 @@ from rfgs_core.run.calibration import (
 )
 from rfgs_core.run.checkpoint import finished_frame, partial_path, store_frame
 from rfgs_core.run.config import CONFIG_FILE, RunConfig
-from rfgs_core.run.costs import CostBar, cost_bar
+from rfgs_core.run.costs import CostBar, cost_bar, pose_stage, price_line
 from rfgs_core.run.encoders import (
     ENCODER_FILE,
     keep_encoder,
@@ -169,7 +172,10 @@ def _fit_frames(run: Run, config: TrainConfig, log: bool) -> float:
     spent = run.config.train_s
     before: FrameState | None = None
     begin = time.perf_counter()
-    limbs = _limbs(run, config)
+    trained = limbs_network(run) if limbs_wanted(run, config) else None
+    looks = looks_at(run) if trained or _evidence(run, config) else 0
+    sys.stderr.write(f"{price_line(run, looks)}\n")
+    limbs = _limbs(run, config, trained, looks) if looks else None
     spent += time.perf_counter() - begin
     with (
         cost_bar(run, config.iterations) as bar,
@@ -192,15 +198,20 @@ def _fit_frames(run: Run, config: TrainConfig, log: bool) -> float:
     return spent
 
 
-def _limbs(run: Run, config: TrainConfig) -> Limbs | None:
+def _evidence(run: Run, config: TrainConfig) -> bool:
+    """Whether evidence tells limbs without a network."""
+    return limbs_wanted(run, config) and evidence_tells(run, frames_read(run))
+
+
+def _limbs(run: Run, config: TrainConfig, trained: Trained | None, looks: int) -> Limbs | None:
     """Follows and poses the people of all frames, where a network or evidence tells limbs."""
-    if not limbs_wanted(run, config):
-        return None
-    trained = limbs_network(run)
-    if trained is None and not evidence_tells(run, frames_read(run)):
-        return None
-    with tqdm(total=looks_at(run), desc="posing people") as bar, one_torch_thread():
-        return find_limbs(run, config, trained, bar.update)
+    begin = time.perf_counter()
+    with tqdm(total=looks, desc="posing people") as bar, one_torch_thread():
+        limbs = find_limbs(run, config, trained, bar.update)
+        if bar.n >= looks:
+            each_s = (time.perf_counter() - begin) / looks
+            note_speed(pose_stage(run, looks), Speed(0.0, each_s))
+    return limbs
 
 
 def _fit(

@@ -14,6 +14,7 @@ from rfgs_core.cli.study import StudyArgs, run
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import write_json
 from rfgs_core.study import CONDITIONS, RADIOS, SCENES, Case, cases, study_table, summarise
+from rfgs_core.study.price import price_line, timed_work
 
 
 def metrics(f10: float, **changes: float) -> dict[str, Any]:
@@ -144,6 +145,45 @@ def test_a_case_that_fails_is_named_and_the_others_go_on(
     assert "| wifi |" not in text
     assert f"\n- {damaged.run.name}: `python -m rfgs_core.cli train" in text
     assert "failed (exit code 2)" in text
+
+
+def test_a_study_says_what_is_left_and_learns_how_long_it_takes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    chosen = cases(["living_room_walk"], ["clean"], ["wifi"], 3)
+    line = price_line(chosen, tmp_path)
+    assert "3 cases; 1 datasets, 3 trainings and 3 evaluations to make" in line
+    assert "usual speeds of two cores" in line and "fewer --seeds" in line
+    with timed_work("train", chosen[0], tmp_path):
+        pass
+    write_json(tmp_path / chosen[0].dataset / "dataset.json", {})
+    write_json(tmp_path / chosen[0].run / "metrics.json", {})
+    line = price_line(chosen, tmp_path)
+    assert "3 cases; 0 datasets, 2 trainings and 2 evaluations to make" in line
+    assert "evaluate estimated from usual speeds of two cores" in line
+    for case in chosen:
+        write_json(tmp_path / case.run / "metrics.json", {})
+    assert "0 evaluations to make; at most 0.0 MB; about 0 s;" in price_line(chosen, tmp_path)
+
+
+def test_every_case_has_a_price(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    line = price_line(cases(list(SCENES), list(CONDITIONS), list(RADIOS), 1), tmp_path)
+    assert "30 cases" in line and " min, estimated from usual" in line
+
+
+def test_work_that_failed_or_went_on_tells_no_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    (case,) = cases(["living_room_walk"], ["clean"], ["wifi"], 1)
+    with pytest.raises(RfgsError), timed_work("train", case, tmp_path):
+        raise RfgsError("no")
+    (tmp_path / case.run).mkdir(parents=True)
+    with timed_work("train", case, tmp_path):
+        pass
+    assert not list(tmp_path.rglob("study-*.json"))
 
 
 def test_a_failed_command_is_named() -> None:

@@ -12,6 +12,7 @@ from rfgs_core.evaluate.baselines import BASELINES
 from rfgs_core.evaluate.geometry import GEOMETRY_KEYS
 from rfgs_core.evaluate.image import IMAGE_KEYS
 from rfgs_core.evaluate.metrics import evaluate_run
+from rfgs_core.evaluate.price import price_line
 from rfgs_core.evaluate.rf import RF_KEYS
 from rfgs_core.evaluate.verdicts import LOST, WON, verdicts
 
@@ -131,6 +132,21 @@ def test_a_lost_comparison_says_whether_the_optimisation_is_at_fault() -> None:
 )
 def test_an_error_that_grew_is_not_removed(own: float, sentence: str) -> None:
     assert judged(own, 0.5, 0.8)[1].startswith(sentence)
+
+
+def test_an_evaluation_says_its_price_and_learns_from_it(
+    surface_run, capsys, tmp_path, monkeypatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    without, fit = (price_line(surface_run, 2, oracle=oracle) for oracle in (False, True))
+    assert "usual speeds of two cores" in without and "--no-oracle" not in without
+    assert f"{len(surface_run.frames)} fits from the true surface" in fit
+    assert fit.endswith("--no-oracle is less")
+    evaluate_run(surface_run, oracle=False)
+    said = capsys.readouterr().err
+    assert f"{len(surface_run.frames)} frames beside {len(BASELINES)} baselines" in said
+    assert "evaluate" not in price_line(surface_run, 0, oracle=False)
+    assert "as measured here before" in price_line(surface_run, 0, oracle=False)
 
 
 def test_evaluation_is_repeatable(metrics, surface_run) -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -10,8 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rfgs_core.past import forecast
 from rfgs_core.run import costs
-from rfgs_core.run.costs import USUAL, CostBar, Costs, price_line, recalled
+from rfgs_core.run.costs import USUAL, CostBar, Costs, expected, price_line, stages
 from rfgs_core.settings import TrainConfig
 
 STEPS = 10
@@ -74,30 +76,43 @@ def test_after_one_frame_the_rest_is_what_that_took(clock: Clock, run: Any) -> N
     bar.close()
 
 
+def source(run: Any) -> str:
+    return forecast(stages(run.config, run.sequence, 1, 1)).source
+
+
 def test_the_next_training_knows_from_its_beginning(clock: Clock, run: Any) -> None:
-    assert recalled(run) is None
-    assert "how long is known after the first" in price_line(run)
+    assert "estimated from usual speeds of two cores; becomes exact" in price_line(run)
     bar = CostBar(run, STEPS)
     fit_frame(bar, clock)
     bar.close()
-    assert recalled(run) == TRUE
+    assert expected(run) == TRUE
     run.ply_path(2).touch()
     line = price_line(run)
     whole = 3 * TRUE.frame_s(run.config.settings.iterations)
     assert line.startswith("3 frames to fit") and f"about {whole / 60:.0f} min" in line
+    assert "as measured here before" in line
     other = SimpleNamespace(
         **{**vars(run), "config": SimpleNamespace(radio="uwb", settings=TrainConfig())}
     )
-    assert recalled(other) is None, "another radio has costs of its own"
+    assert "usual speeds of two cores scaled to this machine" in source(other)
+
+
+def test_posing_people_is_part_of_the_price(clock: Clock, run: Any) -> None:
+    def seconds(line: str) -> float:
+        (word,) = re.findall(r"; about (\d+) s", line)
+        return float(word)
+
+    more = seconds(price_line(run, looks=40)) - seconds(price_line(run))
+    assert more == pytest.approx(40 * costs.USUAL_LOOK_S, abs=1.0)
 
 
 def test_a_damaged_note_stops_no_training(clock: Clock, run: Any, tmp_path: Path) -> None:
     bar = CostBar(run, STEPS)
     fit_frame(bar, clock)
     bar.close()
-    (note,) = (tmp_path / "cache").rglob("*.json")
-    note.write_text("{")
-    assert recalled(run) is None
+    for note in (tmp_path / "cache").rglob("*.json"):
+        note.write_text("{")
+    assert expected(run) == USUAL
 
 
 @pytest.mark.filterwarnings("error")

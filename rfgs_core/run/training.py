@@ -59,6 +59,7 @@ from rfgs_core.run.limbs import (
     looks_at,
 )
 from rfgs_core.run.log import Scalars, TrainingLog
+from rfgs_core.run.people import HeadCount, People, head_count, votes_of
 from rfgs_core.run.static import (
     has_static_set,
     need_phases,
@@ -79,6 +80,7 @@ def train_sequence(
     out: Path,
     encoder_file: Path | None = None,
     *,
+    people: People = "told",
     log: bool = False,
 ) -> Run:
     """Fits every frame, each starting from the one before; finished frames are kept.
@@ -91,6 +93,7 @@ def train_sequence(
         config: Settings.
         out: Folder of the run.
         encoder_file: Learned encoder of the settings, copied into the run.
+        people: How it is known how many people there are; a run keeps what it began with.
         log: Write curves for TensorBoard into `out`/log.
 
     Raises:
@@ -100,14 +103,14 @@ def train_sequence(
     _check(dataset, sequence, radio, config)
     if encoder_file is not None:
         refuse_other_radios(encoder_file, sequence, radio, config.packets)
-    bodies = sum(1 for row in sequence.instances if row["class"] == "person")
+    heads = _heads(out, sequence, radio, frames, config, people)
     asked = RunConfig(
         dataset=relative_dataset(out, dataset.path),
         dataset_fingerprint=dataset.fingerprint,
         sequence=sequence.name,
         radio=radio,
         frames=frames,
-        settings=replace(config, bodies=max(bodies, 1)),
+        settings=replace(config, bodies=max(heads.count, 1)),
     )
     if out.exists() and not out.is_dir():
         raise RfgsError(f"{out} is a file; expected a folder, choose another --out")
@@ -116,7 +119,35 @@ def train_sequence(
     with alone_in(out, out, "rfgs train"):
         sweep(out, ".tmp-*")
         # The file of a run does not keep every setting: the device is free.
-        return _train(_open_or_create(out, asked), asked.settings, sequence, encoder_file, log)
+        run = _open_or_create(out, asked)
+        heads.write(out)
+        return _train(run, asked.settings, sequence, encoder_file, log)
+
+
+def _heads(
+    out: Path,
+    sequence: Sequence,
+    radio: str,
+    frames: list[int],
+    config: TrainConfig,
+    people: People,
+) -> HeadCount:
+    """How many people there are; sensing is not repeated where a run knows.
+
+    Raises:
+        RfgsError: They are sensed and nobody is there.
+    """
+    kept = HeadCount.read(out) if out.is_dir() else None
+    if kept is not None and people in ("auto", kept.source):
+        return kept
+    with tqdm(total=votes_of(frames), desc="counting people", disable=people == "told") as bar:
+        heads = head_count(sequence, radio, frames, config, people, bar.update)
+    if heads.source == "sensed" and heads.count == 0:
+        raise RfgsError(
+            f"{radio} senses nobody in most of these frames; choose other --frames, or say "
+            "--people and how many there are"
+        )
+    return heads
 
 
 def _train(

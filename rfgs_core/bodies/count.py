@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Complex64, Float, Float64
 
 from rfgs_core.articulated import people
-from rfgs_core.bodies.localise import PairMaps, SEPARATION_M, locate_bodies, pair_maps
+from rfgs_core.bodies.localise import SEPARATION_M, PairMaps, locate_bodies, pair_maps
 from rfgs_core.bodies.separation import left_over
 from rfgs_core.encode.body_maps import CENTRE_HEIGHT_M
 from rfgs_core.limbs.evidence.body import Posed, by_walls, direct, figure_of, posed

@@ -5,8 +5,8 @@ Bodies, their echoes by way of walls and noise each make a pair's entries a norm
 
     y ~ CN(0, R),   R = Σ_k s_k C_k
 
-of levels s_k ≥ 0 that are not known. They are fitted by minorisation, every step of which raises the
-likelihood (Zhou, Hu, Zhou and Lange, J. Comput. Graph. Stat. 28(2), 2019):
+of levels s_k ≥ 0 that are not known. They are fitted by minorisation, every step of which raises
+the likelihood (Zhou, Hu, Zhou and Lange, J. Comput. Graph. Stat. 28(2), 2019):
 
     s_k ← s_k √(yᴴ R⁻¹ C_k R⁻¹ y / tr(R⁻¹ C_k))
 """

@@ -169,17 +169,18 @@ def gain_near(
         brightness += [
             level * pair.scale**2 / mean_power(part)
             for level, part in zip(fits[-1].level[1:], straight, strict=False)
-            if part.any()
+            if part.any() and pair.change.any()
         ]
     rises = [fit.rises(parts) for fit, parts in zip(fits, tried, strict=True)]
     best = int(np.sum(rises, axis=0).argmax())
     by_pair, expected = np.zeros(len(pairs)), np.full(len(pairs), np.inf)
     for row, (pair, fit) in enumerate(zip(pairs, fits, strict=True)):
         part = tried[row][best]
-        rise = fit.with_part(part).log_likelihood - fit.log_likelihood
-        by_pair[row] = rise - 0.5 * math.log(len(pair.change))
+        if pair.change.any():
+            by_pair[row] = fit.with_part(part).log_likelihood - fit.log_likelihood
+        by_pair[row] -= 0.5 * math.log(len(pair.change))
         if known:
-            level = float(np.median(brightness)) * mean_power(part) / pair.scale**2
+            level = float(np.median(brightness or [0.0])) * mean_power(part) / pair.scale**2
             expected[row] = fit.expected_rise(part, level)
     return Gain(np.asarray(place_xy) + _SHIFTS_M[best, :2], by_pair, expected)
 

@@ -140,7 +140,10 @@ def _heads(
     kept = HeadCount.read(out) if out.is_dir() else None
     if kept is not None and people in ("auto", kept.source):
         return kept
-    with tqdm(total=votes_of(frames), desc="counting people", disable=people == "told") as bar:
+    with (
+        tqdm(total=votes_of(frames), desc="counting people", disable=people == "told") as bar,
+        one_torch_thread(),
+    ):
         heads = head_count(sequence, radio, frames, config, people, bar.update)
     if heads.source == "sensed" and heads.count == 0:
         raise RfgsError(

@@ -96,7 +96,10 @@ class Levels(NamedTuple):
         """By how much each covariance, added alone, raises the log-likelihood at least [nat].
 
         The levels here keep their ratios: without them, what is left is one covariance and noise.
+        Zero where nothing was heard.
         """
+        if not self.change.any():
+            return np.zeros(len(parts))
         inverse = np.linalg.inv(np.linalg.cholesky(self.covariance))
         white = inverse @ self.change
         before = -len(white) * (math.log(np.vdot(white, white).real / len(white)) + 1.0)

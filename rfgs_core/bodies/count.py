@@ -30,10 +30,13 @@ from rfgs_core.settings import TrainConfig
 from rfgs_core.worlds.figure import Figure
 
 #: Evidence that it takes to count one more [nat], and beside others a share of their median.
-TO_COUNT, OF_OTHERS = 20.0, 0.2
+TO_COUNT, OF_OTHERS = 20.0, 0.3
 #: Share of the device pairs whose evidence rises, of those that would hear a body at the place:
 #: it would raise their log-likelihood by at least this on average [nat].
 PAIR_SHARE, AUDIBLE = 0.75, 5.0
+#: A pair does not hear who stands behind another body: within this of the line of sight, and this
+#: far behind it, for echoes that linger appear just behind a body [m].
+_HIDES_M, _BEHIND_M = 0.3, 0.7
 #: With fewer device pairs an echo off a wall cannot be told from a body.
 FEWEST_PAIRS = 3
 #: Nobody is looked for beyond so many.
@@ -43,6 +46,8 @@ _CANDIDATES = 3
 #: … and around each of them [m].
 _STEPS_M = 0.08 * np.arange(-2, 3)
 _SHIFTS_M = np.array([[x, y, 0.0] for x in _STEPS_M for y in _STEPS_M])
+#: Times that every body is moved to where it is likeliest beside all others, at most.
+_ROUNDS = 3
 #: Which way a body faces is not known: it is taken to face both ways [rad].
 _HEADINGS_RAD = (0.0, 0.5 * math.pi)
 
@@ -56,8 +61,8 @@ class Gain(NamedTuple):
     """Rise of the log-likelihood of each device pair, less ½ ln of its entries for the level that
     the body adds (Schwarz, Ann. Stat. 6(2), 1978) [nat]."""
     expected: Float64[np.ndarray, "pair"]
-    """Rise that a body would cause on average, were it as bright as the others [nat]; infinite
-    beside nobody."""
+    """Rise that a body would cause on average, were it as bright as the others [nat]; zero where
+    one of them hides it, infinite beside nobody."""
 
     @property
     def nat(self) -> float:
@@ -126,12 +131,16 @@ def _one_more(
 def _settled(observations: Observations, found: list[Gain]) -> list[Gain]:
     """Each body where it is likeliest beside all others."""
     found = list(found)
-    for body in range(len(found) if len(found) > 1 else 0):
-        others = np.delete(_places(found), body, axis=0)
-        again = gain_near(observations, others, found[body].place_xy)
-        if not _apart(others, again.place_xy):
-            again = again._replace(place_xy=found[body].place_xy)
-        found[body] = again
+    for _ in range(_ROUNDS if len(found) > 1 else 0):
+        before = _places(found)
+        for body in range(len(found)):
+            others = np.delete(_places(found), body, axis=0)
+            again = gain_near(observations, others, found[body].place_xy)
+            if not _apart(others, again.place_xy):
+                again = again._replace(place_xy=found[body].place_xy)
+            found[body] = again
+        if (_places(found) == before).all():
+            break
     return found
 
 
@@ -173,16 +182,30 @@ def gain_near(
         ]
     rises = [fit.rises(parts) for fit, parts in zip(fits, tried, strict=True)]
     best = int(np.sum(rises, axis=0).argmax())
-    by_pair, expected = np.zeros(len(pairs)), np.full(len(pairs), np.inf)
+    by_pair, expected = np.zeros(len(pairs)), np.full(len(pairs), 0.0 if known else np.inf)
     for row, (pair, fit) in enumerate(zip(pairs, fits, strict=True)):
         part = tried[row][best]
         if pair.change.any():
             by_pair[row] = fit.with_part(part).log_likelihood - fit.log_likelihood
         by_pair[row] -= 0.5 * math.log(len(pair.change))
-        if known:
+        if known and not _hidden(pair, known_xy, np.asarray(place_xy)):
             level = float(np.median(brightness or [0.0])) * mean_power(part) / pair.scale**2
             expected[row] = fit.expected_rise(part, level)
     return Gain(np.asarray(place_xy) + _SHIFTS_M[best, :2], by_pair, expected)
+
+
+def _hidden(
+    pair: Pair, known_xy: Float[np.ndarray, "body 2"], place_xy: Float64[np.ndarray, "2"]
+) -> bool:
+    """Whether a body stands between a place and an end of a pair, seen from above."""
+    behind_m = np.linalg.norm(known_xy - place_xy, axis=1)
+    for end in (pair.tx, pair.rx):
+        way = end.centre[:2] - place_xy
+        along = np.clip((known_xy - place_xy) @ way / (way @ way), 0.0, 1.0)
+        off_m = np.linalg.norm(place_xy + along[:, None] * way - known_xy, axis=1)
+        if ((off_m < _HIDES_M) & (behind_m > _BEHIND_M)).any():
+            return True
+    return False
 
 
 class _Standing(NamedTuple):

@@ -58,6 +58,8 @@ class BenchArgs:
     the package."""
     hold_out: bool = False
     """For the parts `limbs` and `people`: hide what the dataset holds out, as training does."""
+    frames: str | None = None
+    """Frames A:B[:STEP] (inclusive) for the part `people`; all when left out."""
     frame: int | None = None
     """Frame for the part `training`; the first one when left out."""
     gaussians: int = 20_000
@@ -156,17 +158,18 @@ def _people(args: BenchArgs) -> dict[str, Any]:
     from rfgs_core.dataset import open_dataset
     from rfgs_core.errors import RfgsError
     from rfgs_core.evaluate.head_count import head_count_table
+    from rfgs_core.frames import chosen_frames
     from rfgs_core.threads import one_torch_thread
 
     if args.dataset is None:
         raise RfgsError("bench people: expected --dataset FOLDER, see `rfgs-factory generate`")
     sequence = open_dataset(args.dataset).sequence()
-    with tqdm(total=len(sequence.frames), desc="people") as bar, one_torch_thread():
+    frames = chosen_frames(args.frames, sequence.frames)
+    with tqdm(total=len(frames), desc="people") as bar, one_torch_thread():
         table = head_count_table(
-            sequence, args.radio, sequence.frames,
-            everything=not args.hold_out, on_frame=bar.update,
-        )  # fmt: skip
-    return {**table, "frames": len(sequence.frames), **hardware()}
+            sequence, args.radio, frames, everything=not args.hold_out, on_frame=bar.update
+        )
+    return {**table, **hardware()}
 
 
 def _note(line: str) -> None:

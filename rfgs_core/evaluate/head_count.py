@@ -16,6 +16,8 @@ from rfgs_core.run.people import told, voted
 from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import TrainConfig
 
+#: Frames whose place is also taken by channels without anybody.
+CONTROLS = 3
 #: By how much gains of devices have drifted in the empty room that is heard anew.
 DRIFT = 0.01
 
@@ -45,27 +47,31 @@ def head_count_table(
     """
     true = told(sequence)
     seen = [observe(sequence, radio, frame, everything=everything) for frame in frames]
-    rows: list[tuple[int, int, int, float]] = []
+    counts: list[int] = []
+    nobody: dict[str, list[int]] = {"noise": [], "empty": []}
+    confirmed = 0
     config = TrainConfig()
     for index, (frame, one) in enumerate(zip(frames, seen, strict=True)):
         seed = sub_seed(0, sequence.name, radio, frame, "people")
         found = count_bodies(one, config, seed)
         other = seen[(index + len(seen) // 2) % len(seen)]
         there = [one_more_counts([gain_near(other, _NOBODY, body.place_xy)]) for body in found]
-        controls = (noise_alone(one, seed), empty_room_anew(one, seed))
-        nobody = [len(count_bodies(control, config, seed)) for control in controls]
-        rows.append((len(found), *nobody, float(np.sum(there))))
+        confirmed += sum(there)
+        counts.append(len(found))
+        if index < CONTROLS:
+            for name, control in (("noise", noise_alone), ("empty", empty_room_anew)):
+                nobody[name].append(len(count_bodies(control(one, seed), config, seed)))
         on_frame()
-    counts = np.array([row[0] for row in rows])
     return {
         "people": true,
-        "vote": voted(counts.tolist()),
-        "right": int((counts == true).sum()),
-        "over": int((counts > true).sum()),
-        "under": int((counts < true).sum()),
-        "noise alone": float(np.mean([row[1] for row in rows])),
-        "empty room heard anew": float(np.mean([row[2] for row in rows])),
-        "confirmed by another frame": float(sum(row[3] for row in rows) / max(counts.sum(), 1)),
+        "vote": voted(counts),
+        "right": sum(count == true for count in counts),
+        "over": sum(count > true for count in counts),
+        "under": sum(count < true for count in counts),
+        "frames": len(counts),
+        "noise alone": float(np.mean(nobody["noise"])),
+        "empty room heard anew": float(np.mean(nobody["empty"])),
+        "confirmed by another frame": confirmed / max(sum(counts), 1),
     }
 
 

@@ -18,6 +18,7 @@ from rfgs_core.errors import RfgsError
 from rfgs_core.files import write_json
 from rfgs_core.measure.observations import observe
 from rfgs_core.records import read_record
+from rfgs_core.run.folder import Run
 from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import TrainConfig
 
@@ -67,6 +68,12 @@ class HeadCount:
 def told(sequence: Sequence) -> int:
     """People among the dataset's instances."""
     return sum(1 for row in sequence.instances if row["class"] == "person")
+
+
+def known_people(run: Run) -> int:
+    """How many people a run takes to be there."""
+    kept = HeadCount.read(run.path)
+    return told(run.sequence) if kept is None else kept.count
 
 
 def why_not_sensed(sequence: Sequence, radio: str, config: TrainConfig) -> str | None:

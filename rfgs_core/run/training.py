@@ -59,7 +59,7 @@ from rfgs_core.run.limbs import (
     looks_at,
 )
 from rfgs_core.run.log import Scalars, TrainingLog
-from rfgs_core.run.people import HeadCount, People, head_count, votes_of
+from rfgs_core.run.people import HeadCount, People, head_count, told, votes_of
 from rfgs_core.run.static import (
     has_static_set,
     need_phases,
@@ -103,21 +103,22 @@ def train_sequence(
     _check(dataset, sequence, radio, config)
     if encoder_file is not None:
         refuse_other_radios(encoder_file, sequence, radio, config.packets)
-    heads = _heads(out, sequence, radio, frames, config, people)
-    asked = RunConfig(
-        dataset=relative_dataset(out, dataset.path),
-        dataset_fingerprint=dataset.fingerprint,
-        sequence=sequence.name,
-        radio=radio,
-        frames=frames,
-        settings=replace(config, bodies=max(heads.count, 1)),
-    )
     if out.exists() and not out.is_dir():
         raise RfgsError(f"{out} is a file; expected a folder, choose another --out")
     refuse_link(out / CONFIG_FILE)
     out.mkdir(parents=True, exist_ok=True)
     with alone_in(out, out, "rfgs train"):
         sweep(out, ".tmp-*")
+        _refuse_other_files(out)
+        heads = _heads(out, sequence, radio, frames, config, people)
+        asked = RunConfig(
+            dataset=relative_dataset(out, dataset.path),
+            dataset_fingerprint=dataset.fingerprint,
+            sequence=sequence.name,
+            radio=radio,
+            frames=frames,
+            settings=replace(config, bodies=max(heads.count, 1)),
+        )
         # The file of a run does not keep every setting: the device is free.
         run = _open_or_create(out, asked)
         heads.write(out)
@@ -137,7 +138,10 @@ def _heads(
     Raises:
         RfgsError: They are sensed and nobody is there.
     """
-    kept = HeadCount.read(out) if out.is_dir() else None
+    kept = HeadCount.read(out)
+    if kept is None and (out / CONFIG_FILE).exists():
+        # Runs without a word of it were told.
+        kept = HeadCount(told(sequence), "told")
     if kept is not None and people in ("auto", kept.source):
         return kept
     with (
@@ -292,11 +296,16 @@ def _calibrate(run: Run, frame: int, config: TrainConfig, seed: int) -> None:
     write_calibration(run.path, frame, calibrate(reported, config, seed, known))
 
 
+def _refuse_other_files(out: Path) -> None:
+    """Refuses a folder that holds something else than a run."""
+    # Whoever starts a training from elsewhere keeps its log there.
+    begun = (out / CONFIG_FILE).exists()
+    if not begun and any(entry.name != "log" for entry in out.iterdir()):
+        raise RfgsError(f"{out} is not empty and not a run; choose another --out")
+
+
 def _open_or_create(out: Path, config: RunConfig) -> Run:
     if not (out / CONFIG_FILE).exists():
-        # Whoever starts a training from elsewhere keeps its log there.
-        if any(entry.name != "log" for entry in out.iterdir()):
-            raise RfgsError(f"{out} is not empty and not a run; choose another --out")
         config.write(out)
         return Run(out, config)
     run = open_run(out)

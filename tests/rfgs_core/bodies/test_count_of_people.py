@@ -85,7 +85,7 @@ def test_another_place_explains_less(empty: Observations) -> None:
 def test_who_is_known_is_not_counted_again(empty: Observations) -> None:
     seen = lit(empty, BODIES[:1], seed=2)
     first = gain_near(seen, NOBODY, np.array(BODIES[0]))
-    beside = gain_near(seen, np.array(BODIES[:1]), np.array(BODIES[0]) + (0.45, 0.0))
+    beside = gain_near(seen, np.array(BODIES[:1]), np.add(BODIES[0], (0.45, 0.0)))
     assert not one_more_counts([first, beside])
 
 

@@ -183,12 +183,16 @@ def gain_near(
     rises = [fit.rises(parts) for fit, parts in zip(fits, tried, strict=True)]
     best = int(np.sum(rises, axis=0).argmax())
     by_pair, expected = np.zeros(len(pairs)), np.full(len(pairs), 0.0 if known else np.inf)
+    seen = [not _hidden(pair, known_xy, np.asarray(place_xy)) for pair in pairs]
+    if sum(seen) < FEWEST_PAIRS:
+        # Two pairs agree by chance on an echo off a wall: then all have a say.
+        seen = [True] * len(pairs)
     for row, (pair, fit) in enumerate(zip(pairs, fits, strict=True)):
         part = tried[row][best]
         if pair.change.any():
             by_pair[row] = fit.with_part(part).log_likelihood - fit.log_likelihood
         by_pair[row] -= 0.5 * math.log(len(pair.change))
-        if known and not _hidden(pair, known_xy, np.asarray(place_xy)):
+        if known and seen[row]:
             level = float(np.median(brightness or [0.0])) * mean_power(part) / pair.scale**2
             expected[row] = fit.expected_rise(part, level)
     return Gain(np.asarray(place_xy) + _SHIFTS_M[best, :2], by_pair, expected)

@@ -29,6 +29,8 @@ People = Literal["auto", "sensed", "told"] | int
 PEOPLE_FILE = "people.json"
 #: Frames of a sequence that have a vote.
 VOTES = 7
+#: Visible device pairs without which people are not sensed unasked: three radars count too many.
+AUTO_PAIRS = 4
 _REMEDY = "delete the run and train again"
 
 
@@ -76,7 +78,7 @@ def known_people(run: Run) -> int:
     return told(run.sequence) if kept is None else kept.count
 
 
-def why_not_sensed(sequence: Sequence, radio: str, config: TrainConfig) -> str | None:
+def why_not_sensed(sequence: Sequence, radio: str, config: TrainConfig, fewest: int) -> str | None:
     """Why people cannot be counted by a radio; None where they can be."""
     if config.observe != "complex":
         return f"--observe {config.observe} has no phases"
@@ -87,8 +89,8 @@ def why_not_sensed(sequence: Sequence, radio: str, config: TrainConfig) -> str |
     if any(row["class"] == "vehicle" for row in sequence.instances):
         return "a vehicle is no person, and changes the channel more"
     pairs = len(observe(sequence, radio, sequence.frames[0], config.channel).pairs[1])
-    if pairs < FEWEST_PAIRS:
-        return f"{radio} has {pairs} visible device pairs, fewer than {FEWEST_PAIRS}"
+    if pairs < fewest:
+        return f"{radio} has {pairs} visible device pairs, fewer than {fewest}"
     return None
 
 
@@ -117,7 +119,8 @@ def head_count(
         if asked < 1:
             raise RfgsError(f"--people {asked}: expected at least 1")
         return HeadCount(asked, "asked")
-    why_not = None if asked == "told" else why_not_sensed(sequence, radio, config)
+    fewest = FEWEST_PAIRS if asked == "sensed" else AUTO_PAIRS
+    why_not = None if asked == "told" else why_not_sensed(sequence, radio, config, fewest)
     if asked == "sensed" and why_not:
         raise RfgsError(f"--people sensed: {why_not}; expected --people told, or their number")
     if asked == "told" or why_not:

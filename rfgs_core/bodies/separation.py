@@ -89,6 +89,18 @@ def each_alone(
     return [_without(observations, part) for part in others]
 
 
+def left_over(
+    observations: Observations,
+    maps: PairMaps,
+    axes_xy: Float64[np.ndarray, "body 2"],
+    config: TrainConfig,
+    seed: int,
+) -> Observations:
+    """What remains of a frame without the echoes of all its bodies."""
+    echoes = _echoes(observations, maps, axes_xy, config, seed)
+    return _without(observations, echoes.sum(axis=0))
+
+
 def _move(
     found: Float64[np.ndarray, "body 2"],
     body: int,

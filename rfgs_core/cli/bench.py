@@ -28,11 +28,20 @@ class BenchArgs:
     measured data are explained, each part beside a baseline; docs/captures.md names the files.
     tracers: the fast tracer beside Sionna RT on our scenes, as `rfgs-factory tracers`.
     limbs: joints and surface of a dataset's one person beside what knows less.
+    people: how often a dataset's people are counted right, beside channels without any.
     """
 
     part: tyro.conf.Positional[
         Literal[
-            "propagation", "raster", "blender", "training", "readers", "real", "tracers", "limbs"
+            "propagation",
+            "raster",
+            "blender",
+            "training",
+            "readers",
+            "real",
+            "tracers",
+            "limbs",
+            "people",
         ]
     ]
     """What to time or judge."""
@@ -41,14 +50,16 @@ class BenchArgs:
     blender: Path | None = None
     """Blender program for the part `blender`; else $BLENDER, else pip's bpy."""
     dataset: Path | None = None
-    """Dataset for the parts `training` and `limbs`."""
+    """Dataset for the parts `training`, `limbs` and `people`."""
     radio: str = "wifi"
-    """Radio for the parts `training` and `limbs`."""
+    """Radio for the parts `training`, `limbs` and `people`."""
     network: Path | None = None
     """Network for the part `limbs`, as `rfgs limbs` makes it; left out: the one that comes with
     the package."""
     hold_out: bool = False
-    """For the part `limbs`: hide what the dataset holds out, as training does."""
+    """For the parts `limbs` and `people`: hide what the dataset holds out, as training does."""
+    frames: str | None = None
+    """Frames A:B[:STEP] (inclusive) for the part `people`; all when left out."""
     frame: int | None = None
     """Frame for the part `training`; the first one when left out."""
     gaussians: int = 20_000
@@ -77,6 +88,8 @@ def _bench(args: BenchArgs) -> Callable[[], dict[str, Any]]:
         return partial(_real, args)
     if args.part == "limbs":
         return partial(_limbs, args)
+    if args.part == "people":
+        return partial(_people, args)
     if args.part == "raster":
         from rfgs_core.render.bench import bench_raster
 
@@ -136,6 +149,27 @@ def _limbs(args: BenchArgs) -> dict[str, Any]:
         f"{row}: {name}": value for row, values in table.items() for name, value in values.items()
     }
     return {**flat, "frames": len(sequence.frames), **hardware()}
+
+
+def _people(args: BenchArgs) -> dict[str, Any]:
+    from tqdm import tqdm
+
+    from rfgs_core.bench import hardware
+    from rfgs_core.dataset import open_dataset
+    from rfgs_core.errors import RfgsError
+    from rfgs_core.evaluate.head_count import head_count_table
+    from rfgs_core.frames import chosen_frames
+    from rfgs_core.threads import one_torch_thread
+
+    if args.dataset is None:
+        raise RfgsError("bench people: expected --dataset FOLDER, see `rfgs-factory generate`")
+    sequence = open_dataset(args.dataset).sequence()
+    frames = chosen_frames(args.frames, sequence.frames)
+    with tqdm(total=len(frames), desc="people") as bar, one_torch_thread():
+        table = head_count_table(
+            sequence, args.radio, frames, everything=not args.hold_out, on_frame=bar.update
+        )
+    return {**table, **hardware()}
 
 
 def _note(line: str) -> None:

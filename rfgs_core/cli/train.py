@@ -7,7 +7,7 @@ import contextlib
 import sys
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
@@ -38,6 +38,9 @@ class TrainArgs:
     encoder: str = "matched_filter"
     """What gives the 32 features at a point: matched_filter; cnn:FILE with a file of
     `rfgs encode`; or paths, which reads traced paths (of datasets generated with --paths)."""
+    people: Literal["auto", "sensed", "told"] | int = "auto"
+    """How many people there are: sensed, counted by the radio alone; told, by the dataset's
+    instances; a number, so many; or auto, sensed where the radio allows it, else told."""
     packets: Packets | None = None
     """Of several packets (chirps) per frame: all, which tells the channel's change from noise by
     delay, direction and Doppler; or first, the one at the frame's own time. Left out: all, but
@@ -68,6 +71,7 @@ def run(args: TrainArgs) -> int:
     from rfgs_core.render.view import fit_run_shader
     from rfgs_core.run.calibration import calibration_text
     from rfgs_core.run.encoders import with_encoder
+    from rfgs_core.run.people import HeadCount
     from rfgs_core.run.training import train_sequence
     from rfgs_core.seeds import sub_seed
 
@@ -87,8 +91,10 @@ def run(args: TrainArgs) -> int:
     shader = args.shader and _can_color(dataset, sequence, frames)
     with watched(args.out) if args.view else contextlib.nullcontext():
         trained = train_sequence(
-            dataset, sequence, args.radio, frames, config, args.out, encoder_file, log=args.log
-        )
+            dataset, sequence, args.radio, frames, config, args.out, encoder_file,
+            people=args.people, log=args.log,
+        )  # fmt: skip
+    sys.stdout.write(f"people: {HeadCount.read(args.out)}\n")
     if args.options.calibrate != "none":
         sys.stdout.write(f"offsets: {calibration_text(args.out, frames)}\n")
     if shader and not (args.out / "shader.npz").exists():

@@ -36,6 +36,7 @@ from rfgs_core.report.page import (
 )
 from rfgs_core.report.player import player_of
 from rfgs_core.report.tables import metric_tables
+from rfgs_core.run.people import HeadCount
 
 #: Pictures of the scene and rows of rendered views, at most.
 SCENE_SHOTS, VIEW_ROWS = 4, 4
@@ -142,6 +143,13 @@ def _scene_shots(run: EvaluatedRun) -> list[Shot]:
     ]
 
 
+def _conditions(run: EvaluatedRun, metrics: dict[str, Any]) -> dict[str, Any]:
+    """What was asked for, how far paths were traced, and how the number of people is known."""
+    heads = HeadCount.read(run.path)
+    people = {} if heads is None else {"people": str(heads)}
+    return metrics["conditions"] | {"trace_depth": metrics["trace_depth"]} | people
+
+
 def _section(run: EvaluatedRun, metrics: dict[str, Any]) -> RunSection:
     scene = Scene.of(run)
     frame = run.frames[len(run.frames) // 2]
@@ -173,7 +181,7 @@ def _section(run: EvaluatedRun, metrics: dict[str, Any]) -> RunSection:
         views=_views(run),
         tables=metric_tables(metrics),
         limits=_limits(metrics),
-        conditions=pairs(metrics["conditions"] | {"trace_depth": metrics["trace_depth"]}),
+        conditions=pairs(_conditions(run, metrics)),
         reasons=sorted(metrics["reasons"].items()),
     )
 

@@ -24,6 +24,7 @@ from rfgs_core.limbs.skins import PosedPeople
 from rfgs_core.limbs.weights import Trained, own_network
 from rfgs_core.measure.observations import Observations
 from rfgs_core.run.folder import LIMBS_FILE, Run
+from rfgs_core.run.people import known_people
 from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import TrainConfig
 
@@ -152,9 +153,8 @@ def find_limbs(
 def evidence_tells(run: Run, frames: list[int]) -> bool:
     """Whether frames are those of one person and show enough of a walk."""
     sequence = run.sequence
-    people = sum(1 for row in sequence.instances if row["class"] == "person")
     time_s = np.array([sequence.time_s(frame) for frame in frames])
-    return people == 1 and long_enough(time_s)
+    return known_people(run) == 1 and long_enough(time_s)
 
 
 def looks_at(run: Run) -> int:

@@ -62,6 +62,7 @@ from rfgs_core.run.limbs import (
     looks_at,
 )
 from rfgs_core.run.log import Scalars, TrainingLog
+from rfgs_core.run.people import HeadCount, People, head_count, told, votes_of
 from rfgs_core.run.static import (
     has_static_set,
     need_phases,
@@ -82,6 +83,7 @@ def train_sequence(
     out: Path,
     encoder_file: Path | None = None,
     *,
+    people: People = "told",
     log: bool = False,
 ) -> Run:
     """Fits every frame, each starting from the one before; finished frames are kept.
@@ -94,6 +96,7 @@ def train_sequence(
         config: Settings.
         out: Folder of the run.
         encoder_file: Learned encoder of the settings, copied into the run.
+        people: How it is known how many people there are; a run keeps what it began with.
         log: Write curves for TensorBoard into `out`/log.
 
     Raises:
@@ -103,23 +106,58 @@ def train_sequence(
     _check(dataset, sequence, radio, config)
     if encoder_file is not None:
         refuse_other_radios(encoder_file, sequence, radio, config.packets)
-    bodies = sum(1 for row in sequence.instances if row["class"] == "person")
-    asked = RunConfig(
-        dataset=relative_dataset(out, dataset.path),
-        dataset_fingerprint=dataset.fingerprint,
-        sequence=sequence.name,
-        radio=radio,
-        frames=frames,
-        settings=replace(config, bodies=max(bodies, 1)),
-    )
     if out.exists() and not out.is_dir():
         raise RfgsError(f"{out} is a file; expected a folder, choose another --out")
     refuse_link(out / CONFIG_FILE)
     out.mkdir(parents=True, exist_ok=True)
     with alone_in(out, out, "rfgs train"):
         sweep(out, ".tmp-*")
+        _refuse_other_files(out)
+        heads = _heads(out, sequence, radio, frames, config, people)
+        asked = RunConfig(
+            dataset=relative_dataset(out, dataset.path),
+            dataset_fingerprint=dataset.fingerprint,
+            sequence=sequence.name,
+            radio=radio,
+            frames=frames,
+            settings=replace(config, bodies=max(heads.count, 1)),
+        )
         # The file of a run does not keep every setting: the device is free.
-        return _train(_open_or_create(out, asked), asked.settings, sequence, encoder_file, log)
+        run = _open_or_create(out, asked)
+        heads.write(out)
+        return _train(run, asked.settings, sequence, encoder_file, log)
+
+
+def _heads(
+    out: Path,
+    sequence: Sequence,
+    radio: str,
+    frames: list[int],
+    config: TrainConfig,
+    people: People,
+) -> HeadCount:
+    """How many people there are; sensing is not repeated where a run knows.
+
+    Raises:
+        RfgsError: They are sensed and nobody is there.
+    """
+    kept = HeadCount.read(out)
+    if kept is None and (out / CONFIG_FILE).exists():
+        # Runs without a word of it were told.
+        kept = HeadCount(told(sequence), "told")
+    if kept is not None and people in ("auto", kept.source):
+        return kept
+    with (
+        tqdm(total=votes_of(frames), desc="counting people", disable=people == "told") as bar,
+        one_torch_thread(),
+    ):
+        heads = head_count(sequence, radio, frames, config, people, bar.update)
+    if heads.source == "sensed" and heads.count == 0:
+        raise RfgsError(
+            f"{radio} senses nobody in most of these frames; choose other --frames, or say "
+            "--people and how many there are"
+        )
+    return heads
 
 
 def _train(
@@ -269,11 +307,16 @@ def _calibrate(run: Run, frame: int, config: TrainConfig, seed: int) -> None:
     write_calibration(run.path, frame, calibrate(reported, config, seed, known))
 
 
+def _refuse_other_files(out: Path) -> None:
+    """Refuses a folder that holds something else than a run."""
+    # Whoever starts a training from elsewhere keeps its log there.
+    begun = (out / CONFIG_FILE).exists()
+    if not begun and any(entry.name != "log" for entry in out.iterdir()):
+        raise RfgsError(f"{out} is not empty and not a run; choose another --out")
+
+
 def _open_or_create(out: Path, config: RunConfig) -> Run:
     if not (out / CONFIG_FILE).exists():
-        # Whoever starts a training from elsewhere keeps its log there.
-        if any(entry.name != "log" for entry in out.iterdir()):
-            raise RfgsError(f"{out} is not empty and not a run; choose another --out")
         config.write(out)
         return Run(out, config)
     run = open_run(out)

@@ -100,6 +100,8 @@ class Pair(NamedTuple):
     bands: Bands
     change: Complex128[np.ndarray, "entry"]
     """Entries in units of their root mean square."""
+    scale: float
+    """That root mean square."""
 
 
 def pairs_of(observations: Observations, centre: Float[np.ndarray, "3"]) -> list[Pair]:
@@ -134,7 +136,7 @@ def _pair(
         block = _summed(block * np.expand_dims(turned, 1 - axis), end.block, end.share, axis)
     change = _summed(block, bands.block, bands.share, 2).ravel()
     scale = np.sqrt(np.mean(np.abs(change) ** 2)) or 1.0
-    return Pair(view.pair, *ends, bands, change / scale)
+    return Pair(view.pair, *ends, bands, change / scale, float(scale))
 
 
 def _summed(values: np.ndarray, block: np.ndarray, share: np.ndarray, axis: int) -> np.ndarray:

@@ -34,7 +34,7 @@ def complaints(said: str) -> list[str]:
     return [
         line
         for line in lines
-        if line and not re.match(r"train wifi: +\d+%|\d+ frames to fit, ", line)
+        if line and not re.match(r"(train wifi|counting people): +\d+%|\d+ frames to fit, ", line)
     ]
 
 

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Levels of several covariances whose sum explains the entries of one device pair.
+
+Bodies, their echoes by way of walls and noise each make a pair's entries a normal vector; together
+
+    y ~ CN(0, R),   R = Σ_k s_k C_k
+
+of levels s_k ≥ 0 that are not known. They are fitted by minorisation, every step of which raises
+the likelihood (Zhou, Hu, Zhou and Lange, J. Comput. Graph. Stat. 28(2), 2019):
+
+    s_k ← s_k √(yᴴ R⁻¹ C_k R⁻¹ y / tr(R⁻¹ C_k))
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Complex, Complex128, Float64
+
+from rfgs_core.limbs.evidence.kernel import log_evidence
+
+#: Steps of the fit, and the least level of the first covariance, which is noise: a share of the
+#: entries' mean power.
+STEPS, LEAST_NOISE = 15, 1e-3
+
+
+class Levels(NamedTuple):
+    """Covariances at their likeliest levels."""
+
+    change: Complex128[np.ndarray, "entry"]
+    """What was heard, in units of its root mean square."""
+    parts: Complex128[np.ndarray, "part entry entry"]
+    """Covariances of mean power 1; the first is that of noise."""
+    level: Float64[np.ndarray, "part"]
+    """Power of each."""
+
+    @staticmethod
+    def fitted(
+        change: Complex128[np.ndarray, "entry"],
+        parts: list[Complex[np.ndarray, "entry entry"]],
+        start: Float64[np.ndarray, "part"] | None = None,
+    ) -> Levels:
+        """The likeliest levels of some covariances and of white noise.
+
+        Args:
+            change: What was heard, in units of its root mean square.
+            parts: Covariances of at least an upper triangle; one without power has no say.
+            start: Levels to start from, noise first; None: equal ones.
+        """
+        whole = np.array([np.eye(len(change)), *map(_whole, parts)], dtype=np.complex128)
+        level = np.full(len(whole), 1.0 / len(whole)) if start is None else start.copy()
+        level[~whole.any(axis=(1, 2))] = 0.0
+        for _ in range(STEPS):
+            inverse = np.linalg.inv(np.tensordot(level, whole, 1))
+            white = inverse @ change
+            power = np.einsum("n,kn->k", white.conj(), whole @ white).real
+            trace = np.einsum("knm,mn->k", whole, inverse).real
+            level = level * np.sqrt(power / np.maximum(trace, 1e-300))
+            level[0] = max(level[0], LEAST_NOISE)
+        return Levels(change, whole, level)
+
+    @property
+    def covariance(self) -> Complex128[np.ndarray, "entry entry"]:
+        """Of all together."""
+        return np.tensordot(self.level, self.parts, 1)
+
+    @property
+    def log_likelihood(self) -> float:
+        """Of what was heard, without the constant −N ln π [nat]."""
+        root = np.linalg.cholesky(self.covariance)
+        white = np.linalg.solve(root, self.change)
+        spread = 2.0 * float(np.log(np.diagonal(root).real).sum())
+        return -spread - float(np.vdot(white, white).real)
+
+    def with_part(self, part: Complex[np.ndarray, "entry entry"]) -> Levels:
+        """One covariance more, and the levels of all fitted anew."""
+        start = np.append(0.9 * self.level, 0.1 * self.level.sum())
+        start[0] = max(start[0], LEAST_NOISE)
+        parts = [*self.parts[1:], part]
+        return Levels.fitted(self.change, parts, start)
+
+    def expected_rise(self, part: Complex[np.ndarray, "entry entry"], level: float) -> float:
+        """By how much a covariance raises the log-likelihood on average where it is there [nat].
+
+        Σ (sλ − ln(1 + sλ)) over the eigenvalues λ of R⁻¹ C, the divergence of the two normal
+        distributions (Kullback and Leibler, Ann. Math. Stat. 22(1), 1951).
+        """
+        inverse = np.linalg.inv(np.linalg.cholesky(self.covariance))
+        eigenvalues = np.linalg.eigvalsh(inverse @ _whole(part) @ inverse.conj().T)
+        ratio = level * np.maximum(eigenvalues, 0.0)
+        return float((ratio - np.log1p(ratio)).sum())
+
+    def rises(self, parts: list[Complex[np.ndarray, "entry entry"]]) -> Float64[np.ndarray, "part"]:
+        """By how much each covariance, added alone, raises the log-likelihood at least [nat].
+
+        The levels here keep their ratios: without them, what is left is one covariance and noise.
+        Zero where nothing was heard.
+        """
+        if not self.change.any():
+            return np.zeros(len(parts))
+        inverse = np.linalg.inv(np.linalg.cholesky(self.covariance))
+        white = inverse @ self.change
+        before = -len(white) * (math.log(np.vdot(white, white).real / len(white)) + 1.0)
+        left = (inverse @ _whole(part) @ inverse.conj().T for part in parts)
+        rise = [log_evidence(white, part) - before for part in left]
+        return np.maximum(rise, 0.0)
+
+
+def mean_power(upper: Complex[np.ndarray, "entry entry"]) -> float:
+    """Mean power of entries of a covariance."""
+    return float(np.diagonal(upper).real.mean())
+
+
+def _whole(upper: Complex[np.ndarray, "entry entry"]) -> Complex128[np.ndarray, "entry entry"]:
+    """Both triangles of a covariance, at mean power 1."""
+    level = mean_power(upper)
+    matrix = np.triu(upper) + np.triu(upper, 1).conj().T
+    return (matrix / (level if level > 0.0 else 1.0)).astype(np.complex128)

@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How many people a run is about: sensed from the radio, told by the dataset, or asked for."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from rfgs_core.background.learned import learned_background
+from rfgs_core.bodies.count import FEWEST_PAIRS, count_bodies
+from rfgs_core.dataset import Sequence
+from rfgs_core.errors import RfgsError
+from rfgs_core.files import write_json
+from rfgs_core.measure.observations import observe
+from rfgs_core.records import read_record
+from rfgs_core.run.folder import Run
+from rfgs_core.seeds import sub_seed
+from rfgs_core.settings import TrainConfig
+
+#: auto: sensed where that can be, else told; sensed: from the radio alone; told: by the dataset's
+#: instances; a number: so many.
+People = Literal["auto", "sensed", "told"] | int
+#: Where a run keeps how many there are, and how that is known.
+PEOPLE_FILE = "people.json"
+#: Frames of a sequence that have a vote.
+VOTES = 7
+#: Visible device pairs without which people are not sensed unasked: three radars count too many.
+AUTO_PAIRS = 4
+_REMEDY = "delete the run and train again"
+
+
+@dataclass(frozen=True)
+class HeadCount:
+    """How many people there are in a sequence."""
+
+    count: int
+    """People."""
+    source: Literal["sensed", "told", "asked"]
+    """From the radio alone, from the dataset's instances, or by the option."""
+    votes: dict[str, int] = field(default_factory=dict)
+    """What single frames said, by their numbers; empty unless sensed."""
+
+    def __str__(self) -> str:
+        """One line for people to read."""
+        if self.source != "sensed":
+            return f"{self.count}, {self.source}"
+        same = sum(vote == self.count for vote in self.votes.values())
+        return f"{self.count}, sensed ({same} of {len(self.votes)} frames)"
+
+    def write(self, run: Path) -> None:
+        """Keeps it in a run."""
+        write_json(run / PEOPLE_FILE, asdict(self))
+
+    @staticmethod
+    def read(run: Path) -> HeadCount | None:
+        """What a run keeps; None of a run that was told without a word.
+
+        Raises:
+            RfgsFormatError: The file is damaged.
+        """
+        path = run / PEOPLE_FILE
+        return read_record(path, HeadCount, _REMEDY) if path.exists() else None
+
+
+def told(sequence: Sequence) -> int:
+    """People among the dataset's instances."""
+    return sum(1 for row in sequence.instances if row["class"] == "person")
+
+
+def known_people(run: Run) -> int:
+    """How many people a run takes to be there."""
+    kept = HeadCount.read(run.path)
+    return told(run.sequence) if kept is None else kept.count
+
+
+def why_not_sensed(sequence: Sequence, radio: str, config: TrainConfig, fewest: int) -> str | None:
+    """Why people cannot be counted by a radio; None where they can be."""
+    if config.observe != "complex":
+        return f"--observe {config.observe} has no phases"
+    if config.calibrate != "none":
+        return f"--calibrate {config.calibrate} finds offsets only where people are known"
+    if sequence.radio_spec(radio).antennas_move:
+        return f"the antennas of {radio} move within a frame"
+    if any(row["class"] == "vehicle" for row in sequence.instances):
+        return "a vehicle is no person, and changes the channel more"
+    pairs = len(observe(sequence, radio, sequence.frames[0], config.channel).pairs[1])
+    if pairs < fewest:
+        return f"{radio} has {pairs} visible device pairs, fewer than {fewest}"
+    return None
+
+
+def head_count(
+    sequence: Sequence,
+    radio: str,
+    frames: list[int],
+    config: TrainConfig,
+    asked: People = "auto",
+    on_frame: Callable[[], Any] = lambda: None,
+) -> HeadCount:
+    """How many people there are: what most of some frames say, spread over all.
+
+    Args:
+        sequence: The data.
+        radio: Which radio.
+        frames: Which frames.
+        config: What of the channel is read.
+        asked: How to know.
+        on_frame: Called when a frame is counted.
+
+    Raises:
+        RfgsError: They shall be sensed where that cannot be, or be fewer than one.
+    """
+    if isinstance(asked, int):
+        if asked < 1:
+            raise RfgsError(f"--people {asked}: expected at least 1")
+        return HeadCount(asked, "asked")
+    fewest = FEWEST_PAIRS if asked == "sensed" else AUTO_PAIRS
+    why_not = None if asked == "told" else why_not_sensed(sequence, radio, config, fewest)
+    if asked == "sensed" and why_not:
+        raise RfgsError(f"--people sensed: {why_not}; expected --people told, or their number")
+    if asked == "told" or why_not:
+        return HeadCount(told(sequence), "told")
+    spread = np.linspace(0, len(frames) - 1, votes_of(frames)).round().astype(int)
+    empty = None
+    if config.background == "learned":
+        empty = learned_background(sequence, radio, config.channel, config.observe, config.packets)
+    votes = {}
+    for frame in (frames[index] for index in spread):
+        seen = observe(
+            sequence, radio, frame, config.channel, config.observe, empty, config.packets
+        )
+        seed = sub_seed(config.seed, sequence.name, radio, frame, "people")
+        votes[str(frame)] = len(count_bodies(seen, config, seed))
+        on_frame()
+    return HeadCount(voted(list(votes.values())), "sensed", votes)
+
+
+def votes_of(frames: list[int]) -> int:
+    """How many of some frames have a vote."""
+    return min(VOTES, len(frames))
+
+
+def voted(votes: list[int]) -> int:
+    """What most frames say, of equals the larger: people hide each other more often than not."""
+    tally = Counter(votes)
+    return max(tally, key=lambda count: (tally[count], count))

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""People are counted by what most device pairs hear; noise and echoes of one pair are nobody."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from lit_bodies import lit
+
+from rfgs_core.bodies.count import (
+    FEWEST_PAIRS,
+    OF_OTHERS,
+    TO_COUNT,
+    Gain,
+    count_bodies,
+    gain_near,
+    one_more_counts,
+)
+from rfgs_core.measure.observations import Observations
+from rfgs_core.radio import preset
+from rfgs_core.settings import TrainConfig
+
+ROOM_M = np.array([[0.0, 0.0, 0.0], [5.0, 4.6, 2.4]])
+BODIES = [(1.5, 2.9), (3.4, 1.6)]
+NOBODY = np.zeros((0, 2))
+
+
+@pytest.fixture
+def empty(make_observations: Callable[..., Observations]) -> Observations:
+    radio = replace(preset("wifi"), rx_rows=4, rx_cols=4, num_subcarriers=32)
+    return make_observations(radio=radio, bounds_m=ROOM_M)
+
+
+def noisy(observations: Observations, share: float) -> Observations:
+    """With noise of a share of the mean power."""
+    rng = np.random.default_rng(5)
+    entries = observations.links[..., None] & observations.subcarriers
+    power = np.mean(np.abs(observations.delta[entries]) ** 2)
+    noise = rng.standard_normal((2, *entries.shape)) * np.sqrt(0.5 * share * (power or 1.0))
+    return observations.with_delta(observations.delta + entries * (noise[0] + 1j * noise[1]))
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_people_are_counted_where_they_stand(empty: Observations, count: int) -> None:
+    seen = noisy(lit(empty, BODIES[:count], seed=2), 0.1)
+    found = count_bodies(seen, TrainConfig(), 0)
+    assert len(found) == count
+    for place in BODIES[:count]:
+        assert min(np.linalg.norm(one.place_xy - place) for one in found) < 0.25
+
+
+def test_an_unchanged_channel_has_nobody(empty: Observations) -> None:
+    assert count_bodies(empty, TrainConfig(), 0) == []
+
+
+def test_too_few_device_pairs_count_nobody(empty: Observations) -> None:
+    seen = lit(empty, BODIES[:1], seed=2)
+    pair, _ = seen.pairs
+    few = replace(seen, links=seen.links & (pair >= 0) & (pair < FEWEST_PAIRS - 1))
+    assert count_bodies(few, TrainConfig(), 0) == []
+
+
+def test_what_one_pair_alone_hears_is_nobody(empty: Observations) -> None:
+    body = lit(empty, BODIES[:1], seed=2)
+    pair, names = body.pairs
+    quiet = noisy(empty.with_delta(np.zeros_like(body.delta)), 1.0).delta
+    level = np.sqrt(np.mean(np.abs(body.delta[pair == 0]) ** 2))
+    only = np.where((pair == 0)[..., None], body.delta, 0.1 * level * quiet)
+    gain = gain_near(body.with_delta(only), NOBODY, np.array(BODIES[0]))
+    assert gain.nat > TO_COUNT
+    assert gain.heard < 0.5
+    assert not one_more_counts([gain])
+    assert len(gain.by_pair) == len(names)
+
+
+def test_another_place_explains_less(empty: Observations) -> None:
+    seen = lit(empty, BODIES[:1], seed=2)
+    here, there = (gain_near(seen, NOBODY, np.array(place)) for place in BODIES)
+    assert here.nat > 2.0 * there.nat
+
+
+def test_who_is_known_is_not_counted_again(empty: Observations) -> None:
+    seen = lit(empty, BODIES[:1], seed=2)
+    first = gain_near(seen, NOBODY, np.array(BODIES[0]))
+    beside = gain_near(seen, np.array(BODIES[:1]), np.add(BODIES[0], (0.45, 0.0)))
+    assert not one_more_counts([first, beside])
+
+
+@pytest.mark.parametrize(
+    ("by_pair", "expected", "counts"),
+    [
+        ([30.0, 30.0, 30.0, 30.0], [90.0, 90.0, 90.0, 90.0], True),
+        ([30.0, 30.0, 30.0, -2.0], [90.0, 90.0, 90.0, 90.0], True),
+        ([60.0, 60.0, -2.0, -2.0], [90.0, 90.0, 90.0, 90.0], False),
+        ([60.0, 60.0, -2.0, -2.0], [90.0, 90.0, 1.0, 1.0], True),
+        ([4.0, 4.0, 4.0, 4.0], [90.0, 90.0, 90.0, 90.0], False),
+        ([60.0, 60.0, 60.0, 60.0], [1.0, 1.0, 1.0, 1.0], False),
+    ],
+)
+def test_evidence_and_agreement_are_both_needed(
+    by_pair: list[float], expected: list[float], counts: bool
+) -> None:
+    one = Gain(np.zeros(2), np.array(by_pair), np.array(expected))
+    assert one_more_counts([one]) is counts
+
+
+def test_next_to_strong_evidence_a_faint_one_is_nobody() -> None:
+    def of(nat: float) -> Gain:
+        return Gain(np.zeros(2), np.full(4, nat / 4), np.full(4, 1e3))
+
+    strong = 4.0 * TO_COUNT / OF_OTHERS
+    assert one_more_counts([of(2.0 * TO_COUNT)])
+    assert not one_more_counts([of(strong), of(strong), of(2.0 * TO_COUNT)])

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
@@ -10,6 +11,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from tqdm import tqdm
 
 from rfgs_core.background.learned import learned_background
 from rfgs_core.bodies.count import FEWEST_PAIRS, count_bodies
@@ -18,9 +20,11 @@ from rfgs_core.errors import RfgsError
 from rfgs_core.files import write_json
 from rfgs_core.measure.observations import observe
 from rfgs_core.records import read_record
+from rfgs_core.run.config import CONFIG_FILE
 from rfgs_core.run.folder import Run
 from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import TrainConfig
+from rfgs_core.threads import one_torch_thread
 
 #: auto: sensed where that can be, else told; sensed: from the radio alone; told: by the dataset's
 #: instances; a number: so many.
@@ -31,6 +35,7 @@ PEOPLE_FILE = "people.json"
 VOTES = 7
 #: Visible device pairs without which people are not sensed unasked: three radars count too many.
 AUTO_PAIRS = 4
+_LOG = logging.getLogger(__name__)
 _REMEDY = "delete the run and train again"
 
 
@@ -92,6 +97,49 @@ def why_not_sensed(sequence: Sequence, radio: str, config: TrainConfig, fewest: 
     if pairs < fewest:
         return f"{radio} has {pairs} visible device pairs, fewer than {fewest}"
     return None
+
+
+def counted(
+    out: Path,
+    sequence: Sequence,
+    radio: str,
+    frames: list[int],
+    config: TrainConfig,
+    people: People,
+) -> HeadCount:
+    """How many people a run in a folder is about; sensing is not repeated where it knows.
+
+    Args:
+        out: Folder of the run, which may be new.
+        sequence: The data.
+        radio: Which radio.
+        frames: Frames of the run.
+        config: What of the channel is read.
+        people: How to know.
+
+    Raises:
+        RfgsError: They shall be sensed where that cannot be, or nobody is sensed.
+    """
+    kept = HeadCount.read(out)
+    if kept is None and (out / CONFIG_FILE).exists():
+        # Runs without a word of it were told.
+        kept = HeadCount(told(sequence), "told")
+    if kept is not None and people in ("auto", kept.source):
+        return kept
+    with (
+        tqdm(total=votes_of(frames), desc="counting people", delay=1.0) as bar,
+        one_torch_thread(),
+    ):
+        heads = head_count(sequence, radio, frames, config, people, bar.update)
+    if heads.source == "sensed" and heads.count == 0:
+        if people == "auto":
+            _LOG.warning("%s senses nobody; taken to be there: %d, told", radio, told(sequence))
+            return HeadCount(told(sequence), "told")
+        raise RfgsError(
+            f"{radio} senses nobody in most of these frames; choose other --frames, or say "
+            "--people and how many there are"
+        )
+    return heads
 
 
 def head_count(

@@ -62,7 +62,7 @@ from rfgs_core.run.limbs import (
     looks_at,
 )
 from rfgs_core.run.log import Scalars, TrainingLog
-from rfgs_core.run.people import HeadCount, People, head_count, told, votes_of
+from rfgs_core.run.people import People, counted
 from rfgs_core.run.static import (
     has_static_set,
     need_phases,
@@ -113,7 +113,7 @@ def train_sequence(
     with alone_in(out, out, "rfgs train"):
         sweep(out, ".tmp-*")
         _refuse_other_files(out)
-        heads = _heads(out, sequence, radio, frames, config, people)
+        heads = counted(out, sequence, radio, frames, config, people)
         asked = RunConfig(
             dataset=relative_dataset(out, dataset.path),
             dataset_fingerprint=dataset.fingerprint,
@@ -126,38 +126,6 @@ def train_sequence(
         run = _open_or_create(out, asked)
         heads.write(out)
         return _train(run, asked.settings, sequence, encoder_file, log)
-
-
-def _heads(
-    out: Path,
-    sequence: Sequence,
-    radio: str,
-    frames: list[int],
-    config: TrainConfig,
-    people: People,
-) -> HeadCount:
-    """How many people there are; sensing is not repeated where a run knows.
-
-    Raises:
-        RfgsError: They are sensed and nobody is there.
-    """
-    kept = HeadCount.read(out)
-    if kept is None and (out / CONFIG_FILE).exists():
-        # Runs without a word of it were told.
-        kept = HeadCount(told(sequence), "told")
-    if kept is not None and people in ("auto", kept.source):
-        return kept
-    with (
-        tqdm(total=votes_of(frames), desc="counting people", disable=people == "told") as bar,
-        one_torch_thread(),
-    ):
-        heads = head_count(sequence, radio, frames, config, people, bar.update)
-    if heads.source == "sensed" and heads.count == 0:
-        raise RfgsError(
-            f"{radio} senses nobody in most of these frames; choose other --frames, or say "
-            "--people and how many there are"
-        )
-    return heads
 
 
 def _train(

@@ -74,13 +74,14 @@ def transmission(
     shape = (len(shaded), tx_places.shape[1], rx_places.shape[1], len(grid_hz))
     out = np.ones(shape, dtype=np.complex128)
     some = paths.select(shaded)
+    before, after, tx_turn, rx_turn = (line[shaded] for line in lines)
     tx = np.ascontiguousarray(tx_places[some.tx] - some.vertices[:, :1])
     rx = np.ascontiguousarray(rx_places[some.rx] - some.vertices[:, -1:])
     for outline, rows in zip(outlines, near, strict=True):
         _shade(
             some.vertices,
             rows[shaded],
-            (*(line[shaded] for line in lines), relative[shaded]),
+            (before, after, tx_turn, rx_turn, relative[shaded]),
             (tx, rx),
             np.ascontiguousarray(outline.vertices, dtype=np.float64),
             (outline.mesh.faces, outline.mesh.edges, outline.mesh.edge_of),

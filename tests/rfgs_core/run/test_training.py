@@ -66,7 +66,7 @@ def test_a_run_holds_the_documented_files(trained_run: Run, quick_config) -> Non
         for path in sorted(trained_run.path.rglob("*"))
         if path.is_file()
     ]
-    assert present == sorted([*RESULTS, *CHECKPOINTS, "config.json"])
+    assert present == sorted([*RESULTS, *CHECKPOINTS, "config.json", "people.json"])
     config = read_json(trained_run.path / "config.json")
     assert config["schema"] == "rfgs-run/1"
     assert (config["radio"], config["sequence"], config["frames"]) == ("wifi", "tiny", [1, 2])

@@ -31,6 +31,14 @@ def main(arguments: list[str] | None = None) -> int:
     shapes.add_argument("--out", type=Path, required=True, help="the .blend to write")
     bodies = commands.add_parser("bodies", help="build the shape space of rfgs_core.articulated")
     bodies.add_argument("--out", type=Path, help="where to; default: into the package")
+    record = commands.add_parser(
+        "recording", help="build a room in which one of our people plays motion capture (.bvh)"
+    )
+    record.add_argument("bvh", type=Path, help="the recording; any rig of a person, any unit")
+    record.add_argument("--out", type=Path, required=True, help="the .blend to write")
+    record.add_argument("--person", default="emma", help="who plays it (emma)")
+    record.add_argument("--fps", type=int, default=10, help="frames per second (10)")
+    record.add_argument("--up", choices=("y", "z"), default="y", help="axis that is up (y)")
     args = parser.parse_args(arguments)
     known = scenes()
     if args.command == "list":
@@ -42,6 +50,8 @@ def main(arguments: list[str] | None = None) -> int:
         return _shapes(args.description, args.out)
     if args.command == "bodies":
         return _bodies(args.out)
+    if args.command == "recording":
+        return _recording(args)
     if args.command == "sheet":
         return _sheet(args.out, args.size, args.samples)
     if args.name not in known:
@@ -72,6 +82,25 @@ def _sheet(out: Path, size_px: int, samples: int) -> int:
     contact_sheet(list(scenes().values()), out, size_px, samples)
     sys.stdout.write(f"wrote {out}\n")
     return 0
+
+
+def _recording(args: argparse.Namespace) -> int:
+    if not args.bvh.is_file() or not 1 <= args.fps <= 240:
+        wrong = f"{args.bvh}: no such file" if args.fps in range(1, 241) else f"--fps {args.fps}"
+        sys.stderr.write(f"error: {wrong}; expected a .bvh file and 1 to 240 frames per second\n")
+        return 2
+
+    def work(out: Path) -> None:
+        from blender_scenes.recording import build
+
+        frames = build(args.bvh, out, args.person, args.fps, args.up)
+        sys.stdout.write(f"{frames} frames of {args.person}; next: rfgs-factory check {out}\n")
+
+    try:
+        return _write(work, args.out)
+    except ValueError as error:
+        sys.stderr.write(f"error: {error}\n")
+        return 2
 
 
 def _bodies(out: Path | None) -> int:

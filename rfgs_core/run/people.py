@@ -32,7 +32,7 @@ People = Literal["auto", "sensed", "told"] | int
 #: Where a run keeps how many there are, and how that is known.
 PEOPLE_FILE = "people.json"
 #: Frames of a sequence that have a vote.
-VOTES = 7
+VOTES = 5
 #: Visible device pairs without which people are not sensed unasked: three radars count too many.
 AUTO_PAIRS = 4
 _LOG = logging.getLogger(__name__)

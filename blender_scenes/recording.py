@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Builds a scene around motion capture: one of our people plays a .bvh in a room that fits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from blender_scenes.assemble import Folders, save_scene, watch
+from blender_scenes.motion.bvh import Bvh, read_bvh
+from blender_scenes.motion.recorded import Recorded, retarget
+from blender_scenes.motion.score import Figure, Posture, Score, compose
+from blender_scenes.people.cast import PEOPLE, Actor, cast, key_score
+from blender_scenes.sets.lighting import COOL, ceiling_row
+from blender_scenes.sets.room import Room
+from blender_scenes.sets.shell import Shell, Wall, door
+from blender_scenes.stage import add_access_points, around_room, corners
+
+#: From what a joint reaches to the walls and to the ceiling [m].
+MARGIN_M, HEADROOM_M = 1.2, 0.6
+#: No room is smaller [m], and none larger: beyond it the unit of the file was meant otherwise.
+SMALLEST_M, LARGEST_M = (4.0, 4.0, 2.7), 40.0
+#: Frames of a scene, at most.
+MOST_FRAMES = 10_000
+
+
+def build(recording: Path, out: Path, person: str, fps: int, up: str) -> int:
+    """Builds the scene and saves it, compressed, as `out`.
+
+    Args:
+        recording: The .bvh; its limbs' lengths do not matter, nor does its unit.
+        out: The .blend to write.
+        person: Who plays it, one of `PEOPLE`.
+        fps: Frames per second of the scene.
+        up: Axis that is up in the file, `y` or `z`.
+
+    Returns:
+        Number of frames.
+
+    Raises:
+        ValueError: The recording is no BVH of a person, or is too long or goes too far; or there
+            is no such person.
+    """
+    if person not in PEOPLE:
+        raise ValueError(f"no person {person!r}; there are: {', '.join(PEOPLE)}")
+    bvh = read_bvh(recording)
+    frames = 1 + int(np.ceil(bvh.frame_s * (len(bvh.root) - 1) * fps))
+    if not 2 <= frames <= MOST_FRAMES:
+        raise ValueError(
+            f"{recording}: {frames} frames at {fps} fps; expected 2 to {MOST_FRAMES}, choose "
+            "another --fps or cut the recording"
+        )
+
+    def fill(scene: bpy.types.Scene, folders: Folders) -> None:
+        actor = cast(PEOPLE[person], folders["Person"])
+        score, size_m = _staged(actor.figure, bvh, recording, up)
+        key_score(actor, score, fps, 1, frames)
+        _surround(scene, folders, actor, size_m)
+
+    save_scene(out, recording.stem, frames, fps, fill)
+    return frames
+
+
+def _staged(
+    figure: Figure, bvh: Bvh, recording: Path, up: str
+) -> tuple[Score, tuple[float, float, float]]:
+    """The recording in the middle of a room, and the size of that room [m]."""
+    joints = np.array([figure.skeleton.joints(pose) for pose in retarget(bvh, figure.skeleton, up)])
+    reach = np.ptp(joints.reshape(-1, 3), axis=0)
+    if not (np.isfinite(reach).all() and reach[:2].max() < LARGEST_M - 2.0 * MARGIN_M):
+        raise ValueError(
+            f"{recording}: goes {reach[:2].max():.3g} m far; expected less than "
+            f"{LARGEST_M - 2.0 * MARGIN_M:g} m"
+        )
+    piece = Recorded(bvh, "recorded", up)
+    there = compose(figure, Posture((0.0, 0.0), 0.0), [piece])
+    times = np.linspace(0.0, there.duration_s, max(2, int(25 * there.duration_s)))
+    places = np.array([figure.skeleton.joints(there.pose(float(t))) for t in times])
+    low, high = places.min(axis=(0, 1)), places.max(axis=(0, 1))
+    middle = 0.5 * (low + high)
+    size = np.maximum(high - low + 2.0 * MARGIN_M, SMALLEST_M)
+    size[2] = max(SMALLEST_M[2], high[2] + HEADROOM_M)
+    start = Posture((-float(middle[0]), -float(middle[1])), 0.0)
+    return compose(figure, start, [piece]), (float(size[0]), float(size[1]), float(size[2]))
+
+
+def _surround(
+    scene: bpy.types.Scene, folders: Folders, actor: Actor, size_m: tuple[float, float, float]
+) -> None:
+    """An empty room with a door, lamps, access points in its corners, and cameras."""
+    half_x, half_y = 0.5 * size_m[0], 0.5 * size_m[1]
+    lamps = [
+        (x, y, size_m[2] - 0.08)
+        for x in (-0.5 * half_x, 0.5 * half_x)
+        for y in (-0.5 * half_y, 0.5 * half_y)
+    ]
+    room = Room(
+        Shell(
+            size_m,
+            south=Wall("wall_paint"),
+            north=Wall("wall_grey"),
+            east=Wall("wall_blue"),
+            west=Wall("wall_paint", (door((-0.5, 0.5), leaf="paint_teal"),)),
+            floor="linoleum",
+        ),
+        lambda _to: None,
+        lambda to: ceiling_row(lamps, (1.2, 0.3), 26.0, COOL, to),
+    )
+    room.build(folders)
+    add_access_points(corners(room.shell.half_m), (0.0, 0.0), folders["Stage"])
+    watch(scene, around_room(room.shell.half_m), [actor.armature], folders["Stage"])

@@ -113,6 +113,7 @@ def train_sequence(
     with alone_in(out, out, "rfgs train"):
         sweep(out, ".tmp-*")
         _refuse_other_files(out)
+        begin = time.perf_counter()
         heads = counted(out, sequence, radio, frames, config, people)
         asked = RunConfig(
             dataset=relative_dataset(out, dataset.path),
@@ -121,6 +122,7 @@ def train_sequence(
             radio=radio,
             frames=frames,
             settings=replace(config, bodies=max(heads.count, 1)),
+            train_s=round(time.perf_counter() - begin, 2),
         )
         # The file of a run does not keep every setting: the device is free.
         run = _open_or_create(out, asked)

@@ -22,7 +22,8 @@ from rfgs_core.radio.sites import ports
 from rfgs_core.simulate.paths.path_set import PathSet
 from rfgs_core.simulate.paths.plain_sum import summed
 
-_BLOCK = 128
+#: Most paths at a time, and what their number is rounded up to, for vector code.
+_BLOCK, _LANES = 128, 8
 
 
 def steer(
@@ -179,10 +180,11 @@ def _steer(
     out = np.zeros((n_tx, n_rx, len(left)), dtype=np.complex128)
     for link in numba.prange(n_tx * n_rx):
         t, r = link // n_rx, link % n_rx
-        phasor, turn = np.zeros((2, _BLOCK)), np.zeros((2, _BLOCK))
-        block = np.zeros((n_nodes, 2, _BLOCK))
-        for first in range(0, n_paths, _BLOCK):
-            size = min(_BLOCK, n_paths - first)
+        width = min(_BLOCK, (n_paths + _LANES - 1) // _LANES * _LANES)
+        phasor, turn = np.zeros((2, width)), np.zeros((2, width))
+        block = np.zeros((n_nodes, 2, width))
+        for first in range(0, n_paths, width):
+            size = min(width, n_paths - first)
             phasor[:] = 0.0
             block[:] = 0.0
             for j in range(size):

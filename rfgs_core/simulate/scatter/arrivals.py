@@ -44,6 +44,17 @@ class Pictures(NamedTuple):
     """One over its distance [1/m], float32, shape (body, row, column)."""
 
 
+class Ends(NamedTuple):
+    """What stands at the other ends of a site's links."""
+
+    places: np.ndarray
+    """Centres of the arrays, and of their images where these matter [m], shape (end, 3)."""
+    lowest_k: float
+    """Lowest wavenumber [rad/m]."""
+    size_m: float
+    """Size of two arrays together [m]."""
+
+
 @numba.njit(cache=True, nogil=True)
 def straight(
     facets: Facets,
@@ -104,25 +115,35 @@ def straight(
 
 @numba.njit(cache=True, nogil=True)
 def free_facets(
-    facets: Facets, wanted: np.ndarray, around: Panorama, faces: Faces, view: Mirror
+    facets: Facets,
+    ends: Ends,
+    around: Panorama,
+    faces: Faces,
+    view: Mirror,
+    scratch: tuple[np.ndarray, np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
     """Facets that nothing that stands still hides on their way by a mirror.
 
     Args:
         facets: The facets.
-        wanted: Those that matter, int64.
+        ends: What the other ends of the links are.
         around: What stands around the site.
         faces: The same as faces.
         view: The face that mirrors.
+        scratch: Filled with what is returned, int64 and float64, shapes (facet,) and (facet, 3).
 
     Returns:
-        Which facets, and where they are mirrored [m], shape (found, 3).
+        Which facets, and where they are mirrored [m], shape (found, 3): the first of the scratch.
     """
-    met, at = on_mirror(faces, view.face, view.image, facets.lifted, wanted)
+    points = facets.lifted, facets.normals
+    met, at = on_mirror(faces, view.face, view.image, points, 2.0 * ends.size_m, scratch)
     stack, count = new_stack(), 0
     for k in range(len(met)):
-        if free_by_mirror(faces, view, around, facets.lifted[met[k]], at[k], stack):
-            met[count], at[count] = met[k], at[k]
+        p = met[k]
+        if _heard_together(facets, p, view.image, ends) and free_by_mirror(
+            faces, view, around, facets.lifted[p], at[k], stack
+        ):
+            met[count], at[count] = p, at[k]
             count += 1
     return met[:count], at[:count]
 
@@ -186,45 +207,44 @@ def by_mirror(
 
 
 @numba.njit(cache=True, nogil=True)
-def wanted_facets(
-    facets: Facets,
-    place: np.ndarray,
-    partners: np.ndarray,
-    lowest_k: float,
-    size_m: float,
-) -> np.ndarray:
+def wanted_facets(facets: Facets, place: np.ndarray, ends: Ends) -> np.ndarray:
     """Facets that a place and any of its partners may see together, int64.
 
     Args:
         facets: The facets.
-        place: Centre of an array, or of its image [m], shape (3,).
-        partners: Centres of the arrays at the other end, and of their images [m], (partner, 3).
-        lowest_k: Lowest wavenumber [rad/m].
-        size_m: Size of both arrays together [m].
+        place: Centre of an array [m], shape (3,).
+        ends: The partners.
     """
-    found = np.zeros(len(facets.points), dtype=np.int64)
-    points, normals, count = facets.points, facets.normals, 0
-    for p in range(len(points)):
-        n = normals[p, 0], normals[p, 1], normals[p, 2]
-        x, y, z = place[0] - points[p, 0], place[1] - points[p, 1], place[2] - points[p, 2]
-        if x * n[0] + y * n[1] + z * n[2] < -size_m:
-            continue
-        d = math.sqrt(x * x + y * y + z * z)
-        to = x / d, y / d, z / d
-        damping = lowest_k * lowest_k * facets.areas[p] / 24.0
-        for q in range(len(partners)):
-            x, y, z = (
-                partners[q, 0] - points[p, 0],
-                partners[q, 1] - points[p, 1],
-                partners[q, 2] - points[p, 2],
-            )
-            d_other = math.sqrt(x * x + y * y + z * z)
-            other = x / d_other, y / d_other, z / d_other
-            if seen_from_centres(to, other, n, damping, size_m / min(d, d_other)):
-                found[count] = p
-                count += 1
-                break
+    found, count = np.zeros(len(facets.points), dtype=np.int64), 0
+    for p in range(len(facets.points)):
+        if _heard_together(facets, p, place, ends):
+            found[count] = p
+            count += 1
     return found[:count]
+
+
+@numba.njit(cache=True, nogil=True)
+def _heard_together(facets: Facets, p: int, place: np.ndarray, ends: Ends) -> bool:
+    """Whether a place and any of its partners may see facet p together."""
+    points, normals, partners = facets.points, facets.normals, ends.places
+    n = normals[p, 0], normals[p, 1], normals[p, 2]
+    x, y, z = place[0] - points[p, 0], place[1] - points[p, 1], place[2] - points[p, 2]
+    if x * n[0] + y * n[1] + z * n[2] < -ends.size_m:
+        return False
+    d = math.sqrt(x * x + y * y + z * z)
+    to = x / d, y / d, z / d
+    damping = ends.lowest_k * ends.lowest_k * facets.areas[p] / 24.0
+    for q in range(len(partners)):
+        x, y, z = (
+            partners[q, 0] - points[p, 0],
+            partners[q, 1] - points[p, 1],
+            partners[q, 2] - points[p, 2],
+        )
+        d_other = math.sqrt(x * x + y * y + z * z)
+        other = x / d_other, y / d_other, z / d_other
+        if seen_from_centres(to, other, n, damping, ends.size_m / min(d, d_other)):
+            return True
+    return False
 
 
 @numba.njit(cache=True, nogil=True, inline="always")

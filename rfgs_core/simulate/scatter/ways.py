@@ -9,6 +9,7 @@ import numpy as np
 
 from rfgs_core.simulate.geometry import Faces
 from rfgs_core.simulate.scatter.arrivals import (
+    Ends,
     Pictures,
     Slabs,
     by_mirror,
@@ -123,14 +124,15 @@ def find_ways(
     met = [_mirrors(faces, site, body) for site in sites]
     shape = (sum(2 + len(row) for row in met), len(facets.points), 2, scope.nodes)
     field = np.zeros(shape, dtype=np.complex64)
+    scratch = np.zeros(len(facets.points), np.int64), np.zeros((len(facets.points), 3))
     rows: list[tuple[int, int, np.ndarray, np.ndarray]] = []
     for s, (site, seen, views) in enumerate(zip(sites, pictures, met, strict=True)):
         ends = np.array([other.around.place for other in partners[s]]).reshape(-1, 3)
         images = [view.image for other in partners[s] for view in _mirrors(faces, other, body)]
-        every = np.concatenate([ends, np.array(images).reshape(-1, 3)])
+        every = _ends(scope, np.concatenate([ends, np.array(images).reshape(-1, 3)]))
         elements, antenna = site.elements[port], site.antennas[port]
         clear, through = field[len(rows)], field[len(rows) + 1]
-        wanted = _wanted(scope, body, site.around.place, every)
+        wanted = wanted_facets(facets, site.around.place, every)
         count = straight(
             facets,
             seen,
@@ -146,8 +148,7 @@ def find_ways(
         if count[1]:
             rows.append((s, 1, site.around.place, elements))
         for view in views:
-            wanted = _wanted(scope, body, view.image, ends)
-            found = free_facets(facets, wanted, site.around, faces, view)
+            found = free_facets(facets, _ends(scope, ends), site.around, faces, view, scratch)
             onto = field[len(rows)]
             if len(found[0]) and by_mirror(
                 facets, found, seen, site.around, faces, view, antenna, scope.slabs, onto
@@ -162,9 +163,9 @@ def find_ways(
     )
 
 
-def _wanted(scope: Scope, body: Body, place: np.ndarray, partners: np.ndarray) -> np.ndarray:
-    """Facets that a place and any partner may see together."""
-    return wanted_facets(body.facets, place, partners, scope.lowest_k, scope.size_m)
+def _ends(scope: Scope, places: np.ndarray) -> Ends:
+    """The other ends of links, at places [m], shape (end, 3)."""
+    return Ends(places, scope.lowest_k, scope.size_m)
 
 
 def _mirrors(faces: Faces, site: Site, body: Body) -> list[Mirror]:

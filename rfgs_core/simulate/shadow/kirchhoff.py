@@ -83,8 +83,8 @@ def transmission(
             rows[shaded],
             (before, after, tx_turn, rx_turn, relative[shaded]),
             (tx, rx),
-            np.ascontiguousarray(outline.vertices, dtype=np.float64),
-            (outline.mesh.faces, outline.mesh.edges, outline.mesh.edge_of),
+            np.ascontiguousarray(outline.vertices.T, dtype=np.float64),
+            (outline.mesh.faces, outline.mesh.edges, outline.mesh.sides),
             nodes_for(grid_hz),
             FRESNEL,
             mode == "hard",
@@ -123,7 +123,7 @@ def _shade(
                 continue
             way = corners[p, i + 1] - corners[p, i]
             length = np.sqrt((way * way).sum())
-            xy, between, plane, scale, axes = silhouette.project(
+            xy, plane, scale, axes = silhouette.project(
                 vertices, corners[p, i], corners[p, i + 1], before[p, i], after[p, i]
             )
             if scale == 0.0:
@@ -133,9 +133,7 @@ def _shade(
             # What weak paths do not hear of at all counts as unbounded, too.
             window = silhouette.WINDOW * min(1.0, within / FAR)
             pitch = silhouette.ROW / max(relative[p], 1e-6) / per_m
-            runs, heights = silhouette.runs_of(
-                xy, between, mesh, window / per_m, within / per_m, pitch
-            )
+            runs, heights = silhouette.runs_of(xy, mesh, window / per_m, within / per_m, pitch)
             if not len(runs):
                 continue
             if hard:
@@ -201,7 +199,7 @@ def _choice(counts: np.ndarray, degree: float) -> int:
 
     Its Chebyshev coefficients are Bessel functions J_n of the degree, 5e-4 or less from there on.
     """
-    least = degree + 1.5 * np.cbrt(degree) + 3.0
+    least = degree + np.cbrt(degree) + 1.0
     choice = 0
     while choice < len(counts) - 1 and counts[choice] < least:
         choice += 1

@@ -16,21 +16,30 @@ class ShadowMesh:
     """Triangles with their edges."""
 
     faces: np.ndarray
-    """Vertices of each triangle, int64, shape (T, 3)."""
+    """Vertices of each triangle, uint32, shape (T, 3); unsigned, so that kernels need not look for
+    negative ones."""
     edges: np.ndarray
-    """Vertices of each edge, every edge once, int64, shape (E, 2)."""
-    edge_of: np.ndarray
-    """Edges that each triangle goes along, int64, shape (T, 3): 2 · edge, and 1 more where the
-    triangle goes along it backwards."""
+    """Vertices of each edge, uint32, shape (E, 2); once more for every further two triangles."""
+    sides: np.ndarray
+    """Triangles that go along each edge and backwards, T where there is none, uint32, (E, 2)."""
 
     @classmethod
     def of(cls, faces: np.ndarray) -> ShadowMesh:
         """Finds the edges of triangles, shape (T, 3)."""
-        faces = np.ascontiguousarray(faces, dtype=np.int64)
         ways = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
-        edges, edge = np.unique(np.sort(ways, axis=1), axis=0, return_inverse=True)
-        backwards = ways[:, 0] > ways[:, 1]
-        return cls(faces, edges, (2 * edge.ravel() + backwards).reshape(-1, 3))
+        _, edge = np.unique(np.sort(ways, axis=1), axis=0, return_inverse=True)
+        backwards = (ways[:, 0] > ways[:, 1]).astype(np.int64)
+        # Triangles of one edge and direction are numbered: where vertices were joined, an edge may
+        # have more than two.
+        order = np.lexsort((backwards, edge.ravel()))
+        group = 2 * edge.ravel()[order] + backwards[order]
+        number = np.arange(len(group)) - np.searchsorted(group, group)
+        keys, slot = np.unique(np.stack([group // 2, number], axis=1), axis=0, return_inverse=True)
+        sides = np.full((len(keys), 2), len(faces), dtype=np.uint32)
+        sides[slot.ravel(), group % 2] = order // 3
+        edges = np.zeros((len(keys), 2), dtype=np.uint32)
+        edges[slot.ravel()] = np.sort(ways[order], axis=1)
+        return cls(np.ascontiguousarray(faces, dtype=np.uint32), edges, sides)
 
 
 @dataclass(frozen=True)

@@ -15,25 +15,27 @@ ROW = 0.02
 LEAST_ROWS, MOST_ROWS = 40, 2048
 #: Beyond this coordinate a silhouette counts as unbounded.
 WINDOW = 20.0
+#: Vertices nearer to the ends of a segment than this are not between them [m].
+_MARGIN_M = 1e-3
 
 
 @numba.njit(cache=True)
 def project(
     vertices: np.ndarray, start: np.ndarray, end: np.ndarray, before_m: float, after_m: float
-) -> tuple[np.ndarray, np.ndarray, float, float, np.ndarray]:
+) -> tuple[np.ndarray, float, float, np.ndarray]:
     """Flattens a mesh onto the plane across a segment, each vertex at its own Fresnel scale.
 
     Args:
-        vertices: Vertices [m], shape (V, 3).
+        vertices: Vertices [m], shape (3, V), for vector code.
         start: Start of the segment [m].
         end: End of the segment [m].
         before_m: Length of the unfolded path before the segment [m].
         after_m: Length after the segment [m].
 
     Returns:
-        Plane coordinates at the mean depth [m], shape (V, 2); which vertices lie between the
-        ends; the depth of the plane from the segment's start [m]; 1/d_1 + 1/d_2 there [1/m];
-        and the two axes of the plane, shape (2, 3).
+        Plane coordinates at the mean depth [m], no numbers where a vertex does not lie between the
+        ends, shape (2, V); the depth of the plane from the segment's start [m]; 1/d_1 + 1/d_2
+        there, 0 if no vertex lies between [1/m]; and the two axes of the plane, shape (2, 3).
     """
     way = end - start
     length = math.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
@@ -48,45 +50,60 @@ def project(
     axes[1, 0] = u[1] * axes[0, 2] - u[2] * axes[0, 1]
     axes[1, 1] = u[2] * axes[0, 0] - u[0] * axes[0, 2]
     axes[1, 2] = u[0] * axes[0, 1] - u[1] * axes[0, 0]
-    flat_xy = np.zeros((len(vertices), 2))
-    scale = np.zeros(len(vertices))
-    between = np.zeros(len(vertices), dtype=np.bool_)
-    margin = 1e-3
-    depth_sum, count = 0.0, 0
-    for i in range(len(vertices)):
-        x = vertices[i, 0] - start[0]
-        y = vertices[i, 1] - start[1]
-        z = vertices[i, 2] - start[2]
-        depth = x * u[0] + y * u[1] + z * u[2]
-        if depth <= margin or depth >= length - margin:
-            continue
-        between[i] = True
-        depth_sum += depth
-        count += 1
-        scale[i] = 1.0 / (before_m + depth) + 1.0 / (after_m + length - depth)
-        flat_xy[i, 0] = x * axes[0, 0] + y * axes[0, 1] + z * axes[0, 2]
-        flat_xy[i, 1] = x * axes[1, 0] + y * axes[1, 1] + z * axes[1, 2]
-    if count == 0:
-        return flat_xy, between, 0.0, 0.0, axes
+    xy = np.zeros((2, vertices.shape[1]))
+    depths = (before_m, length, after_m)
+    depth_sum, count = _flatten(
+        vertices,
+        (start[0], start[1], start[2]),
+        ((axes[0, 0], axes[0, 1], axes[0, 2]), (axes[1, 0], axes[1, 1], axes[1, 2])),
+        (u[0], u[1], u[2]),
+        depths,
+        xy,
+    )
+    if count == 0.0:
+        return xy, 0.0, 0.0, axes
     plane = depth_sum / count
     at_plane = 1.0 / (before_m + plane) + 1.0 / (after_m + length - plane)
-    for i in range(len(vertices)):
-        factor = math.sqrt(scale[i] / at_plane)
-        flat_xy[i, 0] *= factor
-        flat_xy[i, 1] *= factor
-    return flat_xy, between, plane, at_plane, axes
+    xy *= 1.0 / math.sqrt(at_plane)
+    return xy, plane, at_plane, axes
+
+
+@numba.njit(cache=True, fastmath={"contract", "reassoc"})
+def _flatten(
+    vertices: np.ndarray,
+    start: tuple[float, float, float],
+    axes: tuple[tuple[float, float, float], tuple[float, float, float]],
+    u: tuple[float, float, float],
+    depths: tuple[float, float, float],
+    xy: np.ndarray,
+) -> tuple[float, float]:
+    """Fills in plane coordinates times √(1/d_1 + 1/d_2) of each vertex; sum and count of depths."""
+    (ax, ay, az), (bx, by, bz), (ux, uy, uz) = axes[0], axes[1], u
+    before_m, length, after_m = depths
+    low, high = _MARGIN_M, length - _MARGIN_M
+    depth_sum, count = 0.0, 0.0
+    for i in range(vertices.shape[1]):
+        x, y, z = vertices[0, i] - start[0], vertices[1, i] - start[1], vertices[2, i] - start[2]
+        depth = x * ux + y * uy + z * uz
+        between = (depth > low) & (depth < high)
+        inside = depth if between else 0.5 * length
+        scale = math.sqrt(1.0 / (before_m + inside) + 1.0 / (after_m + length - inside))
+        depth_sum += depth if between else 0.0
+        count += 1.0 if between else 0.0
+        xy[0, i] = (x * ax + y * ay + z * az) * scale if between else np.nan
+        xy[1, i] = (x * bx + y * by + z * bz) * scale if between else np.nan
+    return depth_sum, count
 
 
 @numba.njit(cache=True)
-def _box(
-    xy: np.ndarray, between: np.ndarray, window: float
-) -> tuple[float, float, float, float, float]:
+def _box(xy: np.ndarray, window: float) -> tuple[float, float, float, float, float]:
     """Clipped extent (x, y from and to) and the distance of the extent from the path [m]."""
     x0, x1, y0, y1 = math.inf, -math.inf, math.inf, -math.inf
-    for i in range(len(xy)):
-        if between[i]:
-            x0, x1 = min(x0, xy[i, 0]), max(x1, xy[i, 0])
-            y0, y1 = min(y0, xy[i, 1]), max(y1, xy[i, 1])
+    for i in range(xy.shape[1]):
+        # Comparisons with no number are false.
+        x, y = xy[0, i], xy[1, i]
+        x0, x1 = (x if x < x0 else x0), (x if x > x1 else x1)
+        y0, y1 = (y if y < y0 else y0), (y if y > y1 else y1)
     off_x, off_y = max(x0, -x1, 0.0), max(y0, -y1, 0.0)
     distance = math.sqrt(off_x * off_x + off_y * off_y)
     return max(x0, -window), min(x1, window), max(y0, -window), min(y1, window), distance
@@ -94,38 +111,50 @@ def _box(
 
 @numba.njit(cache=True)
 def _contour(
-    xy: np.ndarray,
-    between: np.ndarray,
-    faces: np.ndarray,
-    edge_of: np.ndarray,
-    count: int,
-) -> np.ndarray:
-    """How many more triangles lie to the left of each edge than to its right, int64, shape (E,).
+    xy: np.ndarray, mesh: tuple[np.ndarray, np.ndarray, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Edges with more triangles on one side than on the other.
 
     Every triangle counts, whichever side it shows. An edge between two that lie side by side has
-    none: only contours and folds are left, a tenth of all edges or less.
+    as many on either: only contours and folds are found, a tenth of all edges or less.
+
+    Returns:
+        Vertices of the edges, uint32, shape (found, 2), and how many more triangles lie to the
+        left of each, int8, shape (found,).
     """
-    more = np.zeros(count, dtype=np.int64)
+    faces, edges, sides = mesh
+    px, py = xy[0], xy[1]
+    side = np.zeros(len(faces) + 1, dtype=np.int8)
     for t in range(len(faces)):
-        a, b, c = faces[t]
-        if not (between[a] and between[b] and between[c]):
-            continue
-        area = (xy[b, 0] - xy[a, 0]) * (xy[c, 1] - xy[a, 1])
-        area -= (xy[b, 1] - xy[a, 1]) * (xy[c, 0] - xy[a, 0])
-        if area == 0.0:
-            continue
-        side = 1 if area > 0.0 else -1
-        for k in range(3):
-            edge = edge_of[t, k]
-            more[edge >> 1] += -side if edge & 1 else side
-    return more
+        a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
+        area = (px[b] - px[a]) * (py[c] - py[a]) - (py[b] - py[a]) * (px[c] - px[a])
+        side[t] = np.int8(area > 0.0) - np.int8(area < 0.0)
+    found, more = np.zeros(len(sides), dtype=np.uint32), np.zeros(len(sides), dtype=np.int8)
+    count = 0
+    for e in range(len(sides)):
+        found[count] = e
+        more[count] = side[sides[e, 0]] - side[sides[e, 1]]
+        count += more[count] != 0
+    some = np.zeros((count, 2), dtype=np.uint32)
+    for e in range(count):
+        some[e, 0], some[e, 1] = edges[found[e], 0], edges[found[e], 1]
+    return some, more[:count]
 
 
 @numba.njit(cache=True)
 def _crossings(
     xy: np.ndarray, edges: np.ndarray, more: np.ndarray, y0: float, pitch: float, rows: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where contours cross the middle of rows: offsets (rows + 1), x [m] and what is entered."""
+    """Where contours cross the middle of rows: offsets (rows + 1), x [m] and what is entered.
+
+    Args:
+        xy: Plane coordinates [m], shape (2, V).
+        edges: Vertices of the contour's edges, shape (edge, 2).
+        more: How many more triangles lie to the left of each, shape (edge,).
+        y0: Lower end of the rows [m].
+        pitch: Their height [m].
+        rows: Their number.
+    """
     offsets = np.zeros(rows + 1, dtype=np.int64)
     for filling in range(2):
         if filling:
@@ -133,10 +162,8 @@ def _crossings(
             entered = np.zeros(offsets[rows], dtype=np.int64)
             filled = offsets[:-1].copy()
         for e in range(len(edges)):
-            if more[e] == 0:
-                continue
-            a, b = edges[e]
-            ya, yb = (xy[a, 1] - y0) / pitch - 0.5, (xy[b, 1] - y0) / pitch - 0.5
+            a, b = edges[e, 0], edges[e, 1]
+            ya, yb = (xy[1, a] - y0) / pitch - 0.5, (xy[1, b] - y0) / pitch - 0.5
             first = max(math.ceil(min(ya, yb)), 0)
             # An edge that ends at the middle of a row is left to the one that begins there.
             last = min(math.ceil(max(ya, yb)) - 1, rows - 1)
@@ -145,7 +172,7 @@ def _crossings(
                     offsets[row + 1] += 1
                     continue
                 at = filled[row]
-                x[at] = xy[a, 0] + (row - ya) / (yb - ya) * (xy[b, 0] - xy[a, 0])
+                x[at] = xy[0, a] + (row - ya) / (yb - ya) * (xy[0, b] - xy[0, a])
                 entered[at] = more[e] if yb < ya else -more[e]
                 filled[row] += 1
         if not filling:
@@ -188,7 +215,6 @@ def _covered(x: np.ndarray, entered: np.ndarray, window: float, runs: np.ndarray
 @numba.njit(cache=True)
 def runs_of(
     xy: np.ndarray,
-    between: np.ndarray,
     mesh: tuple[np.ndarray, np.ndarray, np.ndarray],
     window: float,
     far: float,
@@ -197,9 +223,8 @@ def runs_of(
     """Silhouette as runs.
 
     Args:
-        xy: Plane coordinates [m], shape (V, 2).
-        between: Which vertices count, shape (V,).
-        mesh: Triangles, edges and edges of the triangles, see `ShadowMesh`.
+        xy: Plane coordinates [m], no numbers where a vertex does not count, shape (2, V).
+        mesh: Triangles, edges and triangles beside the edges, see `ShadowMesh`.
         window: Half width beyond which the silhouette counts as unbounded [m].
         far: Distance beyond which there is no silhouette [m].
         pitch: Largest height of a row, within the limits of their number [m].
@@ -208,16 +233,13 @@ def runs_of(
         Runs (x from, x to) and the lower and upper y of their rows [m], each shape (N, 2).
     """
     nothing = np.zeros((0, 2))
-    if not between.any():
-        return nothing, nothing
-    x0, x1, y0, y1, distance = _box(xy, between, window)
+    x0, x1, y0, y1, distance = _box(xy, window)
     if distance > far or x1 <= x0 or y1 <= y0:
         return nothing, nothing
     rows = min(max(math.ceil((y1 - y0) / pitch), LEAST_ROWS), MOST_ROWS)
     pitch = (y1 - y0) / rows
-    faces, edges, edge_of = mesh
-    more = _contour(xy, between, faces, edge_of, len(edges))
-    offsets, x, entered = _crossings(xy, edges, more, y0, pitch, rows)
+    contour, more = _contour(xy, mesh)
+    offsets, x, entered = _crossings(xy, contour, more, y0, pitch, rows)
     runs, heights = np.zeros((len(x) // 2 + 1, 2)), np.zeros((len(x) // 2 + 1, 2))
     count = 0
     for row in range(rows):

@@ -117,7 +117,12 @@ def meeting_ball(
 
 @numba.njit(cache=True, nogil=True)
 def on_mirror(
-    faces: Faces, face: int, image: np.ndarray, points: np.ndarray, some: np.ndarray
+    faces: Faces,
+    face: int,
+    image: np.ndarray,
+    points: tuple[np.ndarray, np.ndarray],
+    slack_m: float,
+    scratch: tuple[np.ndarray, np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
     """Which points may be seen by way of a mirror, by its rectangle alone, and where.
 
@@ -125,11 +130,13 @@ def on_mirror(
         faces: The faces.
         face: The mirror.
         image: Image of the place in it [m], shape (3,).
-        points: The points [m], shape (point, 3).
-        some: Which of them to look at, int64.
+        points: The points [m] and the normals of their surface, each of shape (point, 3).
+        slack_m: How far behind a point's surface the image may lie [m].
+        scratch: Filled, see below; of the length of the points.
 
     Returns:
-        Those that meet the rectangle, and the places where [m], shape (met, 3).
+        Those that face the image and meet the rectangle, int64, and the places where [m], shape
+        (met, 3): the first of the scratch.
     """
     n, u, w = faces.normal[face], faces.axes[face, 0], faces.axes[face, 1]
     nx, ny, nz, offset = n[0], n[1], n[2], faces.offset[face]
@@ -138,12 +145,13 @@ def on_mirror(
     high_u, high_w = faces.high[face, 0], faces.high[face, 1]
     ix, iy, iz = image[0], image[1], image[2]
     h = offset - (nx * ix + ny * iy + nz * iz)
-    met, at = np.zeros(len(some), dtype=np.int64), np.zeros((len(some), 3))
+    (where, normals), (met, at) = points, scratch
     count = 0
-    for p in some:
-        x, y, z = points[p, 0], points[p, 1], points[p, 2]
+    for p in range(len(where)):
+        x, y, z = where[p, 0], where[p, 1], where[p, 2]
+        facing = (ix - x) * normals[p, 0] + (iy - y) * normals[p, 1] + (iz - z) * normals[p, 2]
         over = nx * x + ny * y + nz * z - offset
-        if h * over <= 0.0:
+        if facing < -slack_m or h * over <= 0.0:
             continue
         share = h / (h + over)
         x, y, z = ix + share * (x - ix), iy + share * (y - iy), iz + share * (z - iz)

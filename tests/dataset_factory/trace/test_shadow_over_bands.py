@@ -252,7 +252,7 @@ def test_parts_that_overlap_count_once() -> None:
     )
     mesh = ShadowMesh.of(faces)
     runs, heights = silhouette.runs_of(
-        xy, np.ones(len(xy), bool), (mesh.faces, mesh.edges, mesh.edge_of), 10.0, 10.0, 0.1
+        xy.T.copy(), (mesh.faces, mesh.edges, mesh.sides), 10.0, 10.0, 0.1
     )
     rows = len(runs) // 2
     np.testing.assert_allclose(runs, [[-1.0, 3.0], [4.0, 5.0]] * rows, atol=1e-12)

@@ -24,21 +24,18 @@ class Bvh(NamedTuple):
     """Corners of the triangles [m], shape (triangle, 3, 3)."""
     triangle: np.ndarray
     """Index of each among those given, shape (triangle,)."""
-    low: np.ndarray
-    """Lower corner of each node's box [m], shape (node, 3)."""
-    high: np.ndarray
-    """Upper corner of each node's box [m], shape (node, 3)."""
+    box: np.ndarray
+    """Lower and upper corner of each node's box, `SAME_M` around it [m], shape (node, 6)."""
     first: np.ndarray
-    """First triangle of a leaf; left child of other nodes, the right one follows it."""
+    """First triangle of a leaf; left child of other nodes, the right one follows it; uint32."""
     count: np.ndarray
-    """Triangles of a leaf, 0 for other nodes."""
+    """Triangles of a leaf, 0 for other nodes; uint32."""
 
 
 def build_bvh(triangles: Float64[np.ndarray, "triangle 3 3"]) -> Bvh:
     """Hierarchy over triangles, halved along the longest axis of their centres."""
     triangles = np.ascontiguousarray(triangles, dtype=np.float64)
-    order, low, high, first, count = _built(triangles)
-    return Bvh(triangles[order], order, low, high, first, count)
+    return Bvh(*_built(triangles))
 
 
 @numba.njit(cache=True, nogil=True)
@@ -50,27 +47,35 @@ def refit(bvh: Bvh, triangles: np.ndarray) -> Bvh:
         triangles: Corners in the order that it was built from [m], shape (triangle, 3, 3).
     """
     corners = triangles[bvh.triangle]
-    low, high = np.full_like(bvh.low, np.inf), np.full_like(bvh.high, -np.inf)
-    for node in range(len(bvh.first) - 1, -1, -1):
-        if bvh.count[node] == 0 and len(bvh.first) > 1:
-            for child in range(bvh.first[node], bvh.first[node] + 2):
-                for axis in range(3):
-                    low[node, axis] = min(low[node, axis], low[child, axis])
-                    high[node, axis] = max(high[node, axis], high[child, axis])
+    return Bvh(corners, bvh.triangle, _boxes(corners, bvh.first, bvh.count), bvh.first, bvh.count)
+
+
+@numba.njit(cache=True, nogil=True)
+def _boxes(corners: np.ndarray, first: np.ndarray, count: np.ndarray) -> np.ndarray:
+    """Boxes of all nodes: children stand behind their parents."""
+    box = np.zeros((len(first), 6))
+    box[:, :3], box[:, 3:] = np.inf, -np.inf
+    for node in range(len(first) - 1, -1, -1):
+        begin = first[node]
+        if count[node] == 0 and len(first) > 1:
+            for axis in range(3):
+                box[node, axis] = min(box[begin, axis], box[begin + 1, axis])
+                box[node, 3 + axis] = max(box[begin, 3 + axis], box[begin + 1, 3 + axis])
             continue
-        for i in range(bvh.first[node], bvh.first[node] + bvh.count[node]):
+        for i in range(begin, begin + count[node]):
             for corner in range(3):
                 for axis in range(3):
-                    low[node, axis] = min(low[node, axis], corners[i, corner, axis])
-                    high[node, axis] = max(high[node, axis], corners[i, corner, axis])
-    return Bvh(corners, bvh.triangle, low, high, bvh.first, bvh.count)
+                    at = corners[i, corner, axis]
+                    box[node, axis] = min(box[node, axis], at - SAME_M)
+                    box[node, 3 + axis] = max(box[node, 3 + axis], at + SAME_M)
+    return box
 
 
 @numba.njit(cache=True)
 def _built(
     triangles: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Order of the triangles, boxes, and first and count of each node."""
+    """What a `Bvh` is made of."""
     total = len(triangles)
     order = np.arange(total)
     centre = np.zeros((total, 3))
@@ -79,17 +84,12 @@ def _built(
             corners = triangles[i, :, axis]
             centre[i, axis] = 0.5 * (corners.min() + corners.max())
     room = max(2 * total, 1)
-    low, high = np.full((room, 3), np.inf), np.full((room, 3), -np.inf)
-    first, count = np.zeros(room, dtype=np.int64), np.zeros(room, dtype=np.int64)
+    first, count = np.zeros(room, dtype=np.uint32), np.zeros(room, dtype=np.uint32)
     ends = np.zeros((room, 2), dtype=np.int64)
     ends[0, 1] = total
     node, nodes = 0, 1
     while node < nodes:
         begin, end = ends[node]
-        for i in order[begin:end]:
-            for axis in range(3):
-                low[node, axis] = min(low[node, axis], triangles[i, :, axis].min())
-                high[node, axis] = max(high[node, axis], triangles[i, :, axis].max())
         if end - begin <= _LEAF:
             first[node], count[node] = begin, end - begin
         else:
@@ -107,7 +107,8 @@ def _built(
             ends[nodes + 1, 0], ends[nodes + 1, 1] = middle, end
             nodes += 2
         node += 1
-    return order, low[:nodes], high[:nodes], first[:nodes], count[:nodes]
+    first, count, corners = first[:nodes], count[:nodes], triangles[order]
+    return corners, order, _boxes(corners, first, count), first, count
 
 
 @numba.njit(cache=True, nogil=True)
@@ -127,8 +128,8 @@ def triangle_at(bvh: Bvh, group: np.ndarray, wanted: int, place: np.ndarray) -> 
         node = stack[size]
         outside = False
         for axis in range(3):
-            outside |= place[axis] < bvh.low[node, axis] - SAME_M
-            outside |= place[axis] > bvh.high[node, axis] + SAME_M
+            outside |= place[axis] < bvh.box[node, axis]
+            outside |= place[axis] > bvh.box[node, 3 + axis]
         if outside:
             continue
         if bvh.count[node] == 0 and len(bvh.first) > 1:

@@ -46,13 +46,13 @@ def crossings(
     wx, wy, wz = wx / length, wy / length, wz / length
     inverse = _inverse(wx), _inverse(wy), _inverse(wz)
     reach = length - rim_m
-    low, high, first, count, corners = bvh.low, bvh.high, bvh.first, bvh.count, bvh.corners
+    box, first, count, corners = bvh.box, bvh.first, bvh.count, bvh.corners
     stack = np.zeros(_STACK, dtype=np.int64)
     size, found = 1, 0
     while size:
         size -= 1
         node = stack[size]
-        if not _enters(low, high, node, (x, y, z), inverse, reach):
+        if not _enters(box[node], (x, y, z), inverse, reach):
             continue
         if count[node] == 0 and len(first) > 1:
             stack[size], stack[size + 1] = first[node] + 1, first[node]
@@ -80,13 +80,13 @@ def nearest(bvh: Bvh, start: np.ndarray, way: np.ndarray, rim_m: float) -> tuple
     """
     x, y, z, wx, wy, wz = start[0], start[1], start[2], way[0], way[1], way[2]
     inverse = _inverse(wx), _inverse(wy), _inverse(wz)
-    low, high, first, count, corners = bvh.low, bvh.high, bvh.first, bvh.count, bvh.corners
+    box, first, count, corners = bvh.box, bvh.first, bvh.count, bvh.corners
     stack = np.zeros(_STACK, dtype=np.int64)
     size, best, found = 1, np.inf, -1
     while size:
         size -= 1
         node = stack[size]
-        if not _enters(low, high, node, (x, y, z), inverse, best):
+        if not _enters(box[node], (x, y, z), inverse, best):
             continue
         if count[node] == 0 and len(first) > 1:
             stack[size], stack[size + 1] = first[node] + 1, first[node]
@@ -124,16 +124,17 @@ def blocked(bvh: Bvh, start: np.ndarray, end: np.ndarray, rim_m: float, stack: n
     wx, wy, wz = wx / length, wy / length, wz / length
     inverse = _inverse(wx), _inverse(wy), _inverse(wz)
     reach = length - rim_m
-    low, high, first, count, corners = bvh.low, bvh.high, bvh.first, bvh.count, bvh.corners
+    box, first, count, corners = bvh.box, bvh.first, bvh.count, bvh.corners
     stack[0], size = 0, 1
     while size:
         size -= 1
         node = stack[size]
-        if not _enters(low, high, node, (x, y, z), inverse, reach):
-            continue
+        # Children are looked at before they are kept: most of them are missed.
         if count[node] == 0 and len(first) > 1:
-            stack[size], stack[size + 1] = first[node] + 1, first[node]
-            size += 2
+            for child in range(first[node], first[node] + 2):
+                if _enters(box[child], (x, y, z), inverse, reach):
+                    stack[size] = child
+                    size += 1
             continue
         for i in range(first[node], first[node] + count[node]):
             if rim_m < _hit(corners, i, x, y, z, wx, wy, wz) < reach:
@@ -149,27 +150,20 @@ def _inverse(part: float) -> float:
 
 @numba.njit(cache=True, nogil=True, inline="always")
 def _enters(
-    low: np.ndarray,
-    high: np.ndarray,
-    node: int,
+    box: np.ndarray,
     start: tuple[float, float, float],
     inverse: tuple[float, float, float],
     reach: float,
 ) -> bool:
     """Whether a ray of some reach enters a node's box."""
-    near, far = _within(low[node, 0], high[node, 0], start[0], inverse[0], 0.0, reach)
-    near, far = _within(low[node, 1], high[node, 1], start[1], inverse[1], near, far)
-    near, far = _within(low[node, 2], high[node, 2], start[2], inverse[2], near, far)
-    return near <= far
-
-
-@numba.njit(cache=True, nogil=True, inline="always")
-def _within(
-    low: float, high: float, start: float, inverse: float, near: float, far: float
-) -> tuple[float, float]:
-    """The part of a segment from `near` to `far` that lies between two planes, with a margin."""
-    a, b = (low - SAME_M - start) * inverse, (high + SAME_M - start) * inverse
-    return max(near, min(a, b)), min(far, max(a, b))
+    # What is entered first along an axis depends on the sign of the ray alone.
+    x = 0 if inverse[0] > 0.0 else 3
+    y = 0 if inverse[1] > 0.0 else 3
+    z = 0 if inverse[2] > 0.0 else 3
+    near = max((box[x] - start[0]) * inverse[0], (box[1 + y] - start[1]) * inverse[1])
+    near = max(near, max((box[2 + z] - start[2]) * inverse[2], 0.0))
+    far = min((box[3 - x] - start[0]) * inverse[0], (box[4 - y] - start[1]) * inverse[1])
+    return near <= min(far, min((box[5 - z] - start[2]) * inverse[2], reach))
 
 
 @numba.njit(cache=True, nogil=True)
@@ -208,12 +202,13 @@ def _hit(
     det = ux * px + uy * py + uz * pz
     if det == 0.0:
         return -1.0
+    share = 1.0 / det
     sx, sy, sz = x - ax, y - ay, z - az
-    u = (sx * px + sy * py + sz * pz) / det
+    u = (sx * px + sy * py + sz * pz) * share
     if u < -_SEAM or u > 1.0 + _SEAM:
         return -1.0
     qx, qy, qz = sy * uz - sz * uy, sz * ux - sx * uz, sx * uy - sy * ux
-    v = (wx * qx + wy * qy + wz * qz) / det
+    v = (wx * qx + wy * qy + wz * qz) * share
     if v < -_SEAM or u + v > 1.0 + _SEAM:
         return -1.0
-    return (vx * qx + vy * qy + vz * qz) / det
+    return (vx * qx + vy * qy + vz * qz) * share

@@ -116,6 +116,7 @@ def straight(
 @numba.njit(cache=True, nogil=True)
 def free_facets(
     facets: Facets,
+    balls: np.ndarray,
     ends: Ends,
     around: Panorama,
     faces: Faces,
@@ -126,6 +127,7 @@ def free_facets(
 
     Args:
         facets: The facets.
+        balls: Around groups of them, see `balls_around`.
         ends: What the other ends of the links are.
         around: What stands around the site.
         faces: The same as faces.
@@ -135,7 +137,7 @@ def free_facets(
     Returns:
         Which facets, and where they are mirrored [m], shape (found, 3): the first of the scratch.
     """
-    points = facets.lifted, facets.normals
+    points = facets.lifted, facets.normals, balls
     met, at = on_mirror(faces, view.face, view.image, points, 2.0 * ends.size_m, scratch)
     stack, count = new_stack(), 0
     for k in range(len(met)):

@@ -19,7 +19,7 @@ from rfgs_core.simulate.scatter.arrivals import (
 )
 from rfgs_core.simulate.scatter.sites import Site
 from rfgs_core.simulate.sight.bodies import SIZE, picture
-from rfgs_core.simulate.sight.mirrors import Mirror, meeting_ball
+from rfgs_core.simulate.sight.mirrors import Mirror, balls_around, meeting_ball
 from rfgs_core.simulate.surface.posed import Facets
 
 
@@ -49,6 +49,8 @@ class Body(NamedTuple):
     """Centre of a ball around them [m], shape (3,)."""
     radius_m: float
     """Its radius [m]."""
+    balls: np.ndarray
+    """Balls around groups of them, see `balls_around`."""
 
 
 class Scope(NamedTuple):
@@ -84,7 +86,7 @@ def bodies_of(facets: Facets) -> list[Body]:
         )
         centre = 0.5 * (own.lifted.min(axis=0) + own.lifted.max(axis=0))
         radius_m = float(np.linalg.norm(own.lifted - centre, axis=1).max()) + 1e-3
-        bodies.append(Body(own, span, centre, radius_m))
+        bodies.append(Body(own, span, centre, radius_m, balls_around(own.lifted)))
     return bodies
 
 
@@ -148,7 +150,9 @@ def find_ways(
         if count[1]:
             rows.append((s, 1, site.around.place, elements))
         for view in views:
-            found = free_facets(facets, _ends(scope, ends), site.around, faces, view, scratch)
+            found = free_facets(
+                facets, body.balls, _ends(scope, ends), site.around, faces, view, scratch
+            )
             onto = field[len(rows)]
             if len(found[0]) and by_mirror(
                 facets, found, seen, site.around, faces, view, antenna, scope.slabs, onto

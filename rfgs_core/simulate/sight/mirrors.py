@@ -16,6 +16,8 @@ from rfgs_core.simulate.sight.panorama import Panorama, sees_face
 
 #: Step of the places on a mirror that are looked by way of [m], and most of them along a side.
 STEP_M, MOST = 0.05, 256
+#: Points that are looked at together.
+GROUP = 32
 #: Distances that agree this well are those of one surface [m].
 _SAME_SURFACE_M = 0.02
 
@@ -93,26 +95,48 @@ def meeting_ball(
     """
     found, count = np.zeros(len(face), dtype=np.int64), 0
     for k in range(len(face)):
-        f = face[k]
-        h, over, meets = -height(faces, f, image[k]), height(faces, f, centre), True
-        if h < 0.0:
-            h, over = -h, -over
-        near = max(over - r, 0.0)
-        for axis in range(2):
-            i, c = 0.0, 0.0
-            for x in range(3):
-                i += faces.axes[f, axis, x] * image[k, x]
-                c += faces.axes[f, axis, x] * centre[x]
-            low, high = np.inf, -np.inf
-            for side in (-r, r):
-                for depth in (near, over + r):
-                    at = i + (c + side - i) * h / (h + depth)
-                    low, high = min(low, at), max(high, at)
-            meets &= low <= faces.high[f, axis] and high >= faces.low[f, axis]
-        if meets and over > -r:
+        if _meets(faces, face[k], image[k], centre, r):
             found[count] = k
             count += 1
     return found[:count]
+
+
+@numba.njit(cache=True, nogil=True)
+def _meets(faces: Faces, f: int, image: np.ndarray, centre: np.ndarray, r: float) -> bool:
+    """Whether an image may see any of a ball through a face; errs towards more."""
+    h, over = -height(faces, f, image), height(faces, f, centre)
+    if h < 0.0:
+        h, over = -h, -over
+    if over <= -r:
+        return False
+    near = max(over - r, 0.0)
+    for axis in range(2):
+        i, c = 0.0, 0.0
+        for x in range(3):
+            i += faces.axes[f, axis, x] * image[x]
+            c += faces.axes[f, axis, x] * centre[x]
+        low, high = np.inf, -np.inf
+        for side in (-r, r):
+            for depth in (near, over + r):
+                at = i + (c + side - i) * h / (h + depth)
+                low, high = min(low, at), max(high, at)
+        if low > faces.high[f, axis] or high < faces.low[f, axis]:
+            return False
+    return True
+
+
+@numba.njit(cache=True, nogil=True)
+def balls_around(points: np.ndarray) -> np.ndarray:
+    """Balls around every `GROUP` points in turn [m], rows x, y, z and radius, (group, 4)."""
+    balls = np.zeros(((len(points) + GROUP - 1) // GROUP, 4))
+    for group in range(len(balls)):
+        some, far = points[group * GROUP : (group + 1) * GROUP], 0.0
+        for axis in range(3):
+            balls[group, axis] = 0.5 * (some[:, axis].min() + some[:, axis].max())
+        for p in range(len(some)):
+            far = max(far, ((some[p] - balls[group, :3]) ** 2).sum())
+        balls[group, 3] = math.sqrt(far) + 1e-6
+    return balls
 
 
 @numba.njit(cache=True, nogil=True)
@@ -120,7 +144,7 @@ def on_mirror(
     faces: Faces,
     face: int,
     image: np.ndarray,
-    points: tuple[np.ndarray, np.ndarray],
+    points: tuple[np.ndarray, np.ndarray, np.ndarray],
     slack_m: float,
     scratch: tuple[np.ndarray, np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -130,7 +154,8 @@ def on_mirror(
         faces: The faces.
         face: The mirror.
         image: Image of the place in it [m], shape (3,).
-        points: The points [m] and the normals of their surface, each of shape (point, 3).
+        points: The points [m], the normals of their surface, each of shape (point, 3), and balls
+            around groups of them, from `balls_around`.
         slack_m: How far behind a point's surface the image may lie [m].
         scratch: Filled, see below; of the length of the points.
 
@@ -145,21 +170,24 @@ def on_mirror(
     high_u, high_w = faces.high[face, 0], faces.high[face, 1]
     ix, iy, iz = image[0], image[1], image[2]
     h = offset - (nx * ix + ny * iy + nz * iz)
-    (where, normals), (met, at) = points, scratch
+    (where, normals, balls), (met, at) = points, scratch
     count = 0
-    for p in range(len(where)):
-        x, y, z = where[p, 0], where[p, 1], where[p, 2]
-        facing = (ix - x) * normals[p, 0] + (iy - y) * normals[p, 1] + (iz - z) * normals[p, 2]
-        over = nx * x + ny * y + nz * z - offset
-        if facing < -slack_m or h * over <= 0.0:
+    for group in range(len(balls)):
+        if not _meets(faces, face, image, balls[group, :3], balls[group, 3]):
             continue
-        share = h / (h + over)
-        x, y, z = ix + share * (x - ix), iy + share * (y - iy), iz + share * (z - iz)
-        a, b = ux * x + uy * y + uz * z, wx * x + wy * y + wz * z
-        if a < low_u or a > high_u or b < low_w or b > high_w:
-            continue
-        met[count], at[count, 0], at[count, 1], at[count, 2] = p, x, y, z
-        count += 1
+        for p in range(group * GROUP, min((group + 1) * GROUP, len(where))):
+            x, y, z = where[p, 0], where[p, 1], where[p, 2]
+            facing = (ix - x) * normals[p, 0] + (iy - y) * normals[p, 1] + (iz - z) * normals[p, 2]
+            over = nx * x + ny * y + nz * z - offset
+            if facing < -slack_m or h * over <= 0.0:
+                continue
+            share = h / (h + over)
+            x, y, z = ix + share * (x - ix), iy + share * (y - iy), iz + share * (z - iz)
+            a, b = ux * x + uy * y + uz * z, wx * x + wy * y + wz * z
+            if a < low_u or a > high_u or b < low_w or b > high_w:
+                continue
+            met[count], at[count, 0], at[count, 1], at[count, 2] = p, x, y, z
+            count += 1
     return met[:count], at[:count]
 
 

@@ -39,7 +39,10 @@ class BodySurface:
             people.edges,
         )
         instance = people.instance[self._points.triangle]
-        self._order = np.argsort(instance, kind="stable")
+        # Neighbours one after the other: they meet the same mirrors and the same triangles.
+        places = self._points.at(people.rest_vertices)[0]
+        beside = build_bvh(np.repeat(places[:, None], 3, axis=1)).triangle
+        self._order = beside[np.argsort(instance[beside], kind="stable")]
         self._body = np.unique(instance[self._order], return_inverse=True)[1]
         self._areas = self._points.areas[self._order]
         self._material = self._points.material[self._order].astype(np.int64)

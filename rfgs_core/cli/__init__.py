@@ -23,6 +23,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "ablate": ("ablate", "AblateArgs"),
     "predict": ("predict", "PredictArgs"),
     "csi": ("csi", "CsiArgs"),
+    "room": ("room", "RoomArgs"),
     "inspect": ("inspect_capture", "InspectArgs"),
     "import": ("import_capture", "ImportArgs"),
     "addon": ("addon", "AddonArgs"),

@@ -91,12 +91,7 @@ def pair_maps(observations: Observations) -> PairMaps:
         power = delay_power_map(observations, points.reshape(-1, 3))
     else:
         power = matched_filter_map(
-            observations.delta,
-            observations.layout.tx_xyz,
-            observations.layout.rx_xyz,
-            pair,
-            freq_hz,
-            points.reshape(-1, 3),
+            observations.delta, observations.layout, pair, freq_hz, points.reshape(-1, 3)
         )
     power = power.reshape(len(names), *points.shape[:3])
     power /= np.maximum(power.mean(axis=(1, 2, 3), keepdims=True), 1e-30)

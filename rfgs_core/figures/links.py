@@ -67,9 +67,7 @@ def link_channels(run: Run, tx_device: int, rx_device: int) -> LinkChannels:
     if (tx_device, rx_device) not in pairs:
         known = ", ".join(f"{a}→{b}" for a, b in pairs)
         raise RfgsError(f"{name} measures no link {tx_device}→{rx_device}; it has {known}")
-    tx, rx = np.nonzero(
-        layout.measured & (layout.tx_device[:, None] == tx_device) & (layout.rx_device == rx_device)
-    )
+    tx, rx = np.nonzero(layout.measured & layout.links_between(tx_device, rx_device))
     static = whole_static(sequence, name)
     measured = [(whole_csi(sequence, name, frame) - static)[tx, rx] for frame in run.frames]
     predicted = [run.predict(frame)[tx, rx] for frame in run.frames]

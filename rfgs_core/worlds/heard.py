@@ -12,9 +12,10 @@ import numpy as np
 from jaxtyping import Bool, Float32, Float64
 
 from rfgs_core.articulated import Pose, people
-from rfgs_core.encode.body_maps import CENTRE_HEIGHT_M, ArrayEnd, View, band_weights, views_of
+from rfgs_core.encode.body_maps import CENTRE_HEIGHT_M, ArrayEnd, View, views_of
 from rfgs_core.radio import Radio
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.radio.delay import band_window, hann
 from rfgs_core.radio.tissue import normal_reflection, skin_permittivity
 from rfgs_core.seeds import sub_seed
 from rfgs_core.worlds.echoes import Band, Listener, Seen, mirrored
@@ -95,7 +96,7 @@ def _moments(
         sight = Sight.random(rng, radio, room, spot)
         if sight is None:
             continue
-        band = Band.of(sight.freq_hz, band_weights(sight.subcarriers), _skin(radio.centre_hz))
+        band = Band.of(sight.freq_hz, band_window(sight.subcarriers, hann), _skin(radio.centre_hz))
         pose = motion.at(float(rng.uniform(0.0, motion.duration_s)))
         pose = pose.turned(about(Z, float(rng.uniform(-np.pi, np.pi))))
         # Wherever the motion has led, somebody is at this spot now.

@@ -68,9 +68,9 @@ def _liveliest(sequence: Sequence, radio: str) -> tuple[int, int]:
     nobody moves far, the pair whose channel changes most relative to the static one.
     """
     layout = sequence.layout(radio)
-    apart = [pair for pair in layout.device_pairs if pair[0] != pair[1]] or layout.device_pairs
-    travel_m = {pair: _travel_m(sequence, radio, pair) for pair in apart}
-    best = max(apart, key=lambda pair: travel_m[pair])
+    bistatic = [pair for pair in layout.device_pairs if pair[0] != pair[1]] or layout.device_pairs
+    travel_m = {pair: _travel_m(sequence, radio, pair) for pair in bistatic}
+    best = max(bistatic, key=lambda pair: travel_m[pair])
     if travel_m[best] >= LEAST_TRAVEL_M:
         return best
     static = sequence.csi_static(radio)

@@ -226,7 +226,7 @@ def _prepared(
         bounds_m=np.array(bounds, np.float64),
         fps=plan.fps,
         guesses=guesses,
-        beside={
+        packet_arrays={
             "scale": np.array(scale),
             "packet": plan.packet,
             "packet_time_s": plan.packet_time_s,

@@ -37,9 +37,9 @@ class LinkChannels:
     @property
     def error_db(self) -> float:
         """Energy of the difference over that of the measured channel [dB]; 0 explains nothing."""
-        left = np.sum(np.abs(self.measured - self.predicted).astype(np.float64) ** 2)
+        error = np.sum(np.abs(self.measured - self.predicted).astype(np.float64) ** 2)
         whole = np.sum(np.abs(self.measured).astype(np.float64) ** 2)
-        return float(decibels(max(left, 1e-300) / max(whole, 1e-300), least=0.0))
+        return float(decibels(max(error, 1e-300) / max(whole, 1e-300), least=0.0))
 
     @property
     def explained(self) -> str:

@@ -121,7 +121,7 @@ def body_echoes(
     facets = posed.points, posed.normals, figure.areas_m2
     points, normals, areas = (np.ascontiguousarray(values[::_EVERY]) for values in facets)
     direct = _Sights(lambda place: seen_from(posed, figure.body.faces, place), _SAME_PLACE_M)
-    by_walls = _Sights(lambda place: seen_roughly(points, normals, place, centre), _SAME_IMAGE_M)
+    by_bounces = _Sights(lambda place: seen_roughly(points, normals, place, centre), _SAME_IMAGE_M)
     above = [posed.points[:, 2] > height for height in sight.above_m.tolist()]
     maps = []
     for view in views:
@@ -131,11 +131,11 @@ def body_echoes(
         by_rx = direct.of(view.rx.centre) & above[view.pair[1]]
         listener.add(out, Seen(*facets, by_tx, by_rx), view.tx, view.rx)
         thin_tx, thin_rx = by_tx[::_EVERY], by_rx[::_EVERY]
-        for tx, rx, gain in _by_walls(view, room, centre):
-            met = thin_tx if tx is view.tx else by_walls.of(tx.centre)
-            heard = thin_rx if rx is view.rx else by_walls.of(rx.centre)
+        for tx, rx, gain in _by_bounces(view, room, centre):
+            sent = thin_tx if tx is view.tx else by_bounces.of(tx.centre)
+            heard = thin_rx if rx is view.rx else by_bounces.of(rx.centre)
             listener.add(
-                out, Seen(points, normals, areas, met, heard), tx, rx, gain * math.sqrt(_EVERY)
+                out, Seen(points, normals, areas, sent, heard), tx, rx, gain * math.sqrt(_EVERY)
             )
         maps.append(np.abs(out * band.skin) ** 2)
     return np.array(maps, dtype=np.float32)
@@ -157,7 +157,7 @@ class _Sights:
         return self._known[-1][1]
 
 
-def _by_walls(
+def _by_bounces(
     view: View, room: Room, centre: Float64[np.ndarray, "3"]
 ) -> Iterator[tuple[ArrayEnd, ArrayEnd, float]]:
     """Ends of a view with one of them behind a wall, and the wall's amplitude."""

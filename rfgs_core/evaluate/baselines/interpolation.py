@@ -74,8 +74,8 @@ def completed(
 
     Between devices that heard nothing of each other the prediction stays as it is.
     """
-    left = field - np.where(np.isnan(field), 0.0, predicted)
-    residual = fill(left.astype(np.complex64), evidence, along)
+    unexplained = field - np.where(np.isnan(field), 0.0, predicted)
+    residual = fill(unexplained.astype(np.complex64), evidence, along)
     for pair in evidence.layout.device_pairs:
         block = evidence.layout.block_of(*pair)
         if not evidence.link_visible[block].any():

@@ -57,7 +57,7 @@ def _choose(device: TracingDevice) -> None:
     there = dr.has_backend(dr.JitBackend.CUDA)
     if device == "cuda" and not there:
         raise MissingToolError(
-            f"--device cuda: Dr.Jit {version("drjit")} finds no GPU; expected an NVIDIA driver of "
+            f"--device cuda: Dr.Jit {version('drjit')} finds no GPU; expected an NVIDIA driver of "
             "version 535 or newer, or --device cpu"
         )
     chosen = "cuda" if there and device != "cpu" else "llvm"

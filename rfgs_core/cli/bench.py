@@ -30,6 +30,9 @@ class BenchArgs:
     limbs: joints and surface of a dataset's one person beside what knows less.
     people: how often a dataset's people are counted right, beside channels without any.
     fields: the grid search that settings of neural fields, our rivals, were taken from.
+
+    scaling: how the cost of the fast tracer and of propagation grows over two decades of facets,
+    Gaussians, links and subcarriers: CPU seconds and exponents, some two minutes.
     """
 
     part: tyro.conf.Positional[
@@ -44,6 +47,7 @@ class BenchArgs:
             "limbs",
             "people",
             "fields",
+            "scaling",
         ]
     ]
     """What to time or judge."""
@@ -94,6 +98,8 @@ def _bench(args: BenchArgs) -> Callable[[], dict[str, Any]]:
         return partial(_people, args)
     if args.part == "fields":
         return partial(_fields, args)
+    if args.part == "scaling":
+        return _scaling
     if args.part == "raster":
         from rfgs_core.render.bench import bench_raster
 
@@ -205,6 +211,12 @@ def _fields(args: BenchArgs) -> dict[str, Any]:
     }
     steps = {"steps": tried[0].steps, "radio": args.radio, "frame": frame}
     return {**table, **steps, **hardware()}
+
+
+def _scaling() -> dict[str, Any]:
+    from rfgs_core.scaling import bench_scaling
+
+    return bench_scaling(lambda words: _note(f"timing {words}"))
 
 
 def _note(line: str) -> None:

@@ -30,6 +30,7 @@ class BenchArgs:
     limbs: joints and surface of a dataset's one person beside what knows less.
     people: how often a dataset's people are counted right, beside channels without any.
     fields: the grid search that settings of neural fields, our rivals, were taken from.
+    table1: the paper's table 1, methods x Wi-Fi and mmWave, resumable; see --size and --out.
 
     scaling: how the cost of the fast tracer and of propagation grows over two decades of facets,
     Gaussians, links and subcarriers: CPU seconds and exponents, some two minutes.
@@ -47,6 +48,7 @@ class BenchArgs:
             "limbs",
             "people",
             "fields",
+            "table1",
             "scaling",
         ]
     ]
@@ -74,6 +76,12 @@ class BenchArgs:
     """Adam steps for the parts `training` (left out: until the loss stands still) and `fields`."""
     device: Device = "cpu"
     """Where the parts `propagation` and `training` run: cpu, or cuda, the current GPU."""
+    size: Literal["smoke", "paper-cpu"] = "smoke"
+    """For the part `table1`: one scene, or the study's four with the paper's steps (hours)."""
+    seeds: int | None = None
+    """For the part `table1`: trainings of each method; left out: what the size has."""
+    out: Path | None = None
+    """For the part `table1`: folder of its datasets, runs and cells; what is finished is kept."""
     json: Path | None = None
     """Also write the numbers to this file, as one flat dictionary."""
 
@@ -229,7 +237,8 @@ def run(args: BenchArgs) -> int:
     from rfgs_core.errors import RfgsError
     from rfgs_core.files import write_json
 
-    for name, value in (("gaussians", args.gaussians), ("steps", args.steps)):
+    asked = {"gaussians": args.gaussians, "steps": args.steps, "seeds": args.seeds}
+    for name, value in asked.items():
         if value is not None and value < 1:
             raise RfgsError(f"--{name} {value}: expected at least 1")
     if args.part == "tracers":
@@ -237,6 +246,10 @@ def run(args: BenchArgs) -> int:
 
         call("dataset_factory", "tracers", *(["--json", args.json] if args.json else []))
         return 0
+    if args.part == "table1":
+        from rfgs_core.cli.table1 import make_table1
+
+        return make_table1(args.out, args.size, args.seeds, args.json)
     if args.part in ("propagation", "raster", "blender"):
         sys.stderr.write(f"timing {args.part}; the plain twin takes most of it, about a minute\n")
     result = _bench(args)()

@@ -7,22 +7,25 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import torch
 
 from rfgs_core.bodies.body_prior import Bodies
 from rfgs_core.dataset import Dataset
+from rfgs_core.encode import MATCHED_FILTER
 from rfgs_core.evaluate.geometry import BEST_K_FACTOR, best_voxels, voxel_budget
 from rfgs_core.evaluate.grid import Grid
 from rfgs_core.fit.losses import SamplePoints
+from rfgs_core.fit.sampling import sample_points
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.measure.observations import Observations
 from rfgs_core.model.first_gaussians import gaussians_at
 from rfgs_core.model.first_powers import fit_power, new_head
 from rfgs_core.model.head import RadioHead
 from rfgs_core.model.reflectivity import fitted_reflectivities
-from rfgs_core.neural.fit import FittedField, fit_field
+from rfgs_core.neural.fit import FittedField, StartPrior, fit_field
 from rfgs_core.neural.settings import FieldSettings
 from rfgs_core.radio.levels import decibels
 from rfgs_core.run import Run
@@ -35,8 +38,32 @@ from rfgs_core.threads import one_torch_thread
 #: Standard deviation of a Gaussian that stands for a voxel of 4 cm: it does not reach the next [m].
 VOXEL_SCALE_M = 0.012
 
-#: Sample points of a frame of a channel, which all fields of it share.
-PointsOf = Callable[[int, Observations], SamplePoints]
+
+class Given(NamedTuple):
+    """What all fields of a frame share."""
+
+    points: SamplePoints
+    """Sample points of the paper's losses."""
+    prior: StartPrior
+    """What RF-GS takes for likely of bodies."""
+
+    @staticmethod
+    def of(observations: Observations, config: TrainConfig, seed: int) -> Given:
+        """Sample points with the default encoder, and bodies as RF-GS finds them.
+
+        Raises:
+            RfgsError: Nobody changes the channel.
+        """
+        rng = np.random.default_rng(seed)
+        with one_torch_thread():
+            points = sample_points(
+                observations, config.grid_side, rng, MATCHED_FILTER, config.refine_levels
+            )
+            return Given(points, StartPrior.of(observations, config, seed))
+
+
+#: What is given of a frame.
+GivenOf = Callable[[int, Observations], Given]
 
 
 @dataclass(frozen=True)
@@ -91,7 +118,7 @@ def fit_fields(
     frames: list[int],
     settings: FieldSettings,
     config: TrainConfig,
-    points_of: PointsOf,
+    given_of: GivenOf,
     out: Path,
 ) -> FieldRun:
     """Fits a field to each frame by itself; nothing is written.
@@ -102,7 +129,7 @@ def fit_fields(
         frames: Which frames.
         settings: Which field; its seed is the root of those of the frames.
         config: How bodies are found and reflectivities solved, as RF-GS has it.
-        points_of: Sample points of a frame.
+        given_of: What fields of a frame share; its time is not counted.
         out: A folder that paths of the result are relative to.
 
     Raises:
@@ -120,11 +147,11 @@ def fit_fields(
     spent, head = 0.0, None
     for frame in frames:
         observations = run.observations(frame)
-        points = points_of(frame, observations)
+        given = given_of(frame, observations)
         own = replace(settings, seed=sub_seed(settings.seed, sequence.name, radio, frame, "field"))
         begin = time.perf_counter()
         with one_torch_thread():
-            fitted = fit_field(observations, own, config, points)
+            fitted = fit_field(observations, own, config, given.points, given.prior)
             score = fitted.score(grid.centres(), grid.voxel_m)
             best = best_voxels(score.reshape(grid.shape), BEST_K_FACTOR * voxels)
             places, shares = grid.centres(best), score[best]

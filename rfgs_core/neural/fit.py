@@ -92,6 +92,7 @@ def fit_field(
     settings: FieldSettings,
     config: TrainConfig,
     points: SamplePoints,
+    prior: StartPrior | None = None,
     on_step: Callable[[float], None] | None = None,
 ) -> FittedField:
     """Fits a field to the visible channel of a frame.
@@ -99,14 +100,19 @@ def fit_field(
     Args:
         observations: The frame.
         settings: Which field, and its fit.
-        config: How bodies are found, and the grid of the sample points; as RF-GS has them.
+        config: The grid of the sample points.
         points: Sample points of the objective `features`; the other one does not read them.
+        prior: What the density is multiplied by where `settings.prior` asks for it; None is found
+            here, as RF-GS finds it.
         on_step: Called with the loss of every step.
 
     Raises:
         RfgsError: Nobody changes the channel.
     """
-    prior = StartPrior.of(observations, config, settings.seed) if settings.prior else None
+    if not settings.prior:
+        prior = None
+    elif prior is None:
+        prior = StartPrior.of(observations, config, settings.seed)
     field = NeuralField(settings, observations.bounds_m)
     task = _task(observations, settings, config, points, prior)
     return FittedField(field, task, prior, descend(field, task, settings, on_step))

@@ -14,7 +14,7 @@ import torch
 
 from rfgs_core.dataset import open_dataset
 from rfgs_core.encode import MATCHED_FILTER
-from rfgs_core.evaluate.field_run import fit_fields
+from rfgs_core.evaluate.field_run import Given, fit_fields
 from rfgs_core.evaluate.grid import Grid
 from rfgs_core.evaluate.metrics import evaluate_method
 from rfgs_core.fit.losses import SamplePoints
@@ -103,11 +103,11 @@ def test_fields_of_a_sequence_are_evaluated_as_runs_are(tiny_dataset: Path, tmp_
     config = TrainConfig(grid_side=8, solver_steps=2, posture="standing")
     settings = replace(SMALL, steps=5, prior=True)
 
-    def points_of(frame: int, observations: Observations) -> SamplePoints:
-        return sampled(observations)
+    def given_of(frame: int, observations: Observations) -> Given:
+        return Given.of(observations, config, frame)
 
     runs = [
-        fit_fields(dataset, "wifi", [1, 2], settings, config, points_of, tmp_path) for _ in range(2)
+        fit_fields(dataset, "wifi", [1, 2], settings, config, given_of, tmp_path) for _ in range(2)
     ]
     first, second = (evaluate_method(run)["method"] for run in runs)
     assert first == second
@@ -116,6 +116,6 @@ def test_fields_of_a_sequence_are_evaluated_as_runs_are(tiny_dataset: Path, tmp_
     assert runs[0].config.train_s > 0.0
     assert len(runs[0].bodies(1) or ()) == 1
     plain = fit_fields(
-        dataset, "wifi", [1], replace(settings, prior=False), config, points_of, tmp_path
+        dataset, "wifi", [1], replace(settings, prior=False), config, given_of, tmp_path
     )
     assert plain.bodies(1) is None

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`rfgs bench table1`: the paper's table 1, measured."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rfgs_core.errors import RfgsError
+
+if TYPE_CHECKING:
+    from rfgs_core.study.rivals import SizeName
+
+#: Radios of the table.
+RADIOS = ("wifi", "mmwave")
+
+
+def make_table1(out: Path | None, size_name: SizeName, seeds: int | None, file: Path | None) -> int:
+    """Makes what is missing of the table, prints it and writes OUT/table1.md.
+
+    Args:
+        out: Folder of datasets, runs and cells.
+        size_name: How much of everything.
+        seeds: Trainings of each method; None takes what the size has.
+        file: Also write the rows here.
+
+    Returns:
+        0 when the table holds all cells, else 1.
+
+    Raises:
+        RfgsError: There is no folder to work in.
+    """
+    from dataclasses import asdict
+
+    from tqdm import tqdm
+
+    from rfgs_core.bench import hardware
+    from rfgs_core.cli.calls import call
+    from rfgs_core.evaluate.provenance import now
+    from rfgs_core.files import write_json, write_text
+    from rfgs_core.study.rivals import SIZES, cells, make, stored
+    from rfgs_core.study.rivals_table import rival_rows, rival_table
+
+    if out is None:
+        raise RfgsError("bench table1: expected --out FOLDER for its datasets, runs and cells")
+    if out.exists() and not out.is_dir():
+        raise RfgsError(f"{out} is a file; expected a folder, choose another --out")
+    size = SIZES[size_name]
+    chosen = cells(size, RADIOS, seeds or size.seeds)
+    results, failed = [], {}
+    with tqdm(chosen, desc="table1", unit="cell") as bar:
+        for cell in bar:
+            bar.set_postfix_str(cell.name)
+            try:
+                if not (out / cell.dataset / "dataset.json").exists():
+                    call(*cell.generate(out, size))
+                results.append(stored(cell, out, size) or make(cell, out, size))
+            except RfgsError as error:
+                failed[cell.name] = str(error)
+            rows = rival_rows(results)
+            write_text(out / "table1.md", rival_table(rows))
+            if file is not None:
+                found = {"rows": [asdict(row) for row in rows], "failed": failed}
+                write_json(
+                    file, {"size": size_name, **asdict(size), **found, **hardware(), "date": now()}
+                )
+    sys.stdout.write(rival_table(rival_rows(results)))
+    for name, why in failed.items():
+        sys.stdout.write(f"failed, and in no row: {name}: {why}\n")
+    return 1 if failed else 0

@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Table 1 as rows and as Markdown: means and deviations over seeds beside what the paper claims."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rfgs_core.study.rivals import FIELDS, TRAINED
+from rfgs_core.study.table import number
+
+#: Columns: group and key of the metrics, header, format.
+COLUMNS = (
+    ("geometry", "f05", "F5", ".3f"),
+    ("geometry", "f10", "F10", ".3f"),
+    ("geometry", "f20", "F20", ".3f"),
+    ("geometry", "centroid_m", "centroid [m]", ".2f"),
+    ("rf", "element_snr_db", "elements [dB]", ".1f"),
+    ("rf", "subcarrier_snr_db", "subcarriers [dB]", ".1f"),
+)
+#: Picture PSNR that the paper claims [dB].
+CLAIMED_DB = {
+    ("rfgs", "wifi"): 33.7,
+    ("nerf", "wifi"): 21.4,
+    ("mip", "wifi"): 23.1,
+    ("ngp", "wifi"): 24.8,
+    ("nerf", "mmwave"): 19.2,
+    ("ngp", "mmwave"): 22.5,
+    ("rfgs", "mmwave"): 31.4,
+}
+_LABELS = {
+    "rfgs": "RF-GS",
+    "rfgs_no_limbs": "RF-GS without limbs",
+    "paper": "paper's recipe, from our start",
+    "nerf": "RF-NeRF",
+    "mip": "RF-MipNeRF",
+    "ngp": "RF-InstantNGP",
+}
+
+
+@dataclass(frozen=True)
+class RivalRow:
+    """One method on one scene and radio."""
+
+    scene: str
+    radio: str
+    method: str
+    seeds: int
+    mean: dict[str, float | None]
+    """Means over seeds by column key, and `train_s`."""
+    deviation: dict[str, float | None]
+    """Sample deviation over seeds; None of fewer than two."""
+    claimed_psnr_db: float | None
+    """What the paper claims of its pictures, another quantity; nobody has reproduced it."""
+
+
+def rival_rows(results: Iterable[Mapping[str, Any]]) -> list[RivalRow]:
+    """Rows of finished cells, in the order they come in."""
+    groups: dict[tuple[str, str, str], list[dict[str, float | None]]] = {}
+    for result in results:
+        for method, values in result["methods"].items():
+            row = {key: values[group].get(key) for group, key, *_ in COLUMNS}
+            own = method == result["method"]
+            row["train_s"] = result["train_s"] if own else None
+            groups.setdefault((result["scene"], result["radio"], method), []).append(row)
+    return [_row(*names, rows) for names, rows in groups.items()]
+
+
+def _row(scene: str, radio: str, method: str, rows: list[dict[str, float | None]]) -> RivalRow:
+    mean: dict[str, float | None] = {}
+    deviation: dict[str, float | None] = {}
+    for key in rows[0]:
+        known = [value for row in rows if (value := row[key]) is not None]
+        mean[key] = float(np.mean(known)) if known else None
+        deviation[key] = float(np.std(known, ddof=1)) if len(known) > 1 else None
+    claimed = CLAIMED_DB.get((method.split("_")[0] if method in FIELDS else method, radio))
+    return RivalRow(scene, radio, method, len(rows), mean, deviation, claimed)
+
+
+def label(method: str) -> str:
+    """A method in words."""
+    name, _, alone = method.partition(", ")
+    words = _LABELS.get(name, name.replace("_", " "))
+    if name in FIELDS:
+        kind, objective, *prior = name.split("_")
+        words = f"{_LABELS[kind]}, {objective}{', body prior' if prior else ''}"
+    return f"{words}, without residual" if alone else words
+
+
+def rival_table(rows: Sequence[RivalRow]) -> str:
+    """One table per scene and radio."""
+    titles = [title for _, _, title, _ in COLUMNS]
+    head = ("method", *titles, "training [s]", "claimed PSNR [dB], not reproduced")
+    lines: list[str] = []
+    for scene, radio in dict.fromkeys((row.scene, row.radio) for row in rows):
+        lines += [f"{scene}, `{radio}`:", "", f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
+        here = [row for row in rows if (row.scene, row.radio) == (scene, radio)]
+        lines += [f"| {' | '.join(_cells(row))} |" for row in sorted(here, key=_order)]
+        lines.append("")
+    return "\n".join([*lines, _NOTES, ""])
+
+
+def _order(row: RivalRow) -> int:
+    """Ours, neural fields, then what needs no training."""
+    name = row.method.partition(", ")[0]
+    known = (*TRAINED, *FIELDS)
+    return known.index(name) if name in known else len(known)
+
+
+def _cells(row: RivalRow) -> list[str]:
+    shown = [_with(row, key, form) for _, key, _, form in COLUMNS]
+    return [
+        label(row.method),
+        *shown,
+        _with(row, "train_s", ".0f"),
+        number(row.claimed_psnr_db, ".1f"),
+    ]
+
+
+def _with(row: RivalRow, key: str, form: str) -> str:
+    """Mean and deviation."""
+    mean, deviation = row.mean[key], row.deviation[key]
+    if mean is None or deviation is None:
+        return number(mean, form)
+    return f"{mean:{form}} ± {deviation:{form}}"
+
+
+_NOTES = """\
+Mean and sample deviation over seeds of trainings. Elements and subcarriers: signal over error of
+csi − csi_static on entries that no method has seen; methods with Gaussians or fields carry on what
+is left of the visible channel as well, and stand in a second row without that. The claimed PSNR is
+that of pictures, a quantity that none of these columns is."""

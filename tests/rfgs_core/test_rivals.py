@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Table 1 has every method once, keeps what is finished, and says what the cells say."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rfgs_core.cli.bench import BenchArgs, run
+from rfgs_core.errors import RfgsError
+from rfgs_core.files import read_json
+from rfgs_core.study.rivals import FIELDS, SIZES, TRAINED, Cell, Size, cells, make, stored
+from rfgs_core.study.rivals_table import rival_rows, rival_table
+
+TINY = Size(("living_room_walk",), 2, "1:2", 3, 8, 2, 6, 0)
+
+
+def result(seed: int, f10: float, **others: float) -> dict[str, Any]:
+    """A cell of RF-GS on Wi-Fi, with baselines that have the F10 given for them."""
+
+    def groups(value: float) -> dict[str, Any]:
+        geometry = {"f05": value / 2, "f10": value, "f20": 1.0, "centroid_m": None}
+        return {"geometry": geometry, "rf": {"element_snr_db": 3.0, "subcarrier_snr_db": None}}
+
+    methods = {"rfgs": groups(f10), **{name: groups(value) for name, value in others.items()}}
+    cell = {"scene": "living_room_walk", "radio": "wifi", "method": "rfgs", "seed": seed}
+    return {**cell, "train_s": 10.0 * (seed + 1), "methods": methods}
+
+
+def test_every_cell_once_and_one_seed_of_everything_first() -> None:
+    chosen = cells(SIZES["smoke"], ("wifi", "mmwave"), 2)
+    assert len(chosen) == len({cell.name for cell in chosen}) == 2 * 2 * (len(TRAINED) + 12)
+    assert [cell.seed for cell in chosen] == sorted(cell.seed for cell in chosen)
+    assert len({cell.dataset for cell in chosen}) == 2
+    assert len(FIELDS) == 3 * 2 * 2
+    # Nobody is heard behind a wall before depth 3.
+    behind = Cell("through_wall", "wifi", "rfgs", 0).generate(Path("x"), SIZES["paper-cpu"])
+    assert behind[behind.index("--depth") + 1] == "3"
+
+
+def test_rows_are_means_over_seeds_beside_the_claim() -> None:
+    rows = rival_rows([result(0, 0.8, clean=0.4), result(1, 0.9, clean=0.4)])
+    ours, clean = rows
+    assert ours.mean["f10"] == pytest.approx(0.85) and ours.seeds == 2
+    assert ours.deviation["f10"] == pytest.approx(0.0707, abs=1e-4)
+    assert ours.mean["train_s"] == 15.0 and ours.claimed_psnr_db == 33.7
+    # Nobody trains a classical baseline, and what has no value has none in the table.
+    assert clean.mean["train_s"] is None and clean.claimed_psnr_db is None
+    assert ours.mean["centroid_m"] is None
+    text = rival_table(rows)
+    assert "| RF-GS | 0.425 ± 0.035 | 0.850 ± 0.071 |" in text and "| clean |" in text
+
+
+@pytest.mark.parametrize("method", ["paper", "nerf_features", "ngp_propagation_prior"])
+def test_a_cell_is_kept_until_its_settings_change(
+    method: str, tiny_dataset: Path, tmp_path: Path
+) -> None:
+    cell = Cell("living_room_walk", "wifi", method, 0)
+    shutil.copytree(tiny_dataset, tmp_path / cell.dataset)
+    assert stored(cell, tmp_path, TINY) is None
+    made = make(cell, tmp_path, TINY)
+    assert made["methods"][method]["geometry"]["f20"] is not None
+    kept = stored(cell, tmp_path, TINY)
+    assert kept is not None and rival_rows([kept]) == rival_rows([made])
+    other = Size(("living_room_walk",), 2, "1:2", 4, 8, 3, 6, 0)
+    assert stored(cell, tmp_path, other) is None
+    again = read_json(tmp_path / "cells" / f"{cell.name}.json")
+    assert again["settings"]["train"]["seed"] == 0 and again["dataset"]
+
+
+def test_a_table_without_a_folder_is_refused() -> None:
+    with pytest.raises(RfgsError, match="expected --out FOLDER"):
+        run(BenchArgs("table1"))
+    with pytest.raises(RfgsError, match="--seeds 0: expected at least 1"):
+        run(BenchArgs("table1", seeds=0))

@@ -29,6 +29,7 @@ class BenchArgs:
     tracers: the fast tracer beside Sionna RT on our scenes, as `rfgs-factory tracers`.
     limbs: joints and surface of a dataset's one person beside what knows less.
     people: how often a dataset's people are counted right, beside channels without any.
+    live: six receivers of 1,000 packets/s each over UDP, made here: packets lost, latency, updates.
     """
 
     part: tyro.conf.Positional[
@@ -42,6 +43,7 @@ class BenchArgs:
             "tracers",
             "limbs",
             "people",
+            "live",
         ]
     ]
     """What to time or judge."""
@@ -60,6 +62,8 @@ class BenchArgs:
     """For the parts `limbs` and `people`: hide what the dataset holds out, as training does."""
     frames: str | None = None
     """Frames A:B[:STEP] (inclusive) for the part `people`; all when left out."""
+    seconds: float = 60.0
+    """How long the part `live` follows its receivers [s]."""
     frame: int | None = None
     """Frame for the part `training`; the first one when left out."""
     gaussians: int = 20_000
@@ -90,6 +94,8 @@ def _bench(args: BenchArgs) -> Callable[[], dict[str, Any]]:
         return partial(_limbs, args)
     if args.part == "people":
         return partial(_people, args)
+    if args.part == "live":
+        return partial(_live, args)
     if args.part == "raster":
         from rfgs_core.render.bench import bench_raster
 
@@ -170,6 +176,16 @@ def _people(args: BenchArgs) -> dict[str, Any]:
             sequence, args.radio, frames, everything=not args.hold_out, on_frame=bar.update
         )
     return {**table, **hardware()}
+
+
+def _live(args: BenchArgs) -> dict[str, Any]:
+    from rfgs_core.bench import hardware
+    from rfgs_core.errors import RfgsError
+    from rfgs_core.live.bench import bench_live
+
+    if not 1.0 <= args.seconds <= 3600.0:
+        raise RfgsError(f"--seconds {args.seconds:g}: expected 1 to 3600")
+    return {**bench_live(args.seconds, note=_note), **hardware()}
 
 
 def _note(line: str) -> None:

@@ -1,23 +1,34 @@
 # SPDX-License-Identifier: Apache-2.0
 """Symbolic links that lead out of a dataset or a run: nothing is read or written through them.
 
-Both kinds of folder are handed around, so what lies in them may come from anywhere.
+Both kinds of folder are handed around, so what lies in them may come from anywhere. Nor is
+anything read that is neither file nor folder: a pipe keeps its reader waiting for ever.
 """
 
 from __future__ import annotations
 
 import os
+import stat
 from collections.abc import Collection, Iterator
+from contextlib import suppress
 from pathlib import Path
+
+import msgspec
 
 from rfgs_core.errors import RfgsFormatError
 
-#: What makes a folder a dataset, a run or a scene bundle, and what that file then holds.
+#: What makes a folder a dataset, a run or a scene bundle, and how its schema then begins.
 _MARKS = (
-    ("dataset.json", b'"rfgs-dataset/'),
-    ("config.json", b'"rfgs-run/'),
-    ("bundle.json", b'"rfgs-bundle/'),
+    ("dataset.json", "rfgs-dataset/"),
+    ("config.json", "rfgs-run/"),
+    ("bundle.json", "rfgs-bundle/"),
 )
+#: Larger files are refused wherever they are read, so they mark nothing [bytes].
+_LARGEST_MARK = 2**25
+
+
+class _Mark(msgspec.Struct):
+    schema: str
 
 
 def refuse_link(path: Path | str) -> None:
@@ -27,9 +38,13 @@ def refuse_link(path: Path | str) -> None:
     files. Whether `path` exists does not matter.
 
     Raises:
-        RfgsFormatError: It leads elsewhere.
+        RfgsFormatError: It leads elsewhere, or is a pipe, a socket or a device.
     """
     spelt, real = os.path.abspath(path), os.path.realpath(path)
+    with suppress(OSError):
+        kind = os.lstat(real).st_mode
+        if not (stat.S_ISREG(kind) or stat.S_ISDIR(kind)):
+            raise RfgsFormatError(f"{path}: expected a file or a folder, found {_kind(kind)}")
     if spelt == real:
         return
     folder = os.path.dirname(spelt)
@@ -43,29 +58,46 @@ def refuse_link(path: Path | str) -> None:
         folder = os.path.dirname(folder)
 
 
-def symbolic_links(folder: Path | str, without: Collection[str] = ()) -> Iterator[Path]:
-    """Every symbolic link below a folder; none is followed.
+def strange_entries(folder: Path | str, without: Collection[str] = ()) -> Iterator[Path]:
+    """Everything below a folder that is neither file nor folder: links, pipes, sockets, devices.
 
     Args:
-        folder: Where to look.
+        folder: Where to look; no link is followed.
         without: Names of folders in it that are not looked into.
     """
     with os.scandir(folder) as entries:
         rows = sorted(entries, key=lambda entry: entry.name)
     for entry in rows:
-        if entry.is_symlink():
+        if entry.is_dir(follow_symlinks=False):
+            if entry.name not in without:
+                yield from strange_entries(entry.path)
+        elif not entry.is_file(follow_symlinks=False):
             yield Path(entry.path)
-        elif entry.name not in without and entry.is_dir():
-            yield from symbolic_links(entry.path)
+
+
+def described(entry: Path) -> str:
+    """What `strange_entries` has found, in words."""
+    if entry.is_symlink():
+        return f"a symbolic link to {entry.readlink()}"
+    return _kind(entry.lstat().st_mode)
+
+
+def _kind(mode: int) -> str:
+    kinds = ((stat.S_ISFIFO, "a pipe"), (stat.S_ISSOCK, "a socket"))
+    return next((name for matches, name in kinds if matches(mode)), "a device")
 
 
 def _is_marked(folder: str) -> bool:
     """Whether a folder is a dataset, a run or a scene bundle."""
-    for name, word in _MARKS:
-        try:
-            with open(os.path.join(folder, name), "rb") as stream:
-                if word in stream.read():
-                    return True
-        except OSError:
-            continue
+    for name, begin in _MARKS:
+        # As it will be read: a schema may be spelt with escapes, too.
+        with suppress(OSError, msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
+            file = os.path.join(folder, name)
+            about = os.stat(file)
+            if not stat.S_ISREG(about.st_mode) or about.st_size > _LARGEST_MARK:
+                continue
+            with open(file, "rb") as stream:
+                mark = msgspec.json.decode(stream.read(), type=_Mark)
+            if mark.schema.startswith(begin):
+                return True
     return False

@@ -21,9 +21,11 @@ from rfgs_core.dataset.schema import read_dataset_info
 from rfgs_core.dataset.writer import MANIFEST, listed_files, own_digest
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.files import read_json, sha256
-from rfgs_core.links import symbolic_links
+from rfgs_core.links import described, strange_entries
 from rfgs_core.radio import layout
 
+#: Larger manifests name more files than any dataset has [bytes].
+_LARGEST_MANIFEST = 2**27
 #: Coordinates of a store that follow from the devices in `sequence.json`.
 LAYOUT_COORDINATES = (
     *("tx_xyz", "rx_xyz", "measured", "tx_device", "rx_device", "rx_column"),
@@ -66,8 +68,8 @@ def validate(path: Path) -> list[str]:
 
 
 def _link_faults(path: Path) -> Iterator[str]:
-    for link in symbolic_links(path):
-        yield f"{link}: a symbolic link to {link.readlink()}; expected files and folders"
+    for entry in strange_entries(path):
+        yield f"{entry}: {described(entry)}; expected files and folders"
 
 
 def _caught(check: Callable[[], Iterator[str] | list[str]]) -> list[str]:
@@ -95,6 +97,9 @@ def _manifest_faults(path: Path, manifest_sha256: str) -> Iterator[str]:
     file = path / MANIFEST
     if not file.is_file():
         yield f"{file}: missing"
+        return
+    if file.stat().st_size > _LARGEST_MANIFEST:
+        yield f"{file}: larger than a list of files is"
         return
     if sha256(file) != manifest_sha256:
         yield f"{file}: differs from the digest in dataset.json"

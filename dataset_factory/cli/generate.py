@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 
-from dataset_factory.plan.tracers import TracerName
+from dataset_factory.plan.tracers import TracerName, TracingDevice
 from dataset_factory.scene.overrides import SceneOptions
 from rfgs_core.errors import RfgsError
 
@@ -66,6 +66,9 @@ class GenerateArgs:
     tracer: TracerName = "sionna"
     """What traces the channels: Sionna RT, the reference, or the fast tracer, several times
     quicker and held against it (`rfgs-factory tracers`); see docs/tracers.md."""
+    device: TracingDevice = "auto"
+    """What Sionna RT traces on: cuda, a GPU; cpu; or a GPU where there is one. Bytes are the same
+    on one kind of device, and differ in the last digits between the two."""
     shadow: Literal["kirchhoff", "hard"] = "kirchhoff"
     """How bodies shadow paths: diffracted at the silhouette, or cut off sharply."""
     impairments: str = ""
@@ -94,6 +97,10 @@ def run(args: GenerateArgs) -> int:
 
     if not args.scheduler:
         require("sionna")  # Else it would be missed only once the scene has been exported.
+        if args.device == "cuda":
+            from dataset_factory.trace.setup import prepare
+
+            prepare(device="cuda")
     made = generate(job_of(args)[0])
     what = "finished" if made else "already complete"
     sys.stdout.write(f"{args.out}: {what}; look at it with: rfgs-factory preview {args.out}\n")
@@ -147,7 +154,17 @@ def job_of(args: GenerateArgs) -> tuple[Job, Outline]:
     for sentence in left_out(seen.devices, radios):
         logger.warning("%s", sentence)
     memory_gb = args.worker_memory
-    return Job(args.out, plan, blender, args.workers, memory_gb, args.scheduler, source), seen
+    job = Job(
+        args.out,
+        plan,
+        blender,
+        args.workers,
+        worker_memory_gb=memory_gb,
+        scheduler=args.scheduler,
+        device=args.device,
+        overrides_label=source,
+    )
+    return job, seen
 
 
 def _plan(

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from dataset_factory.plan.contents import Plan
+from dataset_factory.plan.tracers import TracingDevice
 from dataset_factory.scene.blender import Blender, Progress
 from dataset_factory.scene.bundle import sanitised
 from dataset_factory.scene.overrides import overrides_file
@@ -35,6 +36,8 @@ class Job:
     """Memory that each of them may take [GB]; 0 shares the machine's."""
     scheduler: str = ""
     """Address of a Dask scheduler that traces instead; empty for this machine."""
+    device: TracingDevice = "auto"
+    """What Sionna RT traces on."""
     overrides_label: str = "command line"
     """Where the plan's overrides come from, for messages."""
     seconds: dict[str, float] = field(default_factory=dict)

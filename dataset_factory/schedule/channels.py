@@ -114,6 +114,7 @@ def _request(job: Job, bundle: Bundle, sequence: SequenceInfo, log: str) -> Requ
         depth=plan.depth,
         shadow=plan.shadow,
         tracer=plan.tracer,
+        device=job.device,
         seed=plan.seed,
         paths=plan.paths,
         versions=versions(),

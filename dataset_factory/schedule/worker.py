@@ -21,7 +21,7 @@ import psutil
 
 from dataset_factory.children import end_with_parent
 from dataset_factory.plan.contents import versions
-from dataset_factory.plan.tracers import TracerName
+from dataset_factory.plan.tracers import TracerName, TracingDevice
 from dataset_factory.scene.bundle import BundleFrame, frame_file, read_bundle
 from rfgs_core.dataset.path_store import write_paths
 from rfgs_core.dataset.schema import device_pose, radio_from_json
@@ -84,6 +84,8 @@ class Request:
     """How bodies shadow paths."""
     tracer: TracerName
     """What traces."""
+    device: TracingDevice
+    """What Sionna RT traces on."""
     seed: int
     """Root seed."""
     paths: bool
@@ -101,7 +103,7 @@ class SceneTracer:
         """Opens the scene."""
         from dataset_factory.trace.setup import prepare
 
-        prepare(threads=1)
+        prepare(threads=1, device=request.device)
         self._request = request
         self._bundle = read_bundle(bundle)
         self._radio = ""

@@ -30,6 +30,8 @@ class BenchArgs:
     limbs: joints and surface of a dataset's one person beside what knows less.
     people: how often a dataset's people are counted right, beside channels without any.
     live: six receivers of 1,000 packets/s each over UDP, made here: packets lost, latency, updates.
+    scaling: how the cost of the fast tracer and of propagation grows over two decades of facets,
+    Gaussians, links and subcarriers: CPU seconds and exponents, some two minutes.
     """
 
     part: tyro.conf.Positional[
@@ -44,6 +46,7 @@ class BenchArgs:
             "limbs",
             "people",
             "live",
+            "scaling",
         ]
     ]
     """What to time or judge."""
@@ -96,6 +99,8 @@ def _bench(args: BenchArgs) -> Callable[[], dict[str, Any]]:
         return partial(_people, args)
     if args.part == "live":
         return partial(_live, args)
+    if args.part == "scaling":
+        return _scaling
     if args.part == "raster":
         from rfgs_core.render.bench import bench_raster
 
@@ -186,6 +191,12 @@ def _live(args: BenchArgs) -> dict[str, Any]:
     if not 1.0 <= args.seconds <= 3600.0:
         raise RfgsError(f"--seconds {args.seconds:g}: expected 1 to 3600")
     return {**bench_live(args.seconds, note=_note), **hardware()}
+
+
+def _scaling() -> dict[str, Any]:
+    from rfgs_core.scaling import bench_scaling
+
+    return bench_scaling(lambda words: _note(f"timing {words}"))
 
 
 def _note(line: str) -> None:

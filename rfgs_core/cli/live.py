@@ -57,7 +57,7 @@ class LiveArgs:
     room; power, |CSI|^2 alone."""
     people: int = 1
     """How many people move."""
-    gaussians: int = 600
+    gaussians: int = 400
     """Moving Gaussians."""
     updates_per_s: float = 25.0
     """Windows, and updates of the Gaussians, in a second."""

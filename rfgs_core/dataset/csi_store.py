@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +14,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Complex64
 
-from rfgs_core.dataset.store_schema import LARGEST_CHUNK_BYTES, Array, check_array, check_store
+from rfgs_core.dataset.chunk_file import refuse_chunk
+from rfgs_core.dataset.store_schema import (
+    LARGEST_CHUNK_BYTES,
+    Array,
+    check_array,
+    check_store,
+    chunk_bytes,
+)
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.files import replacing_folder, write_json
 from rfgs_core.links import refuse_link
@@ -40,7 +48,7 @@ _UNITS = {
 #: What Zarr, its codecs and xarray say of damaged files.
 _DAMAGE = (
     *(OSError, ValueError, KeyError, TypeError, RuntimeError, IndexError, MemoryError),
-    AttributeError,
+    *(AttributeError, struct.error),
 )
 
 
@@ -153,11 +161,13 @@ def read_csi(
 
     name = name or ("csi_static" if index is None else "csi")
     lengths: dict[str, int] = dict(zip(DIMENSIONS[1:], links, strict=True))
-    count = _samples(path / name, check_array(path, name, lengths), counts)
+    about = check_array(path, name, lengths)
+    count = _samples(path / name, about, counts)
     file = chunk_file(path, index, name)
     refuse_link(file)
     if not file.is_file():
         raise RfgsFormatError(f"{file}: no such chunk; this frame was never finished")
+    refuse_chunk(file, chunk_bytes(about))
     try:
         array = zarr.open_array(str(path / name), mode="r", zarr_format=3)
         which = ... if index is None else slice(index * count, (index + 1) * count)

@@ -21,6 +21,8 @@ _LINES = {0: 1, 2: 1, 3: 16}
 #: Type of a channel's numbers, by its own number: half and single precision.
 _KINDS = {1: "<f2", 2: "<f4"}
 _MOST_CHANNELS = 64
+#: What all channels take as float32, and what their file takes, at most [bytes].
+MOST_BYTES = 400_000_000
 
 
 @dataclass(frozen=True)
@@ -98,6 +100,8 @@ def _header(data: bytes, most_pixels: int) -> _Header:
         raise ValueError("expected lines from top to bottom, plain or zipped")
     channels = _channels(attributes["channels"])
     room = (len(data) - at) * (1100 if compression else 1)
+    if math.prod((width, height, len(channels), 4)) > MOST_BYTES:
+        raise ValueError(f"{len(channels)} channels of {width} x {height} pixels are too large")
     if math.prod((width, height, len(channels), 2)) > room:
         raise ValueError(f"a picture of {width} x {height} pixels does not fit into it")
     return _Header(channels, width, height, low_y, _LINES[compression], compression != 0, at)

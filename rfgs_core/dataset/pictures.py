@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float, Float32, UInt8, UInt16
 from PIL import Image, UnidentifiedImageError
 
-from rfgs_core.dataset.exr import decode_exr
+from rfgs_core.dataset.exr import MOST_BYTES, decode_exr
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.files import replacing, write_bytes
 from rfgs_core.links import refuse_link
@@ -100,6 +100,8 @@ def read_planes(path: Path, names: str) -> list[Float32[np.ndarray, "h w"]]:
     """
     refuse_link(path)
     try:
+        if path.stat().st_size > MOST_BYTES:
+            raise ValueError("larger than any picture of a dataset")
         channels = decode_exr(path.read_bytes(), MAX_PIXELS)
     except FileNotFoundError as error:
         raise RfgsFormatError(f"{path}: no such picture; the dataset is incomplete") from error

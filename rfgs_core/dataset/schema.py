@@ -41,7 +41,9 @@ PERSON_SURFACE_M2 = 1.6
 
 #: More rows, columns, subcarriers or samples than this are none of a radio's.
 _MOST = 2**24
-_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]*")
+#: More elements than this, or links between them, are in no layout.
+_MOST_ELEMENTS, _MOST_LINKS = 2**20, 2**24
+_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,199}")
 
 
 @dataclass(frozen=True)
@@ -153,11 +155,12 @@ def check_name(path: Path, name: Any) -> None:
     """Refuses names that could not be plain file names inside the dataset.
 
     Raises:
-        RfgsFormatError: The name holds anything but letters, digits, `_`, `-` and inner dots.
+        RfgsFormatError: The name holds anything but letters, digits, `_`, `-` and inner dots,
+            or is longer than file systems have names.
     """
     if not isinstance(name, str) or not _NAME.fullmatch(name):
         raise RfgsFormatError(
-            f"{path}: {name!r} leads outside the dataset or is no plain file name; "
+            f"{path}: {str(name)[:60]!r} leads outside the dataset or is no plain file name; "
             "expected letters, digits, '_' and '-'"
         )
 
@@ -193,11 +196,12 @@ def check_size(path: Path, radio: Radio, devices: int) -> None:
     ports = len(radio.slants_deg) * devices
     tx, rx = radio.tx_rows * radio.tx_cols * ports, radio.rx_rows * radio.rx_cols * ports
     values = radio.samples_per_frame * tx * rx * radio.num_subcarriers
-    if values * np.dtype(np.complex64).itemsize > LARGEST_CHUNK_BYTES:
+    too_large = values * np.dtype(np.complex64).itemsize > LARGEST_CHUNK_BYTES
+    if too_large or max(tx, rx) > _MOST_ELEMENTS or tx * rx > _MOST_LINKS:
         raise RfgsFormatError(
             f"{path}: radio {radio.name!r}: {radio.samples_per_frame} samples of {tx} x {rx} "
             f"elements and {radio.num_subcarriers} subcarriers; expected at most "
-            f"{LARGEST_CHUNK_BYTES / 2**30:.0f} GiB per frame"
+            f"{LARGEST_CHUNK_BYTES / 2**30:.0f} GiB per frame and {_MOST_LINKS} links"
         )
 
 

@@ -7,6 +7,7 @@ is one) and no shape that the file cannot hold ever reaches the libraries behind
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
 from collections.abc import Mapping
@@ -15,14 +16,17 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
+from rfgs_core.dataset.chunk_file import MOST_BYTES, refuse_chunk
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.files import read_json
-from rfgs_core.links import refuse_link, symbolic_links
+from rfgs_core.links import refuse_link, strange_entries
 from rfgs_core.radio import Layout, Radio
 from rfgs_core.records import read_record, record
 
 #: A frame is one chunk, and the codec takes no larger one [bytes].
 LARGEST_CHUNK_BYTES = 2**31 - 2**20
+#: Coordinates are read whole; those of a million samples have some hundred such pieces.
+_MOST_CHUNKS = 10_000
 
 _BYTES = {"bool": 1, "int64": 8, "float64": 8, "complex64": 8}
 #: Type and dimensions of every array; `sample` leads what antennas that move have more of.
@@ -163,11 +167,28 @@ def check_store(path: Path, sizes: Mapping[str, int] | None = None) -> None:
         raise RfgsFormatError(f"{path}: expected the arrays of a radio, found {found}")
     lengths = dict(sizes or {})
     # Everything else is read here and now; a channel's chunk is looked at when it is read.
-    channels = [name for name, (kind, _) in _ARRAYS.items() if kind == "complex64"]
-    for link in symbolic_links(path, channels):
-        refuse_link(link)
+    channels = [name for name in _ARRAYS if is_channel(name)]
+    for entry in strange_entries(path, channels):
+        refuse_link(entry)
+    total = 0
     for name in sorted(known):
-        check_array(path, name, lengths, links_known=name not in channels)
+        array = check_array(path, name, lengths, links_known=name not in channels)
+        if name in channels:
+            continue
+        total += math.prod(array.shape) * _BYTES[array.data_type]
+        if total > MOST_BYTES:
+            raise RfgsFormatError(f"{path}: expected coordinates up to {MOST_BYTES} bytes in all")
+        _check_chunks(path / name, array)
+
+
+def is_channel(name: str) -> bool:
+    """Whether an array holds channels, of which every frame is a chunk; others are coordinates."""
+    return _ARRAYS[name][0] == "complex64"
+
+
+def chunk_bytes(array: Array) -> int:
+    """What the values of a chunk take [bytes]."""
+    return math.prod(array.chunk) * _BYTES[array.data_type]
 
 
 def store_sizes(frames: int, radio: Radio, layout: Layout) -> dict[str, int]:
@@ -217,6 +238,24 @@ def check_array(
             )
     if not len(array.shape) == len(array.chunk) == len(array.dimension_names):
         raise RfgsFormatError(f"{file}: expected a size and a chunk for every dimension")
-    if math.prod(array.chunk) * _BYTES[kind] > LARGEST_CHUNK_BYTES:
-        raise RfgsFormatError(f"{file}: expected chunks up to 2 GiB, found {array.chunk}")
+    largest = LARGEST_CHUNK_BYTES if is_channel(name) else MOST_BYTES
+    if chunk_bytes(array) > largest:
+        raise RfgsFormatError(
+            f"{file}: expected chunks up to {largest / 2**20:.0f} MiB, found {array.chunk}"
+        )
     return array
+
+
+def _check_chunks(path: Path, array: Array) -> None:
+    """Refuses coordinates whose chunks are too many, or packed otherwise than they should be."""
+    grid = [-(-size // step) for size, step in zip(array.shape, array.chunk, strict=True)]
+    if math.prod(grid) > _MOST_CHUNKS:
+        raise RfgsFormatError(
+            f"{path / 'zarr.json'}: expected up to {_MOST_CHUNKS} chunks, found {array.shape} in "
+            f"chunks of {array.chunk}"
+        )
+    for place in itertools.product(*map(range, grid)):
+        file = path.joinpath("c", *map(str, place))
+        # What was never written reads as the fill value.
+        if file.is_file():
+            refuse_chunk(file, chunk_bytes(array))

@@ -128,7 +128,7 @@ class Cloud:
         return now
 
 
-def live_config(bodies: int, gaussians: int = 600, observe: Observe = "complex") -> TrainConfig:
+def live_config(bodies: int, gaussians: int = 400, observe: Observe = "complex") -> TrainConfig:
     """Settings of a stream's short steps, and of the whole fits beside them."""
     return TrainConfig(
         bodies=bodies, num_gaussians=gaussians, observe=observe, solver_steps=2, iterations=20

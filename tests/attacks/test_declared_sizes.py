@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import os
 import resource
 import shutil
 import struct
@@ -17,9 +18,13 @@ import pytest
 from rfgs_core.arrays import load_arrays
 from rfgs_core.dataset import open_dataset
 from rfgs_core.dataset.pictures import read_planes, write_exr
+from rfgs_core.dataset.store_schema import check_store
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.gaussians.ply import read_ply
 from rfgs_core.radio.files import read_radio
+
+#: Bytes of a bomb's content, far beyond the memory that is allowed.
+BOMB_BYTES = 2**31 - 2**22
 
 
 @pytest.fixture(autouse=True)
@@ -42,6 +47,61 @@ def test_radios_of_a_dataset(tiny_dataset: Path, tmp_path: Path, field: str, val
     file.write_text(json.dumps(info))
     with pytest.raises(RfgsFormatError, match=r"sequence\.json: radio 'wifi': "):
         open_dataset(data).sequence().layout("wifi")
+
+
+def zeros(file: Path, frames: int) -> None:
+    """Writes zstd frames of zeros, packed to almost nothing: blocks that repeat a byte."""
+    head = b"\x28\xb5\x2f\xfd\xe0" + struct.pack("<Q", BOMB_BYTES // frames)
+    count = BOMB_BYTES // frames // 2**17
+    block = struct.pack("<I", 2**17 << 3 | 2)[:3] + b"\0"
+    last = struct.pack("<I", 2**17 << 3 | 3)[:3] + b"\0"
+    file.write_bytes((head + block * (count - 1) + last) * frames)
+
+
+@pytest.mark.parametrize("frames", [1, 2])
+@pytest.mark.parametrize("name", ["csi/c/0/0/0/0", "csi_static/c/0/0/0", "freq_hz/c/0"])
+def test_chunks_that_unpack_to_gigabytes(
+    tiny_dataset: Path, tmp_path: Path, name: str, frames: int
+) -> None:
+    data = shutil.copytree(tiny_dataset, tmp_path / "data")
+    file = data / "tiny/radio/wifi/csi.zarr" / name
+    zeros(file, frames)
+    assert file.stat().st_size < 100_000
+    sequence = open_dataset(data).sequence()
+    with pytest.raises(RfgsFormatError, match="truncated or damaged CSI chunk"):
+        sequence.coordinates("wifi"), sequence.csi("wifi", 1), sequence.csi_static("wifi")
+
+
+@pytest.mark.parametrize("name", ["csi/c/0/0/0/0", "depth", "freq_hz/c/0"])
+def test_files_with_holes(tiny_dataset: Path, tmp_path: Path, name: str) -> None:
+    data = shutil.copytree(tiny_dataset, tmp_path / "data")
+    store = data / "tiny/radio/wifi/csi.zarr"
+    os.truncate(data / "tiny/depth/cam00/000001.exr" if name == "depth" else store / name, 2**32)
+    sequence = open_dataset(data).sequence()
+    with pytest.raises(RfgsFormatError, match=r"damaged"):
+        sequence.coordinates("wifi"), sequence.csi("wifi", 1), sequence.depth("cam00", 1)
+
+
+@pytest.mark.parametrize(
+    ("shape", "chunk", "said"),
+    [
+        ([2**26], [2**26], "chunks up to 256 MiB"),
+        ([2**26], [2**10], "coordinates up to 268435456 bytes"),
+        ([2**16], [1], "up to 10000 chunks"),
+    ],
+)
+def test_coordinates_of_a_store(
+    tiny_dataset: Path, tmp_path: Path, shape: list[int], chunk: list[int], said: str
+) -> None:
+    data = shutil.copytree(tiny_dataset, tmp_path / "data")
+    store = data / "tiny/radio/wifi/csi.zarr"
+    about = json.loads((store / "freq_hz/zarr.json").read_text())
+    about["shape"], about["chunk_grid"]["configuration"]["chunk_shape"] = shape, chunk
+    about["dimension_names"] = ["device"]
+    (store / "cfo_hz").mkdir()
+    (store / "cfo_hz/zarr.json").write_text(json.dumps(about))
+    with pytest.raises(RfgsFormatError, match=said):
+        check_store(store)
 
 
 @pytest.mark.parametrize("field", ["samples_per_frame", "num_devices", "num_subcarriers"])
@@ -82,4 +142,12 @@ def test_the_window_of_an_exr(tmp_path: Path) -> None:
     window, data = struct.pack("<4i", 0, 0, 3, 3), file.read_bytes()
     file.write_bytes(data.replace(window, struct.pack("<4i", 0, 0, 99_999, 99_999)))
     with pytest.raises(RfgsFormatError, match="too large"):
+        read_planes(file, "Z")
+
+
+def test_channels_of_an_exr(tmp_path: Path) -> None:
+    file, plane = tmp_path / "a.exr", np.zeros((2048, 2048), np.float16)
+    write_exr(file, {f"c{index}": plane for index in range(30)})
+    assert file.stat().st_size < 2_000_000
+    with pytest.raises(RfgsFormatError, match="30 channels of 2048 x 2048 pixels are too large"):
         read_planes(file, "Z")

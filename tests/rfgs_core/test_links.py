@@ -15,7 +15,7 @@ from rfgs_core.cli import main as rfgs
 from rfgs_core.dataset import open_dataset
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.files import read_json, write_text
-from rfgs_core.links import refuse_link, symbolic_links
+from rfgs_core.links import refuse_link, strange_entries
 from rfgs_core.run import Run, open_run
 
 
@@ -104,7 +104,7 @@ def test_validate_names_every_link(data: Path, tmp_path: Path) -> None:
     faults = validate(data)
     for link in links:
         assert any(fault.startswith(f"{link}: a symbolic link to {victim}") for fault in faults)
-    assert sorted(symbolic_links(data)) == sorted(links)
+    assert sorted(strange_entries(data)) == sorted(links)
 
 
 @pytest.mark.parametrize(
@@ -140,6 +140,45 @@ def test_nothing_is_read_through_a_link_that_leads_out(
     own = moved.rename(data / "tiny" / "kept")
     place.symlink_to(own)
     read()
+
+
+@pytest.mark.parametrize("schema", ["rfgs-dataset\\/1", "\\u0072fgs-dataset/1"])
+def test_a_schema_with_escapes_in_it_is_guarded_too(
+    data: Path, tmp_path: Path, schema: str
+) -> None:
+    file, picture = data / "dataset.json", data / "tiny/images/cam00/000001.png"
+    file.write_text(file.read_text().replace("rfgs-dataset/1", schema))
+    assert open_dataset(data).sequence().image("cam00", 1).any()
+    picture.symlink_to(picture.rename(tmp_path / "elsewhere.png"))
+    with pytest.raises(RfgsFormatError, match="a symbolic link leads out of"):
+        open_dataset(data).sequence().image("cam00", 1)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "sequence.json", "images/cam00/000001.png", "depth/cam00/000001.exr",
+        "geometry/static.ply", "geometry/000001.npz", "radio/wifi/csi.zarr/zarr.json",
+        "radio/wifi/csi.zarr/csi/c/0/0/0/0", "radio/wifi/csi.zarr/freq_hz/c/0",
+    ],
+)  # fmt: skip
+def test_nobody_waits_for_a_pipe(data: Path, name: str) -> None:
+    place = data / "tiny" / name
+    place.unlink()
+    os.mkfifo(place)
+
+    def read() -> None:
+        sequence = open_dataset(data).sequence()
+        sequence.csi("wifi", 1)
+        sequence.coordinates("wifi")
+        sequence.image("cam00", 1)
+        sequence.depth("cam00", 1)
+        sequence.moving_mesh(1)
+        sequence.static_mesh()
+
+    with pytest.raises(RfgsFormatError, match="expected a file or a folder, found a pipe"):
+        read()
+    assert f"{place}: a pipe; expected files and folders" in validate(data)
 
 
 def test_a_run_is_not_read_through_links(run: Path, tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ import pytest
 from dataset_factory import cli
 from dataset_factory.plan.contents import frame_runs
 from rfgs_core.dataset.csi_store import chunk_file
+from rfgs_core.errors import MissingToolError
 from rfgs_core.frames import parse_frames
 
 Factory = Callable[..., subprocess.CompletedProcess[str]]
@@ -83,6 +84,22 @@ def test_wrong_requests(
 def test_packets_that_no_radio_sends_are_refused_by_check_too(factory_here: Factory) -> None:
     answer = factory_here("check", "living_room_walk", "--packets-per-frame", "0")
     assert "--packets-per-frame 0: expected 1 to 10000" in one_line(answer)
+
+
+def test_a_gpu_that_is_not_there_is_refused_before_anything_is_made(
+    factory: Factory, tmp_path: Path
+) -> None:
+    from dataset_factory.trace.setup import prepare
+
+    try:
+        prepare(device="cuda")
+    except MissingToolError:
+        made = tmp_path / "made"
+        answer = factory("generate", "gestures", "--device", "cuda", "--out", str(made))
+        assert "--device cuda" in one_line(answer) and "--device cpu" in answer.stderr
+        assert not made.exists()
+    else:
+        pytest.skip("this machine has a GPU")
 
 
 def test_a_benchmark_of_too_few_frames_is_refused_before_they_are_made(

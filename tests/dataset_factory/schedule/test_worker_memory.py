@@ -33,6 +33,8 @@ def test_memory_is_flat_over_300_frames(make_job: MakeJob, tmp_path: Path) -> No
         devices={"wifi": [asdict(device) for device in devices]},
         depth=1,
         shadow="kirchhoff",
+        tracer="sionna",
+        device="auto",
         seed=0,
         paths=False,
         versions=versions(),

@@ -14,7 +14,7 @@ _BIN_S, _LONGEST_S = 1e-4, 20.0
 
 @dataclass
 class Counts:
-    """Packets of one device; each is counted once as received and once as what became of it."""
+    """Packets of one device: how many came, and what became of them."""
 
     received: int = 0
     """Datagrams that reached the program."""
@@ -31,7 +31,9 @@ class Counts:
     duplicate: int = 0
     """Packets that had come before."""
     late: int = 0
-    """Packets of a window that was closed."""
+    """Packets of a window that was closed; used, they teach the background alone."""
+    too_late: int = 0
+    """Packets that came so late that they are left out."""
     pushed_out: int = 0
     """Packets that newer ones pushed out of a full queue."""
     before_us: int = 0
@@ -40,7 +42,7 @@ class Counts:
     @property
     def lost_inside(self) -> int:
         """Good packets that the program did not use for want of time or room."""
-        return self.pushed_out + self.late
+        return self.pushed_out + self.too_late
 
     def plus(self, other: Counts) -> Counts:
         """Both added up."""

@@ -17,7 +17,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Complex64, Complex128, Float, Float64, Int64
+from jaxtyping import Bool, Complex64, Float, Float64, Int64
 
 from rfgs_core.live.setting import Setting
 from rfgs_core.measure.phase_free import direct_wave
@@ -28,7 +28,7 @@ _MEMORY = 20_000
 
 
 class Bins(NamedTuple):
-    """Bins of packets as they come."""
+    """Bins of packets as they come, and which of them are followed."""
 
     freq_hz: Float64[np.ndarray, "bin"]
     """Frequencies [Hz]."""
@@ -36,10 +36,16 @@ class Bins(NamedTuple):
     """Their numbers; neighbours in frequency are one apart."""
     measured: Bool[np.ndarray, "bin"]
     """Where they were measured, neither pilots nor filled."""
+    followed: Int64[np.ndarray, "followed"]
+    """Rows of those that are followed."""
 
 
 class Straightener:
-    """Turns packets of one device onto its empty room."""
+    """Turns packets of one device onto its empty room.
+
+    Timing may turn phases by more than half a turn between bins that are followed: the step is told
+    roughly from each of them and its neighbour, then finely from those that are followed.
+    """
 
     def __init__(self, setting: Setting, device: int, bins: Bins) -> None:
         """Nothing was heard yet.
@@ -47,51 +53,71 @@ class Straightener:
         Args:
             setting: Antennas.
             device: Which device receives.
-            bins: What packets hold, before any subcarrier is left out: timing turns phases far.
+            bins: What packets hold.
         """
         tx, rx = setting.block(device)
-        self._index = bins.index
-        self._used: Int64[np.ndarray, "used"] = np.flatnonzero(bins.measured)
-        wave = direct_wave(setting.layout, bins.freq_hz[self._used])[np.ix_(tx, rx)]
-        self._direct: Complex64[np.ndarray, "rx tx used"] = np.swapaxes(wave, 0, 1)
-        self._mean: Complex128[np.ndarray, "rx tx used"] | None = None
+        self._followed, self._index = bins.followed, bins.index[bins.followed]
+        self._used: Int64[np.ndarray, "used"] = np.flatnonzero(bins.measured[bins.followed])
+        rows = bins.followed[self._used]
+        after = np.minimum(rows + 1, len(bins.index) - 1)
+        paired = (bins.index[after] == bins.index[rows] + 1) & bins.measured[after]
+        self._paired, self._after = np.flatnonzero(paired), after[paired]
+        self._rows = np.concatenate([rows, self._after])
+        wave = direct_wave(setting.layout, bins.freq_hz[self._rows])[np.ix_(tx, rx)]
+        self._direct: Complex64[np.ndarray, "rx tx row"] = np.swapaxes(wave, 0, 1)
+        self._mean: Complex64[np.ndarray, "rx tx row"] | None = None
         self._count = 0
 
     def __call__(
-        self, values: Complex64[np.ndarray, "packet rx tx subcarrier"]
-    ) -> Complex64[np.ndarray, "packet rx tx subcarrier"]:
-        """The packets less their phase and timing; they also count for what follows."""
-        seen = values[..., self._used]
+        self, values: Complex64[np.ndarray, "packet rx tx bin"]
+    ) -> Complex64[np.ndarray, "packet rx tx followed"]:
+        """Followed bins of packets less their phase and timing; they count for what comes next."""
+        seen = values[..., self._rows]
         if self._mean is None:
-            self._mean = self._tied(seen[0].astype(np.complex128))
+            self._mean = self._tied(seen[0])
         step, phase = self._offsets(seen, self._mean)
-        turn = np.exp(-1j * (phase[:, None] + step[:, None] * self._index))
-        turned = values * turn.astype(np.complex64)[:, None, None]
+        turned = values[..., self._followed] * _turn(step, phase, self._index)
         self._count = min(self._count + len(values), _MEMORY)
-        share = len(values) / max(self._count, len(values))
-        now = turned[..., self._used].mean(axis=0)
+        share = np.float32(len(values) / max(self._count, len(values)))
+        now = (seen * _turn(step, phase, self._of_rows)).mean(axis=0)
         self._mean = self._tied(self._mean + share * (now - self._mean))
         return turned
 
-    def _tied(
-        self, mean: Complex128[np.ndarray, "rx tx used"]
-    ) -> Complex128[np.ndarray, "rx tx used"]:
+    @property
+    def _of_rows(self) -> Int64[np.ndarray, "row"]:
+        """Numbers of the bins that offsets are told from."""
+        own = self._index[self._used]
+        return np.concatenate([own, own[self._paired] + 1])
+
+    def _tied(self, mean: Complex64[np.ndarray, "rx tx row"]) -> Complex64[np.ndarray, "rx tx row"]:
         """An empty room with the timing of the direct paths, and each link with its phase."""
         step, _ = self._offsets(mean[None], self._direct)
-        mean = mean * np.exp(-1j * step[0] * self._index[self._used])
+        mean = mean * _turn(step, np.zeros(1), self._of_rows)[0]
         match = (mean * self._direct.conj()).sum(axis=-1, keepdims=True)
-        return mean * np.exp(-1j * np.angle(match))
+        return (mean * np.exp(-1j * np.angle(match))).astype(np.complex64)
 
     def _offsets(
-        self, values: Complex64[np.ndarray, "packet rx tx used"], reference: np.ndarray
-    ) -> tuple[Float[np.ndarray, "packet"], Float64[np.ndarray, "packet"]]:
+        self, values: Complex64[np.ndarray, "packet rx tx row"], reference: np.ndarray
+    ) -> tuple[Float[np.ndarray, "packet"], Float[np.ndarray, "packet"]]:
         """Phase step per subcarrier, and phase, of packets against a reference [rad]."""
-        index = self._index[self._used]
-        match = values * reference.conj()
-        links = match.reshape(len(match), -1, len(index))
-        step = phase_step(links, index, shared=True)
-        turned = links.sum(axis=1) * np.exp(-1j * step[:, None] * index)
-        return step, np.angle(turned.sum(axis=-1))
+        index, count = self._index[self._used], len(self._used)
+        links = (values * reference.conj()).reshape(len(values), -1, values.shape[-1])
+        own, after = links[..., :count], links[..., count:]
+        rough = np.angle((own[..., self._paired].conj() * after).sum(axis=(1, 2)))
+        left = own * _turn(rough, np.zeros(1), index)[:, 0]
+        fine = phase_step(left, index, shared=True)
+        still = left.sum(axis=1) * _turn(fine, np.zeros(1), index)[:, 0, 0]
+        return rough + fine, np.angle(still.sum(axis=-1))
+
+
+def _turn(
+    step: Float[np.ndarray, "packet"],
+    phase: Float[np.ndarray, "packet"],
+    index: Int64[np.ndarray, "row"],
+) -> Complex64[np.ndarray, "packet 1 1 row"]:
+    """Phasors that take a phase, and a step per subcarrier, back."""
+    turns = (phase[:, None] + step[:, None] * index).astype(np.float32)
+    return np.exp(np.complex64(-1j) * turns)[:, None, None]
 
 
 class OwnUnits:
@@ -106,15 +132,16 @@ class OwnUnits:
             bins: What packets hold.
         """
         self._level = setting.free_space(device)
+        self._followed = bins.followed
         asked = setting.reported == "complex"
         self._straighten = Straightener(setting, device, bins) if asked else None
 
     def __call__(
-        self, values: Complex64[np.ndarray, "packet rx tx subcarrier"]
-    ) -> Complex64[np.ndarray, "packet rx tx subcarrier"]:
-        """Channels of the level of free space, turned back if phases are asked for."""
+        self, values: Complex64[np.ndarray, "packet rx tx bin"]
+    ) -> Complex64[np.ndarray, "packet rx tx followed"]:
+        """Followed bins, of the level of free space, turned back if phases are asked for."""
         values = levelled(values, self._level)
-        return values if self._straighten is None else self._straighten(values)
+        return values[..., self._followed] if self._straighten is None else self._straighten(values)
 
 
 def levelled(

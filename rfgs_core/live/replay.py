@@ -117,7 +117,7 @@ def recorded_captures(files: Sequence[Path], given: CaptureLayout, reported: Rep
     )
     packets = prepared.csi.reshape(frames * samples, *prepared.csi.shape[2:])
     times_s = (np.arange(frames)[:, None] / prepared.fps + offset_s).ravel()
-    bins = Bins(radio.freq_hz, np.arange(radio.num_subcarriers), prepared.measured)
+    bins = Bins(radio.freq_hz, np.arange(radio.num_subcarriers), prepared.measured, kept)
     return Recording(setting, times_s, lambda row: packets[row], kept, own_units=bins)
 
 
@@ -176,6 +176,7 @@ class Replay:
         values = np.swapaxes(csi[:, tx[:, None], rx], 1, 2).astype(np.complex64)
         if self._own_units:
             values = self._own_units[row](values)
-        values = values[..., self._recording.kept]
+        else:
+            values = values[..., self._recording.kept]
         self.counts[row].received += len(due_s)
         return Heard(device, due_s, due_s, values)

@@ -154,18 +154,17 @@ def _by_kind(decoded: list[Decoded]) -> list[Decoded]:
 
 @dataclass(frozen=True)
 class _Place:
-    """Which bins of packets are the setting's subcarriers."""
+    """Where bins that are followed belong among the setting's subcarriers."""
 
     bins: Bins
-    chosen: Int64[np.ndarray, "chosen"]
-    rows: Int64[np.ndarray, "chosen"]
+    rows: Int64[np.ndarray, "followed"]
     count: int
 
     def __call__(
-        self, values: Complex64[np.ndarray, "packet rx tx bin"]
+        self, values: Complex64[np.ndarray, "packet rx tx followed"]
     ) -> Complex64[np.ndarray, "packet rx tx subcarrier"]:
         found = np.zeros((*values.shape[:-1], self.count), np.complex64)
-        found[..., self.rows] = values[..., self.chosen]
+        found[..., self.rows] = values
         return found
 
 
@@ -208,6 +207,6 @@ def _kept(channels: Channels) -> tuple[Int64[np.ndarray, "subcarrier"], _Place]:
     """Subcarriers that are followed, and where packets hold them."""
     kept = every_nth(len(channels.measured))
     place = channels.place
-    bins = Bins(channels.freq_hz[place], place, channels.measured[place])
-    chosen = np.flatnonzero(np.isin(place, kept))
-    return kept, _Place(bins, chosen, np.searchsorted(kept, place[chosen]), len(kept))
+    followed = np.flatnonzero(np.isin(place, kept))
+    bins = Bins(channels.freq_hz[place], place, channels.measured[place], followed)
+    return kept, _Place(bins, np.searchsorted(kept, place[followed]), len(kept))

@@ -12,6 +12,9 @@ from jaxtyping import Bool, Complex64, Float64
 from rfgs_core.live.counts import Counts
 from rfgs_core.live.setting import Heard, Setting
 
+#: Packets that come later than this after their window was closed are left out [s].
+LATEST_S = 1.0
+
 
 @dataclass(frozen=True)
 class Window:
@@ -50,15 +53,17 @@ class Windows:
         self._closed_s: float | None = None
 
     def add(self, heard: list[Heard]) -> None:
-        """Takes packets; those of a window that is closed are late, and only counted."""
+        """Takes packets; those of a window that is closed are late, and part of the next one."""
         if self._closed_s is None:
             self._closed_s = min((float(e.time_s.min()) for e in heard), default=None)
             if self._closed_s is None:
                 return
             self._closed_s -= 1e-6
         for each in heard:
-            in_time = each.time_s > self._closed_s
-            self._counts[each.device].late += int((~in_time).sum())
+            in_time = each.time_s > self._closed_s - LATEST_S
+            counts = self._counts[each.device]
+            counts.too_late += int((~in_time).sum())
+            counts.late += int((in_time & (each.time_s <= self._closed_s)).sum())
             self._waiting[each.device].append(_rows(each, in_time))
 
     def due(self, until_s: float) -> float | None:

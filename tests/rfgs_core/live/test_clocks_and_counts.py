@@ -69,8 +69,10 @@ def test_percentiles_of_times_are_those_of_numpy() -> None:
 
 
 def test_counts_add_up_and_say_what_happened() -> None:
-    total = Counts(received=5, used=3, late=1).plus(Counts(received=2, pushed_out=2, before_us=4))
+    total = Counts(received=5, used=3, too_late=1).plus(
+        Counts(received=2, pushed_out=2, before_us=4)
+    )
     assert (total.received, total.lost_inside) == (7, 3)
-    said = "7 received, 3 used, 1 late, 2 pushed out, 4 dropped before the program"
+    said = "7 received, 3 used, 1 too late, 2 pushed out, 4 dropped before the program"
     assert str(total) == said
     assert str(Counts()) == "nothing received"

@@ -44,7 +44,7 @@ SETTING = Setting(
     bounds_m=np.array([[0.0, 0.0, 0.0], [4.0, 4.0, 2.5]]),
     reported="complex",
 )
-BINS = Bins(SETTING.freq_hz, np.arange(32), SETTING.subcarriers)
+BINS = Bins(SETTING.freq_hz, np.arange(32), SETTING.subcarriers, np.arange(32))
 
 
 def heard(device: int, time_s: list[float], value: float = 1.0) -> Heard:
@@ -68,11 +68,14 @@ def test_windows_take_their_own_packets_and_count_late_ones() -> None:
     window = windows.close(due)
     assert window.links.tolist() == [[True] * 4]
     assert sorted(window.arrived_s) == pytest.approx([1.5, 1.52, 1.55, 1.59])
-    windows.add([heard(1, [1.06, 1.17]), heard(2, [1.01])])
+    windows.add([heard(1, [1.06, 1.17], 9.0), heard(2, [0.05])])
     window = windows.close(1.2)
+    # One that is late teaches the background; one that is a second late is left out.
+    assert np.abs(window.csi[0, :2]).max() == 9.0
     assert window.links.tolist() == [[True, True, False, False]]
-    assert [counts[d].used for d in (1, 2)] == [5, 1]
-    assert [counts[d].late for d in (1, 2)] == [1, 1]
+    assert [counts[d].used for d in (1, 2)] == [6, 1]
+    assert [counts[d].late for d in (1, 2)] == [1, 0]
+    assert [counts[d].too_late for d in (1, 2)] == [0, 1]
 
 
 def test_the_end_of_a_window_is_its_last_packets() -> None:

@@ -246,11 +246,11 @@ def _resume(
         types={**dict.fromkeys(GAUSSIAN_SHAPES, "f4"), "origin": "i8", "finished_steps": "i8"},
         others=True,
     )
-    mark, device = "density.", start.means.device
+    prefix, device = "density.", start.means.device
     memory = {
-        name.removeprefix(mark): torch.from_numpy(value.copy()).to(device)
+        name.removeprefix(prefix): torch.from_numpy(value.copy()).to(device)
         for name, value in arrays.items()
-        if name.startswith(mark)
+        if name.startswith(prefix)
     }
     trained = TrainableGaussians.restore(arrays, rates, device)
     return trained, int(arrays["finished_steps"]), memory

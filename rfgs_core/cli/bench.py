@@ -31,7 +31,6 @@ class BenchArgs:
     people: how often a dataset's people are counted right, beside channels without any.
     live: six receivers of 1,000 packets/s each over UDP, made here: packets lost, latency, updates.
     fields: the grid search that settings of neural fields, our rivals, were taken from.
-
     scaling: how the cost of the fast tracer and of propagation grows over two decades of facets,
     Gaussians, links and subcarriers: CPU seconds and exponents, some two minutes.
     """
@@ -83,34 +82,35 @@ class BenchArgs:
 
 
 def _bench(args: BenchArgs) -> Callable[[], dict[str, Any]]:
-    if args.part == "blender":
-        from rfgs_core.bench import hardware
-        from rfgs_core.blender_bench import bench_blender
-
-        return lambda: {**bench_blender(args.blender), **hardware()}
-    if args.part == "training":
-        return partial(_training, args)
+    """What a part runs; nothing of another part is imported."""
+    parts: dict[str, Callable[[BenchArgs], dict[str, Any]]] = {
+        "blender": _blender,
+        "training": _training,
+        "real": _real,
+        "limbs": _limbs,
+        "people": _people,
+        "live": _live,
+        "fields": _fields,
+        "propagation": _propagation,
+    }
+    if args.part in parts:
+        return partial(parts[args.part], args)
     if args.part == "readers":
         from rfgs_core.real.reading import bench_readers
 
         return bench_readers
-    if args.part == "real":
-        return partial(_real, args)
-    if args.part == "limbs":
-        return partial(_limbs, args)
-    if args.part == "people":
-        return partial(_people, args)
-    if args.part == "live":
-        return partial(_live, args)
-    if args.part == "fields":
-        return partial(_fields, args)
     if args.part == "scaling":
         return _scaling
-    if args.part == "raster":
-        from rfgs_core.render.bench import bench_raster
+    from rfgs_core.render.bench import bench_raster
 
-        return bench_raster
-    return partial(_propagation, args)
+    return bench_raster
+
+
+def _blender(args: BenchArgs) -> dict[str, Any]:
+    from rfgs_core.bench import hardware
+    from rfgs_core.blender_bench import bench_blender
+
+    return {**bench_blender(args.blender), **hardware()}
 
 
 def _propagation(args: BenchArgs) -> dict[str, Any]:

@@ -30,7 +30,7 @@ class BenchArgs:
     limbs: joints and surface of a dataset's one person beside what knows less.
     people: how often a dataset's people are counted right, beside channels without any.
     live: six receivers of 1,000 packets/s each over UDP, made here: packets lost, latency, updates.
-    fields: the grid search that settings of neural fields, our rivals, were taken from.
+    fields: the grid search that settings of neural fields, our baselines, were taken from.
     table1: the paper's table 1, methods x Wi-Fi and mmWave, resumable; see --size and --out.
     scaling: how the cost of the fast tracer and of propagation grows over two decades of facets,
     Gaussians, links and subcarriers: CPU seconds and exponents, some two minutes.

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from rfgs_core.errors import RfgsError
 
 if TYPE_CHECKING:
-    from rfgs_core.study.rivals import SizeName
+    from rfgs_core.study.table1 import SizeName
 
 #: Radios of the table.
 RADIOS = ("wifi", "mmwave")
@@ -39,8 +39,8 @@ def make_table1(out: Path | None, size_name: SizeName, seeds: int | None, file: 
     from rfgs_core.cli.calls import call
     from rfgs_core.evaluate.provenance import now
     from rfgs_core.files import write_json, write_text
-    from rfgs_core.study.rivals import SIZES, cells, make, stored
-    from rfgs_core.study.rivals_table import rival_rows, rival_table
+    from rfgs_core.study.table1 import SIZES, cells, make, stored
+    from rfgs_core.study.table1_rows import method_rows, method_table
 
     if out is None:
         raise RfgsError("bench table1: expected --out FOLDER for its datasets, runs and cells")
@@ -58,14 +58,14 @@ def make_table1(out: Path | None, size_name: SizeName, seeds: int | None, file: 
                 results.append(stored(cell, out, size) or make(cell, out, size))
             except RfgsError as error:
                 failed[cell.name] = str(error)
-            rows = rival_rows(results)
-            write_text(out / "table1.md", rival_table(rows))
+            rows = method_rows(results)
+            write_text(out / "table1.md", method_table(rows))
             if file is not None:
                 found = {"rows": [asdict(row) for row in rows], "failed": failed}
                 write_json(
                     file, {"size": size_name, **asdict(size), **found, **hardware(), "date": now()}
                 )
-    sys.stdout.write(rival_table(rival_rows(results)))
+    sys.stdout.write(method_table(method_rows(results)))
     for name, why in failed.items():
         sys.stdout.write(f"failed, and in no row: {name}: {why}\n")
     return 1 if failed else 0

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from rfgs_core.study.rivals import FIELDS, TRAINED
 from rfgs_core.study.table import number
+from rfgs_core.study.table1 import FIELDS, TRAINED
 
 #: Columns: group and key of the metrics, header, format.
 COLUMNS = (
@@ -42,7 +42,7 @@ _LABELS = {
 
 
 @dataclass(frozen=True)
-class RivalRow:
+class MethodRow:
     """One method on one scene and radio."""
 
     scene: str
@@ -57,7 +57,7 @@ class RivalRow:
     """What the paper claims of its pictures, another quantity; nobody has reproduced it."""
 
 
-def rival_rows(results: Iterable[Mapping[str, Any]]) -> list[RivalRow]:
+def method_rows(results: Iterable[Mapping[str, Any]]) -> list[MethodRow]:
     """Rows of finished cells, in the order they come in."""
     groups: dict[tuple[str, str, str], list[dict[str, float | None]]] = {}
     for result in results:
@@ -69,7 +69,7 @@ def rival_rows(results: Iterable[Mapping[str, Any]]) -> list[RivalRow]:
     return [_row(*names, rows) for names, rows in groups.items()]
 
 
-def _row(scene: str, radio: str, method: str, rows: list[dict[str, float | None]]) -> RivalRow:
+def _row(scene: str, radio: str, method: str, rows: list[dict[str, float | None]]) -> MethodRow:
     mean: dict[str, float | None] = {}
     deviation: dict[str, float | None] = {}
     for key in rows[0]:
@@ -77,7 +77,7 @@ def _row(scene: str, radio: str, method: str, rows: list[dict[str, float | None]
         mean[key] = float(np.mean(known)) if known else None
         deviation[key] = float(np.std(known, ddof=1)) if len(known) > 1 else None
     claimed = CLAIMED_DB.get((method.split("_")[0] if method in FIELDS else method, radio))
-    return RivalRow(scene, radio, method, len(rows), mean, deviation, claimed)
+    return MethodRow(scene, radio, method, len(rows), mean, deviation, claimed)
 
 
 def label(method: str) -> str:
@@ -90,7 +90,7 @@ def label(method: str) -> str:
     return f"{words}, without residual" if alone else words
 
 
-def rival_table(rows: Sequence[RivalRow]) -> str:
+def method_table(rows: Sequence[MethodRow]) -> str:
     """One table per scene and radio."""
     titles = [title for _, _, title, _ in COLUMNS]
     head = ("method", *titles, "training [s]", "claimed PSNR [dB], not reproduced")
@@ -103,14 +103,14 @@ def rival_table(rows: Sequence[RivalRow]) -> str:
     return "\n".join([*lines, _NOTES, ""])
 
 
-def _order(row: RivalRow) -> int:
+def _order(row: MethodRow) -> int:
     """Ours, neural fields, then what needs no training."""
     name = row.method.partition(", ")[0]
     known = (*TRAINED, *FIELDS)
     return known.index(name) if name in known else len(known)
 
 
-def _cells(row: RivalRow) -> list[str]:
+def _cells(row: MethodRow) -> list[str]:
     shown = [_with(row, key, form) for _, key, _, form in COLUMNS]
     return [
         label(row.method),
@@ -120,7 +120,7 @@ def _cells(row: RivalRow) -> list[str]:
     ]
 
 
-def _with(row: RivalRow, key: str, form: str) -> str:
+def _with(row: MethodRow, key: str, form: str) -> str:
     """Mean and deviation."""
     mean, deviation = row.mean[key], row.deviation[key]
     if mean is None or deviation is None:

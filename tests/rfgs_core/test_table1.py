@@ -12,8 +12,8 @@ import pytest
 from rfgs_core.cli.bench import BenchArgs, run
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json
-from rfgs_core.study.rivals import FIELDS, SIZES, TRAINED, Cell, Size, cells, make, stored
-from rfgs_core.study.rivals_table import rival_rows, rival_table
+from rfgs_core.study.table1 import FIELDS, SIZES, TRAINED, Cell, Size, cells, make, stored
+from rfgs_core.study.table1_rows import method_rows, method_table
 
 TINY = Size(("living_room_walk",), 2, "1:2", 3, 8, 2, 6, 0)
 
@@ -42,7 +42,7 @@ def test_every_cell_once_and_one_seed_of_everything_first() -> None:
 
 
 def test_rows_are_means_over_seeds_beside_the_claim() -> None:
-    rows = rival_rows([result(0, 0.8, clean=0.4), result(1, 0.9, clean=0.4)])
+    rows = method_rows([result(0, 0.8, clean=0.4), result(1, 0.9, clean=0.4)])
     ours, clean = rows
     assert ours.mean["f10"] == pytest.approx(0.85) and ours.seeds == 2
     assert ours.deviation["f10"] == pytest.approx(0.0707, abs=1e-4)
@@ -50,7 +50,7 @@ def test_rows_are_means_over_seeds_beside_the_claim() -> None:
     # Nobody trains a classical baseline, and what has no value has none in the table.
     assert clean.mean["train_s"] is None and clean.claimed_psnr_db is None
     assert ours.mean["centroid_m"] is None
-    text = rival_table(rows)
+    text = method_table(rows)
     assert "| RF-GS | 0.425 ± 0.035 | 0.850 ± 0.071 |" in text and "| clean |" in text
 
 
@@ -64,7 +64,7 @@ def test_a_cell_is_kept_until_its_settings_change(
     made = make(cell, tmp_path, TINY)
     assert made["methods"][method]["geometry"]["f20"] is not None
     kept = stored(cell, tmp_path, TINY)
-    assert kept is not None and rival_rows([kept]) == rival_rows([made])
+    assert kept is not None and method_rows([kept]) == method_rows([made])
     other = Size(("living_room_walk",), 2, "1:2", 4, 8, 3, 6, 0)
     assert stored(cell, tmp_path, other) is None
     again = read_json(tmp_path / "cells" / f"{cell.name}.json")

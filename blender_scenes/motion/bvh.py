@@ -63,6 +63,8 @@ def read_bvh(path: Path) -> Bvh:
     if not head.strip().startswith("HIERARCHY") or not found:
         raise ValueError(f"{path}: expected HIERARCHY and MOTION, as BVH files have")
     names, parents, offsets, channels = _hierarchy(path, iter(head.split()[1:]))
+    if len(names) > _MOST_JOINTS:
+        raise ValueError(f"{path}: {len(names)} joints; expected at most {_MOST_JOINTS}")
     values, frame_s = _motion(path, body, sum(len(row) for row in channels), len(names))
     turns = np.broadcast_to(np.eye(3), (len(values), len(names), 3, 3)).copy()
     root = np.broadcast_to(offsets[0], (len(values), 3)).copy()
@@ -109,8 +111,6 @@ def _hierarchy(
                 raise ValueError(f"{path}: unexpected {word[:_SHOWN]!r} in the hierarchy")
     except (StopIteration, IndexError) as error:
         raise ValueError(f"{path}: the hierarchy ends within a joint") from error
-    if len(names) > _MOST_JOINTS:
-        raise ValueError(f"{path}: {len(names)} joints; expected at most {_MOST_JOINTS}")
     if not names or line or not len(names) == len(offsets) == len(channels):
         raise ValueError(f"{path}: expected an OFFSET and CHANNELS for every joint")
     return names, parents, offsets, channels

@@ -77,8 +77,8 @@ def refuse_place(path: Path) -> None:
     try:
         near = next(place for place in (path, *path.absolute().parents) if place.exists())
         # A file that is there already is replaced, by one that is written beside it.
-        beside = path.parent if near == path and not path.is_dir() else near
-        with tempfile.TemporaryDirectory(prefix=".tmp-", dir=beside):
+        folder = path.parent if near == path and not path.is_dir() else near
+        with tempfile.TemporaryDirectory(prefix=".tmp-", dir=folder):
             return
     except OSError as error:
         if error.errno == errno.ENOSPC:

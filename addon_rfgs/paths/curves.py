@@ -28,7 +28,7 @@ _LEVELS = 12
 
 
 @dataclass(frozen=True)
-class Choice:
+class Selection:
     """Which paths are shown, and how thick."""
 
     radio: str
@@ -46,7 +46,7 @@ class Choice:
 Tables = dict[int | None, Paths]
 
 
-def chosen(tables: Tables, choice: Choice) -> Tables:
+def chosen(tables: Tables, selection: Selection) -> Tables:
     """The paths of the wanted links that are strong enough, strongest first.
 
     Strong means the same in every frame, so that levels can be compared.
@@ -54,22 +54,22 @@ def chosen(tables: Tables, choice: Choice) -> Tables:
     Raises:
         AddonError: There is no such path in any frame.
     """
-    found = {frame: _of_links(paths, choice) for frame, paths in tables.items()}
+    found = {frame: _of_links(paths, selection) for frame, paths in tables.items()}
     tops = [paths.power_db[0] for paths in found.values() if len(paths)]
     if not tops:
         raise AddonError(
-            f"no path from device {choice.tx_device} to device {choice.rx_device}; "
+            f"no path from device {selection.tx_device} to device {selection.rx_device}; "
             "-1 stands for all, devices are counted from 0"
         )
-    least = max(tops) - choice.range_db
-    return {frame: _strongest(paths, least, choice.count) for frame, paths in found.items()}
+    least = max(tops) - selection.range_db
+    return {frame: _strongest(paths, least, selection.count) for frame, paths in found.items()}
 
 
-def _of_links(paths: Paths, choice: Choice) -> Paths:
+def _of_links(paths: Paths, selection: Selection) -> Paths:
     keep = np.ones(len(paths), bool)
     for devices, wanted in (
-        (paths.tx_device, choice.tx_device),
-        (paths.rx_device, choice.rx_device),
+        (paths.tx_device, selection.tx_device),
+        (paths.rx_device, selection.rx_device),
     ):
         if wanted >= 0:
             keep &= devices == wanted
@@ -91,7 +91,7 @@ def show_paths(
     scene: bpy.types.Scene,
     dataset: PathDataset,
     tables: Tables,
-    choice: Choice,
+    selection: Selection,
     progress: Progress | None = None,
 ) -> list[bpy.types.Object]:
     """Adds a curve object per link and frame, in place of earlier ones of the same links.
@@ -104,7 +104,7 @@ def show_paths(
         scene: Where to.
         dataset: Names devices and objects.
         tables: From `chosen`.
-        choice: How they were chosen.
+        selection: How they were chosen.
         progress: Called with frames done and in all.
 
     Returns:
@@ -116,11 +116,11 @@ def show_paths(
     for done, (frame, paths) in enumerate(tables.items(), start=1):
         for link in np.unique(np.stack([paths.tx_device, paths.rx_device], axis=1), axis=0):
             part = paths.select((paths.tx_device == link[0]) & (paths.rx_device == link[1]))
-            ends = " to ".join(dataset.device(choice.radio, int(number)) for number in link)
-            item = _curve_object(part, _levels(part, top, choice), materials, choice)
+            ends = " to ".join(dataset.device(selection.radio, int(number)) for number in link)
+            item = _curve_object(part, _levels(part, top, selection), materials, selection)
             # Corners are metres; the object's scale carries them into the scene's units.
             item.scale = (1 / unit_scale(scene),) * 3
-            item[LINK] = f"{choice.radio}: {ends}" + ("" if frame is not None else _STATIC)
+            item[LINK] = f"{selection.radio}: {ends}" + ("" if frame is not None else _STATIC)
             item["power_db"] = [float(value) for value in part.power_db]
             item["delay_s"] = [float(value) for value in part.delay_s]
             item["interactions"] = json.dumps([part.interactions(i) for i in range(len(part))])
@@ -142,8 +142,8 @@ def show_paths(
     return [item for _, item in made]
 
 
-def _levels(paths: Paths, top_db: float, choice: Choice) -> np.ndarray:
-    share = (paths.power_db - (top_db - choice.range_db)) / max(choice.range_db, 1e-9)
+def _levels(paths: Paths, top_db: float, selection: Selection) -> np.ndarray:
+    share = (paths.power_db - (top_db - selection.range_db)) / max(selection.range_db, 1e-9)
     return np.clip(share * _LEVELS, 0, _LEVELS - 1).astype(int)
 
 
@@ -176,11 +176,11 @@ def _remove(items: list[bpy.types.Object]) -> None:
 
 
 def _curve_object(
-    paths: Paths, levels: np.ndarray, materials: list[bpy.types.Material], choice: Choice
+    paths: Paths, levels: np.ndarray, materials: list[bpy.types.Material], selection: Selection
 ) -> bpy.types.Object:
     curve = bpy.data.curves.new("Paths", "CURVE")
     curve.dimensions = "3D"
-    curve.bevel_depth, curve.bevel_resolution = choice.radius_m, 1
+    curve.bevel_depth, curve.bevel_resolution = selection.radius_m, 1
     for material in materials:
         curve.materials.append(material)
     for i in range(len(paths)):
@@ -194,8 +194,8 @@ def _curve_object(
 
 
 def _objects(dataset: PathDataset, paths: Paths, path: int) -> list[str]:
-    met = paths.object[path][paths.kind[path] != 0]
-    return [dataset.objects.get(int(number), "") for number in met]
+    touched = paths.object[path][paths.kind[path] != 0]
+    return [dataset.objects.get(int(number), "") for number in touched]
 
 
 def _materials() -> list[bpy.types.Material]:

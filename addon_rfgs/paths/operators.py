@@ -10,7 +10,7 @@ from ..command import Command
 from ..errors import AddonError
 from ..ownership import collections_of
 from ..reporting import Progress, Undoable, chosen_path
-from .curves import COLLECTION, LINK, Choice, chosen, clear_paths, show_paths
+from .curves import COLLECTION, LINK, Selection, chosen, clear_paths, show_paths
 from .dataset import open_path_dataset, read_paths, recorded_frames
 
 
@@ -67,7 +67,7 @@ def show_settings(scene: bpy.types.Scene, progress: Progress | None = None) -> s
     dataset = open_path_dataset(chosen_path(said.dataset or scene.rfgs.jobs.dataset_folder))
     if not dataset.devices:
         raise AddonError(f"{dataset.folder}: holds no radio")
-    choice = Choice(
+    selection = Selection(
         radio=said.radio or next(iter(dataset.devices)),
         tx_device=said.tx_device,
         rx_device=said.rx_device,
@@ -77,12 +77,14 @@ def show_settings(scene: bpy.types.Scene, progress: Progress | None = None) -> s
     )
     frames = [None] if said.static else [scene.frame_current]
     if said.follow and not said.static:
-        frames = recorded_frames(dataset, choice.radio)
-    tables = chosen({frame: read_paths(dataset, choice.radio, frame) for frame in frames}, choice)
-    links = {item[LINK] for item in show_paths(scene, dataset, tables, choice, progress)}
+        frames = recorded_frames(dataset, selection.radio)
+    tables = chosen(
+        {frame: read_paths(dataset, selection.radio, frame) for frame in frames}, selection
+    )
+    links = {item[LINK] for item in show_paths(scene, dataset, tables, selection, progress)}
     power_db = np.concatenate([paths.power_db for paths in tables.values()])
     more = f" in {len(frames)} frames" if len(frames) > 1 else ""
     return (
-        f"{len(power_db)} paths of {len(links)} links of {choice.radio}{more}, "
+        f"{len(power_db)} paths of {len(links)} links of {selection.radio}{more}, "
         f"{power_db.min():.0f} to {power_db.max():.0f} dB"
     )

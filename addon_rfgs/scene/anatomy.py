@@ -134,7 +134,7 @@ def _figure(legs: Pair, arms: Pair, up: np.ndarray) -> _Figure | None:
     if not _STATURE_M[0] <= stature <= _STATURE_M[1]:
         return None
     choices = (_arm_choices(limb, legs, stature) for limb in arms.limbs)
-    arm = [joints for choice in choices if (joints := _cheapest(choice))]
+    arm = [joints for option in choices if (joints := _cheapest(option))]
     if len(arm) < 2:
         return None
     figure = _Figure(legs, arms, leg, arm, up, stature)
@@ -142,7 +142,7 @@ def _figure(legs: Pair, arms: Pair, up: np.ndarray) -> _Figure | None:
 
 
 def _cheapest(choices: _Choices) -> _Joints | None:
-    best = min(choices, key=lambda choice: choice[0], default=None)
+    best = min(choices, key=lambda option: option[0], default=None)
     return None if best is None else best[1]
 
 
@@ -163,8 +163,8 @@ def _leg_choices(limb: list[Point], legs: Pair, up: np.ndarray) -> _Choices:
             continue
         # Of a long foot the toes are as likely by length, but they lie ahead.
         cost = abs(np.log(thigh / shin)) + 3.0 * abs(float(drop @ ahead)) / length
-        aside = abs(float((joints[0].place - legs.middle) @ legs.lateral)) / length
-        cost += 4.0 * max(0.0, _ASIDE - aside)
+        sideways = abs(float((joints[0].place - legs.middle) @ legs.lateral)) / length
+        cost += 4.0 * max(0.0, _ASIDE - sideways)
         yield cost + 2.0 * (top - float(joints[0].place @ up)) / length, joints
 
 
@@ -195,8 +195,8 @@ def _head(known: dict[str, Bone], figure: _Figure) -> Bone | None:
     best, least = None, 0.12 * figure.stature
     for bone in known.values():
         above = float((bone.head - shoulder) @ figure.up)
-        beside = abs(float((bone.head - figure.legs.middle) @ figure.legs.lateral))
-        if bone.name in taken or above < 0.01 * figure.stature or beside > 0.04 * figure.stature:
+        sideways = abs(float((bone.head - figure.legs.middle) @ figure.legs.lateral))
+        if bone.name in taken or above < 0.01 * figure.stature or sideways > 0.04 * figure.stature:
             continue
         off = float(np.linalg.norm(bone.head - wanted))
         if off < least and _root(known, bone.name) == root:

@@ -89,15 +89,15 @@ def _custom_edges(mesh: bpy.types.Mesh, loops: np.ndarray) -> np.ndarray:
     at[backwards] = at[backwards, ::-1]
     ends = np.sort(np.stack([first, last], axis=1), axis=1)
     order = np.lexsort((ends[:, 1], ends[:, 0]))
-    met, agrees = np.zeros(len(ends), bool), np.zeros(len(ends), bool)
-    for apart in range(1, _MOST_AT_AN_EDGE):
-        one, other = order[:-apart], order[apart:]
+    shared, agrees = np.zeros(len(ends), bool), np.zeros(len(ends), bool)
+    for step in range(1, _MOST_AT_AN_EDGE):
+        one, other = order[:-step], order[step:]
         same = (ends[one] == ends[other]).all(axis=1)
         one, other = one[same], other[same]
         alike = _alike(at[one], at[other]).all(axis=1)
-        met[one], met[other] = True, True
+        shared[one], shared[other] = True, True
         agrees[one[alike]], agrees[other[alike]] = True, True
-    return np.where(met & ~agrees, SHARP, SMOOTH).astype(np.int8).reshape(loops.shape)
+    return np.where(shared & ~agrees, SHARP, SMOOTH).astype(np.int8).reshape(loops.shape)
 
 
 def _alike(one: np.ndarray, other: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from .survey import Surface
 #: A surface may be a body of its own from this share of the largest's extent.
 _BODY_SHARE = 0.7
 #: Bodies are apart from this share of their extent on.
-APART_SHARE = 0.3
+SEPARATE_SHARE = 0.3
 
 
 def instance_names(moving: list[Surface]) -> list[tuple[Surface, str]]:
@@ -52,7 +52,7 @@ def _bodies(surfaces: list[Surface]) -> list[list[Surface]]:
         ]
         near = int(np.argmin(distance)) if distance else -1
         whole = _extent(surface) >= _BODY_SHARE * largest
-        if near < 0 or (whole and distance[near] > APART_SHARE * largest):
+        if near < 0 or (whole and distance[near] > SEPARATE_SHARE * largest):
             bodies.append([surface])
         else:
             bodies[near].append(surface)

@@ -128,10 +128,10 @@ def _mirrored(parent: str, one: list[Point], other: list[Point]) -> Iterator[Pai
         return
     length = float(np.linalg.norm(np.diff(a, axis=0), axis=1).sum())
     across = (a - b).sum(axis=0)
-    apart = float(np.linalg.norm(across))
-    if min(length, apart) < 1e-6:
+    distance = float(np.linalg.norm(across))
+    if min(length, distance) < 1e-6:
         return
-    lateral, middle = across / apart, 0.5 * (a + b).mean(axis=0)
+    lateral, middle = across / distance, 0.5 * (a + b).mean(axis=0)
     image = a - 2.0 * ((a - middle) @ lateral)[:, None] * lateral
     if np.linalg.norm(image - b, axis=1).max() < _MIRROR * length:
         yield Pair(parent, (one, other), lateral, middle, length)

@@ -13,7 +13,7 @@ import numpy as np
 
 from .findings import Finding
 from .frames import unit_scale
-from .grouping import APART_SHARE, instance_names, stand
+from .grouping import SEPARATE_SHARE, instance_names, stand
 from .rig import Rig, read_rig
 from .survey import Surface, evaluated_mesh, placements
 
@@ -206,8 +206,8 @@ def _stands_at(instance: Instance, armature: bpy.types.Object) -> bool:
         np.mean([bone.head for bone in posed.pose.bones], axis=0)
     )
     vertices = np.concatenate([surface.vertices for surface in instance.surfaces])
-    apart = stand(vertices) - np.array(middle[:2]) * unit_scale(bpy.context.scene)
-    return float(np.hypot(*apart)) < APART_SHARE * _size_m(instance)
+    offset = stand(vertices) - np.array(middle[:2]) * unit_scale(bpy.context.scene)
+    return float(np.hypot(*offset)) < SEPARATE_SHARE * _size_m(instance)
 
 
 def _first_box(instance: Instance) -> tuple[np.ndarray, np.ndarray]:

@@ -21,7 +21,7 @@ from .survey import Surface
 #: So many places of people are looked around from, spread over the scene's range.
 _MOST_STANDS, _MOST_SEERS = 12, 6
 #: Rays up and down also start so far beside people, since a lamp or a lintel is no ceiling [m].
-_BESIDE_M = 0.5
+_ASIDE_M = 0.5
 #: Shares of a person's height at which rays down and up start: below seats, above table tops.
 _SHIN, _CHEST = 0.25, 0.75
 #: Rays to the walls run at this share of the room's height: above doors and most furniture.
@@ -117,12 +117,12 @@ def _box(tree: BVHTree, stands: np.ndarray, bounds: np.ndarray) -> np.ndarray:
     """Floor, ceiling and walls [2, 3] around people, within the bounds."""
     box = bounds.copy()
     turns = np.arange(8) * np.pi / 4
-    beside = _BESIDE_M * np.stack([np.cos(turns), np.sin(turns), 0.0 * turns], axis=1)
+    ring = _ASIDE_M * np.stack([np.cos(turns), np.sin(turns), 0.0 * turns], axis=1)
     down, up = [], []
     for low, high in stands:
         middle = 0.5 * (low + high)
         shin, chest = (low[2] + share * (high[2] - low[2]) for share in (_SHIN, _CHEST))
-        for spot in (middle, *(middle + beside)):
+        for spot in (middle, *(middle + ring)):
             if _free(tree, middle, spot):
                 down.append(shin - _way(tree, np.array([*spot[:2], shin]), np.array([0, 0, -1.0])))
                 up.append(chest + _way(tree, np.array([*spot[:2], chest]), np.array([0, 0, 1.0])))

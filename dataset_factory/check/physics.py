@@ -75,10 +75,9 @@ def _early_faults(
 ) -> Iterator[str]:
     """Pairs of devices between which something arrives before light can."""
     for a, b in layout.device_pairs:
-        tx, rx = layout.tx_device == a, layout.rx_device == b
-        links = static[np.ix_(tx, rx)]
-        distance_m = np.linalg.norm(layout.tx_xyz[tx][:, None] - layout.rx_xyz[rx][None], axis=-1)
-        early = _early_power(sequence, radio, links, float(distance_m.min()))
+        tx, rx = layout.block_of(a, b)
+        distance_m = np.linalg.norm(layout.tx_xyz[tx] - layout.rx_xyz[rx], axis=-1)
+        early = _early_power(sequence, radio, static[tx, rx], float(distance_m.min()))
         if early > EARLY_LIMIT:
             yield (
                 f"{where}: devices {a} to {b}: {decibels(early):.0f} dB arrive before the "
@@ -179,16 +178,15 @@ def _direct_path(
     """
     spec = sequence.radio_spec(radio)
     wavenumber = 2 * np.pi * spec.freq_hz / SPEED_OF_LIGHT
+    window = hann_to_zero(spec.num_subcarriers)
     free_space = np.exp(-1j * wavenumber * distance_m[..., None]) / (
         2 * wavenumber * distance_m[..., None]
     )
-    aligned = (links / free_space).mean(axis=(0, 1)) * np.hanning(spec.num_subcarriers)
+    aligned = (links / free_space).mean(axis=(0, 1)) * window
     offset_m = np.linspace(-4, 4, 321) * SPEED_OF_LIGHT / spec.bandwidth_hz
     shift = np.exp(1j * np.outer(offset_m, wavenumber - wavenumber.mean()))
-    scan = np.abs(shift @ aligned) / np.hanning(spec.num_subcarriers).sum()
-    return float(np.abs(aligned.sum()) / np.hanning(spec.num_subcarriers).sum()), float(
-        offset_m[scan.argmax()]
-    )
+    late_m = offset_m[np.abs(shift @ aligned).argmax()]
+    return float(np.abs(aligned.sum()) / window.sum()), float(late_m)
 
 
 def energy_faults(sequence: Sequence, radio: str, value: np.ndarray, where: str) -> Iterator[str]:

@@ -27,10 +27,10 @@ def write(sequence: Sequence, out: Path) -> None:
     split: dict[str, dict[str, list[Any]]] = {
         name: {"images": [], "annotations": []} for name in ("train", "test")
     }
-    for number, (row, frame, held) in enumerate(pictures(sequence), start=1):
+    for number, (row, frame, held_out) in enumerate(pictures(sequence), start=1):
         file = f"{row['name']}_{frame:06d}.png"
         copy_picture(sequence, row["name"], frame, out / "images" / file)
-        part = split["test" if held else "train"]
+        part = split["test" if held_out else "train"]
         size = {"width": row["width"], "height": row["height"]}
         part["images"].append({"id": number, "file_name": f"images/{file}", **size})
         for found in _people(sequence, row, frame):

@@ -35,8 +35,8 @@ def write(sequence: Sequence, out: Path) -> None:
 
 def _write_scene(sequence: Sequence, cameras: list[str], angle: float, out: Path) -> None:
     frames: dict[str, list[dict[str, Any]]] = {"train": [], "test": []}
-    for row, frame, held in pictures(sequence, cameras):
-        split = "test" if held else "train"
+    for row, frame, held_out in pictures(sequence, cameras):
+        split = "test" if held_out else "train"
         name = f"{row['name']}_{frame:06d}"
         copy_picture(sequence, row["name"], frame, out / split / f"{name}.png")
         frames[split].append(

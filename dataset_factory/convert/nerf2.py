@@ -76,7 +76,7 @@ def _write_gateway(sequence: Sequence, radio: str, number: int, out: Path) -> No
     turn = 2 * np.pi * spec.centre_hz / SPEED_OF_LIGHT * (directions().reshape(-1, 3) @ local.T)
     steering = np.exp(-1j * turn).astype(np.complex64) / len(elements)
     positions, rows, split = [], [], {"train": [], "test": []}
-    held = sequence.splits["images"]["test_frames"]
+    test_frames = sequence.splits["images"]["test_frames"]
     senders = np.flatnonzero(layout.measured[:, elements].any(axis=1))
     for frame in tqdm(sequence.frames, desc=out.name, unit="frame"):
         csi = sequence.csi(radio, frame)
@@ -90,7 +90,7 @@ def _write_gateway(sequence: Sequence, radio: str, number: int, out: Path) -> No
             write_png(out / "spectrum" / f"{name}.png", pixels.astype(np.uint8))
             level_db = decibels(float(top))
             rows.append(f"{name},{frame},{sequence.time_s(frame):.6f},{tx},{level_db:.3f}\n")
-            split["test" if frame in held else "train"].append(f"{name}\n")
+            split["test" if frame in test_frames else "train"].append(f"{name}\n")
     write_text(out / "tx_pos.csv", "x,y,z\n" + "".join(positions))
     write_text(out / "samples.csv", "name,frame,time_s,tx,strongest_db\n" + "".join(rows))
     for name, lines in split.items():

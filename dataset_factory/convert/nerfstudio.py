@@ -25,7 +25,7 @@ DEPTH_STEPS_PER_M = 1000.0
 def write(sequence: Sequence, out: Path) -> None:
     """Writes the folder that `ns-train … --data OUT` reads."""
     frames, split = [], {"train": [], "test": []}
-    for row, frame, held in pictures(sequence):
+    for row, frame, held_out in pictures(sequence):
         name = f"{row['name']}_{frame:06d}.png"
         copy_picture(sequence, row["name"], frame, out / "images" / name)
         depth_mm = sequence.depth(row["name"], frame) * DEPTH_STEPS_PER_M
@@ -33,7 +33,7 @@ def write(sequence: Sequence, out: Path) -> None:
         write_png(out / "depth" / name, np.where(known, np.rint(depth_mm), 0).astype(np.uint16))
         still = np.where(sequence.mask(row["name"], frame) == 0, 255, 0).astype(np.uint8)
         write_png(out / "masks" / name, still)
-        split["test" if held else "train"].append(f"images/{name}")
+        split["test" if held_out else "train"].append(f"images/{name}")
         frames.append(
             {
                 "file_path": f"images/{name}",

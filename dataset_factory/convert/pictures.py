@@ -30,9 +30,9 @@ def pictures(
     """Every picture of some cameras, or all, as camera row, frame and whether it is held out."""
     chosen = [row for row in sequence.cameras if cameras is None or row["name"] in cameras]
     rows = [(camera, frame) for frame in sequence.frames for camera in chosen]
-    held_frames = sequence.splits["images"]["test_frames"]
+    test_frames = sequence.splits["images"]["test_frames"]
     for camera, frame in tqdm(rows, desc="pictures", unit="picture"):
-        yield camera, frame, camera["split"] == "test" or frame in held_frames
+        yield camera, frame, camera["split"] == "test" or frame in test_frames
 
 
 def copy_picture(sequence: Sequence, camera: str, frame: int, target: Path) -> None:

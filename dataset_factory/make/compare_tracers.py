@@ -181,10 +181,9 @@ def _delay_angle_powers(change: np.ndarray, elements: Layout, freq_hz: np.ndarra
     tx, rx = (np.exp(-1j * k * xyz @ beams.T) for xyz in (elements.tx_xyz, elements.rx_xyz))
     rows = []
     for a, b in elements.device_pairs:
-        here, there = elements.tx_device == a, elements.rx_device == b
-        part = change[:, here][:, :, there]
-        steered = np.einsum("ftrn,rb->ftbn", part, rx[there])
+        here, there = elements.block_of(a, b)
+        steered = np.einsum("ftrn,rb->ftbn", change[:, here, there], rx[there[0]])
         # Every beam of the receiver with that of the transmitter in the same direction.
-        steered = np.einsum("ftbn,tb->fbn", steered, tx[here])
+        steered = np.einsum("ftbn,tb->fbn", steered, tx[here[:, 0]])
         rows.append(np.abs(delay_profile(steered, hann(len(freq_hz)))) ** 2)
     return np.stack(rows, axis=1)

@@ -13,6 +13,7 @@ from dataset_factory.preview.channels import RANGE_DB, responses
 from dataset_factory.preview.strips import MARGINS, WIDTH_IN, Timeline
 from rfgs_core.dataset import Sequence
 from rfgs_core.encode.matched_filter import aperture_filter
+from rfgs_core.radio.delay import hann_to_zero
 from rfgs_core.radio.levels import decibels
 
 #: Cells of the images [m]: across, and from height to height.
@@ -54,7 +55,7 @@ class Aperture:
         would show everywhere.
         """
         grid = np.stack(np.meshgrid(*axes_m, indexing="ij"), axis=-1)
-        window = np.hanning(len(self.freq_hz))
+        window = hann_to_zero(len(self.freq_hz))
         found = aperture_filter(
             (pulses * window / window.mean()).astype(np.complex64),
             self.tx_xyz,

@@ -44,9 +44,8 @@ def delay_image(
     """
     if has_beam(sequence, radio):
         return delay_angle(sequence, radio, value, pair)
-    layout = sequence.layout(radio)
-    tx, rx = layout.tx_device == pair[0], layout.rx_device == pair[1]
-    profile, length_m = responses(sequence, radio, value[np.ix_(tx, rx)])
+    block = sequence.layout(radio).block_of(*pair)
+    profile, length_m = responses(sequence, radio, value[block])
     place_m = _local(sequence, radio, pair[1])[:, 1]
     order = np.argsort(place_m)
     return (np.abs(profile) ** 2).sum(axis=0)[order], place_m[order], length_m
@@ -64,7 +63,7 @@ def draw_scatterer(
     place_m = _local(sequence, radio, pair[1])[:, 1]
     order = np.argsort(place_m)
     back = np.linalg.norm(layout.rx_xyz[layout.rx_device == pair[1]] - point, axis=1)
-    out = np.linalg.norm(point - layout.tx_xyz[layout.tx_device == pair[0]].mean(axis=0))
+    out = np.linalg.norm(point - layout.centres_of(*pair)[0])
     axis.plot(place_m[order], (out + back)[order], "--", color=TRUTH_COLOUR, lw=1)
 
 
@@ -80,8 +79,7 @@ def delay_angle(
         Power (angle, delay), angles [°] and path lengths [m].
     """
     layout, spec = sequence.layout(radio), sequence.radio_spec(radio)
-    tx, rx = layout.tx_device == pair[0], layout.rx_device == pair[1]
-    profile, length_m = responses(sequence, radio, value[np.ix_(tx, rx)])
+    profile, length_m = responses(sequence, radio, value[layout.block_of(*pair)])
     local = _local(sequence, radio, pair[1])
     angle_deg = np.linspace(-90.0, 90.0, 181)
     turn = np.sin(np.deg2rad(angle_deg))[:, None] * local[:, 1]
@@ -120,7 +118,7 @@ def seen_from(
     layout, device = sequence.layout(radio), sequence.devices(radio)[pair[1]]
     local = (point - np.asarray(device.position_m)) @ rotation(device.quat_wxyz)
     away = np.linalg.norm(local)
-    out = np.linalg.norm(point - layout.tx_xyz[layout.tx_device == pair[0]].mean(axis=0))
+    out = np.linalg.norm(point - layout.centres_of(*pair)[0])
     return float(np.rad2deg(np.arcsin(local[1] / away))), float(away + out)
 
 

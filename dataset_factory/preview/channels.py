@@ -91,12 +91,12 @@ def _profiles(
     axis, sequence: Sequence, radio: str, pair: tuple[int, int], values: tuple[np.ndarray, ...]
 ) -> None:
     layout = sequence.layout(radio)
-    tx, rx = layout.tx_device == pair[0], layout.rx_device == pair[1]
+    block = layout.block_of(*pair)
     for value, name, colour in zip(values, _KINDS, _COLOURS, strict=True):
-        profile, length_m = responses(sequence, radio, value[np.ix_(tx, rx)])
+        profile, length_m = responses(sequence, radio, value[block])
         power = (np.abs(profile) ** 2).mean(axis=(0, 1))
         axis.plot(length_m, decibels(power), color=colour, lw=1.2, label=name)
-    direct = np.linalg.norm(layout.tx_xyz[tx].mean(0) - layout.rx_xyz[rx].mean(0))
+    direct = np.linalg.norm(np.subtract(*layout.centres_of(*pair)))
     axis.axvline(direct, color="#444", ls=":", lw=1)
     axis.set_title(f"device {pair[0]} to {pair[1]}", fontsize=9)
     axis.set_xlabel("path length [m]", fontsize=8)

@@ -49,7 +49,7 @@ def watch(sequence: Sequence, radio: str) -> Watch:
     """Reads the device pair that shows people's movement best."""
     layout = sequence.layout(radio)
     pair = _liveliest(sequence, radio)
-    index = np.ix_(layout.tx_device == pair[0], layout.rx_device == pair[1])
+    index = layout.block_of(*pair)
     values = [
         sequence.csi_samples(radio, frame)[(slice(None), *index)]
         for frame in tqdm(sequence.frames, desc=f"strips of {radio}", unit="frame")
@@ -68,9 +68,9 @@ def _liveliest(sequence: Sequence, radio: str) -> tuple[int, int]:
     nobody moves far, the pair whose channel changes most relative to the static one.
     """
     layout = sequence.layout(radio)
-    apart = [pair for pair in layout.device_pairs if pair[0] != pair[1]] or layout.device_pairs
-    travel_m = {pair: _travel_m(sequence, radio, pair) for pair in apart}
-    best = max(apart, key=lambda pair: travel_m[pair])
+    bistatic = [pair for pair in layout.device_pairs if pair[0] != pair[1]] or layout.device_pairs
+    travel_m = {pair: _travel_m(sequence, radio, pair) for pair in bistatic}
+    best = max(bistatic, key=lambda pair: travel_m[pair])
     if travel_m[best] >= LEAST_TRAVEL_M:
         return best
     static = sequence.csi_static(radio)
@@ -78,7 +78,7 @@ def _liveliest(sequence: Sequence, radio: str) -> tuple[int, int]:
     change = [sequence.csi(radio, frame) - static for frame in sequence.frames[::step]]
     share = {}
     for pair in layout.device_pairs:
-        index = np.ix_(layout.tx_device == pair[0], layout.rx_device == pair[1])
+        index = layout.block_of(*pair)
         moved = sum(float((np.abs(value[index]) ** 2).sum()) for value in change)
         share[pair] = moved / max(float((np.abs(static[index]) ** 2).sum()), 1e-30)
     return max(share, key=lambda pair: share[pair])
@@ -145,7 +145,7 @@ def angle_panel(axis: Any, sequence: Sequence, radio: str, seen: Watch) -> Any:
     """Angle of arrival of what people change, with the pelvis' own angle."""
     layout = sequence.layout(radio)
     whole = np.zeros((*layout.measured.shape, seen.csi.shape[-1]), np.complex64)
-    index = np.ix_(layout.tx_device == seen.pair[0], layout.rx_device == seen.pair[1])
+    index = layout.block_of(*seen.pair)
     columns = []
     for value in seen.csi - seen.static:
         whole[index] = value

@@ -50,13 +50,13 @@ def image_paths(
             continue
         image = count * size + np.where(count % 2 == 0, rx, size - rx)
         way = image - tx
-        met = []
+        crossings = []
         for axis in range(3):
             # Walls are crossed at L, 2L, … upwards and at 0, −L, … downwards.
             up = count[axis] > 0
             planes = np.arange(1, count[axis] + 1) if up else np.arange(count[axis] + 1, 1)
-            met += [((n * size[axis] - tx[axis]) / way[axis], axis) for n in planes]
-        paths.append((way, [axis for _, axis in sorted(met)]))
+            crossings += [((n * size[axis] - tx[axis]) / way[axis], axis) for n in planes]
+        paths.append((way, [axis for _, axis in sorted(crossings)]))
     return paths
 
 

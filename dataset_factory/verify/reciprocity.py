@@ -77,6 +77,6 @@ def _row(name: str, csi: np.ndarray) -> Row:
     there = csi.astype(np.complex128)
     power = (np.abs(there) ** 2).sum(axis=2)
     error = (np.abs(there - there.transpose(1, 0, 2)) ** 2).sum(axis=2)
-    apart = ~np.eye(len(power), dtype=bool)
-    worst = float((error[apart] / power[apart]).max())
+    between = ~np.eye(len(power), dtype=bool)
+    worst = float((error[between] / power[between]).max())
     return within(name, decibels(worst), WORST_DB, "dB", SOURCE)

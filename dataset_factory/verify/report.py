@@ -40,8 +40,8 @@ def facts(command: str, card: Card) -> list[tuple[str, str]]:
 
 def summary(card: Card) -> str:
     """How many rows hold, in one sentence; those that do not are named."""
-    held = len(card.rows) - len(card.missed)
-    said = f"{held} of {len(card.rows)} rows hold."
+    passed = len(card.rows) - len(card.missed)
+    said = f"{passed} of {len(card.rows)} rows hold."
     return said + (f" Missed: {'; '.join(card.missed)}." if card.missed else "")
 
 

@@ -130,14 +130,14 @@ def without_movers(
                 empty=background,
                 packets=config.packets,
             )
-            left = seen.delta + seen.static
+            still = seen.delta + seen.static
             if seen.changed:
                 seed = sub_seed(config.seed, sequence.name, radio, frame, turn, "background")
                 with one_torch_thread():
                     before = solved_frame(seen, config, seed, before)
-                    left = left - explained_change(seen, before)
+                    still = still - explained_change(seen, before)
             rows.append(
-                np.where(seen.links[..., None] & seen.subcarriers, left, complex(np.nan, np.nan))
+                np.where(seen.links[..., None] & seen.subcarriers, still, complex(np.nan, np.nan))
             )
         background = _median(np.stack(rows))
     return background

@@ -95,13 +95,13 @@ def fit_static_set(observations: Observations, count: int, seed: int) -> StaticS
         The set; without any Gaussian where direct paths explain the background.
     """
     seen = observations.links[..., None] & observations.subcarriers
-    left = np.where(seen, observations.static - direct_background(observations), 0)
-    rest = observations.with_delta(left)
+    unexplained = np.where(seen, observations.static - direct_background(observations), 0)
+    rest = observations.with_delta(unexplained)
     least = LEAST_SHARE * float(np.sum(np.abs(observations.static) ** 2))
     channel = Channel.of(observations, observations.links, observations.subcarriers)
     target = torch.from_numpy(rest.delta[observations.links][:, observations.subcarriers])
     head = _head(observations, seed)
-    if float(np.sum(np.abs(left) ** 2)) <= least or count == 0:
+    if float(np.sum(np.abs(unexplained) ** 2)) <= least or count == 0:
         return StaticSet(Gaussians.none(), head)
     noise = noise_per_link(rest, target, UNEXPLAINED)
     rng = np.random.default_rng(sub_seed(seed, "places"))

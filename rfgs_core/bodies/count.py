@@ -19,9 +19,9 @@ from jaxtyping import Complex64, Float, Float64
 
 from rfgs_core.articulated import people
 from rfgs_core.bodies.localise import SEPARATION_M, PairMaps, locate_bodies, pair_maps
-from rfgs_core.bodies.separation import left_over
+from rfgs_core.bodies.separation import residual_of_bodies
 from rfgs_core.encode.body_maps import CENTRE_HEIGHT_M
-from rfgs_core.limbs.evidence.body import Posed, by_walls, direct, figure_of, posed
+from rfgs_core.limbs.evidence.body import Posed, by_bounces, direct, figure_of, posed
 from rfgs_core.limbs.evidence.entries import Pair, pairs_of
 from rfgs_core.limbs.evidence.levels import Levels, mean_power
 from rfgs_core.limbs.evidence.library import about_z, upright
@@ -116,14 +116,14 @@ def _one_more(
     """All bodies and the likeliest of those that may be missing; None where there is none."""
     places = _places(found)
     if found:
-        maps = pair_maps(left_over(observations, maps, places, config, seed))
+        maps = pair_maps(residual_of_bodies(observations, maps, places, config, seed))
     gains = [
         gain_near(observations, places, place)
         for place in locate_bodies(maps, observations.bounds_m, _CANDIDATES)
-        if _apart(places, place)
+        if _separate(places, place)
     ]
     best = max(gains, key=lambda gain: gain.nat, default=None)
-    if best is None or best.nat < TO_COUNT or not _apart(places, best.place_xy):
+    if best is None or best.nat < TO_COUNT or not _separate(places, best.place_xy):
         return None
     return _settled(observations, [*found, best])
 
@@ -136,7 +136,7 @@ def _settled(observations: Observations, found: list[Gain]) -> list[Gain]:
         for body in range(len(found)):
             others = np.delete(_places(found), body, axis=0)
             again = gain_near(observations, others, found[body].place_xy)
-            if not _apart(others, again.place_xy):
+            if not _separate(others, again.place_xy):
                 again = again._replace(place_xy=found[body].place_xy)
             found[body] = again
         if (_places(found) == before).all():
@@ -148,7 +148,7 @@ def _places(found: list[Gain]) -> Float64[np.ndarray, "body 2"]:
     return np.array([one.place_xy for one in found]).reshape(-1, 2)
 
 
-def _apart(places: Float64[np.ndarray, "body 2"], place: Float64[np.ndarray, "2"]) -> bool:
+def _separate(places: Float64[np.ndarray, "body 2"], place: Float64[np.ndarray, "2"]) -> bool:
     """Whether nobody stands within `SEPARATION_M` of a place."""
     return bool((np.linalg.norm(places - place, axis=1) >= SEPARATION_M).all())
 
@@ -172,8 +172,8 @@ def gain_near(
     fits, tried, brightness = [], [], []
     for pair in pairs:
         straight = [body.echoes(pair) for body in known]
-        walls = [body.by_walls(pair, observations.bounds_m) for body in known]
-        fits.append(Levels.fitted(pair.change, [*straight, *walls]))
+        bounces = [body.by_bounces(pair, observations.bounds_m) for body in known]
+        fits.append(Levels.fitted(pair.change, [*straight, *bounces]))
         tried.append([new.echoes(pair, shift) for shift in _SHIFTS_M])
         brightness += [
             level * pair.scale**2 / mean_power(part)
@@ -233,11 +233,11 @@ class _Standing(NamedTuple):
         moved = np.zeros(3) if shift is None else shift
         return np.sum([direct(one, pair, moved) for one in self.ways], axis=0)
 
-    def by_walls(
+    def by_bounces(
         self, pair: Pair, bounds_m: Float64[np.ndarray, "2 3"]
     ) -> Complex64[np.ndarray, "entry entry"]:
         """Covariance of the echoes by way of one wall."""
-        parts = [by_walls(one.facets, pair, bounds_m, self.middle) for one in self.ways]
+        parts = [by_bounces(one.facets, pair, bounds_m, self.middle) for one in self.ways]
         return np.sum(parts, axis=0)
 
 

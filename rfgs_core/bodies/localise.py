@@ -91,12 +91,7 @@ def pair_maps(observations: Observations) -> PairMaps:
         power = delay_power_map(observations, points.reshape(-1, 3))
     else:
         power = matched_filter_map(
-            observations.delta,
-            observations.layout.tx_xyz,
-            observations.layout.rx_xyz,
-            pair,
-            freq_hz,
-            points.reshape(-1, 3),
+            observations.delta, observations.layout, pair, freq_hz, points.reshape(-1, 3)
         )
     power = power.reshape(len(names), *points.shape[:3])
     power /= np.maximum(power.mean(axis=(1, 2, 3), keepdims=True), 1e-30)
@@ -147,8 +142,8 @@ def _separate_peaks(
         # A reach too small for as many peaks still gives as many places.
         among = free & is_peak if (free & is_peak).any() else free
         taken.append(int(np.where(among, score, -np.inf).argmax()))
-        apart = np.linalg.norm(ground - ground[taken[-1]], axis=1)
-        free &= apart >= SEPARATION_M
+        distance_m = np.linalg.norm(ground - ground[taken[-1]], axis=1)
+        free &= distance_m >= SEPARATION_M
     return np.array(taken)
 
 
@@ -158,11 +153,11 @@ def _means_around(
     peaks: Int64[np.ndarray, "count"],
 ) -> Float64[np.ndarray, "count 2"]:
     """Mean place around each peak, weighed by score; a place counts for the nearest peak only."""
-    apart = np.linalg.norm(ground[:, None] - ground[peaks], axis=2)
-    nearest = apart.argmin(axis=1)
+    distance_m = np.linalg.norm(ground[:, None] - ground[peaks], axis=2)
+    nearest = distance_m.argmin(axis=1)
     means = np.zeros((len(peaks), 2))
     for row, peak in enumerate(peaks):
-        around = (nearest == row) & (apart[:, row] <= PEAK_RADIUS_M)
+        around = (nearest == row) & (distance_m[:, row] <= PEAK_RADIUS_M)
         weight = np.exp((score[around] - score[peak]) / SCORE_SCALE)
         means[row] = weight @ ground[around] / weight.sum()
     return means
@@ -195,10 +190,10 @@ def locate_bodies(
     axes = [np.arange(low[k], high[k] + 1e-9, GROUND_STEP_M) for k in range(2)]
     ground = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
     if near is not None:
-        apart = np.linalg.norm(ground[:, None] - near, axis=2)
+        distance_m = np.linalg.norm(ground[:, None] - near, axis=2)
         # Of a reach that holds no ground, the nearest point of it.
-        within = np.maximum(reach_m, apart.min(axis=0))
-        ground = ground[(apart <= within).any(axis=1)]
+        within = np.maximum(reach_m, distance_m.min(axis=0))
+        ground = ground[(distance_m <= within).any(axis=1)]
     score = _visible_side_score(maps, ground, float(bounds_m[0, 2]))
     found = _means_around(ground, score, _separate_peaks(ground, score, count))
     if near is None:

@@ -89,7 +89,7 @@ def each_alone(
     return [_without(observations, part) for part in others]
 
 
-def left_over(
+def residual_of_bodies(
     observations: Observations,
     maps: PairMaps,
     axes_xy: Float64[np.ndarray, "body 2"],

@@ -83,7 +83,7 @@ def _moved_along(before: Moving, bodies: Bodies) -> Float64[np.ndarray, "M 3"]:
     return points
 
 
-def at_pace(
+def follow_motion(
     before: Moving,
     bodies: Bodies,
     cells: StartCells,

@@ -116,11 +116,11 @@ def _next_place(data: bytes, start: int) -> int:
         part = np.frombuffer(data, np.uint8, last - first + 56, first).astype(np.uint32)
         count = last - first
         words = part[:-3] | part[1:-2] << 8 | part[2:-1] << 16 | part[3:] << 24
-        size, tones = words[:count], words[52 : 52 + count]
+        size, subcarriers = words[:count], words[52 : 52 + count]
         num_rx, num_tx = part[46 : 46 + count], part[47 : 47 + count]
-        fits = np.isin(tones, _SUBCARRIERS) & (num_rx >= 1) & (num_rx <= 4)
+        fits = np.isin(subcarriers, _SUBCARRIERS) & (num_rx >= 1) & (num_rx <= 4)
         fits &= (num_tx >= 1) & (num_tx <= 4)
-        fits[fits] = size[fits] == 4 * num_rx[fits] * num_tx[fits] * tones[fits]
+        fits[fits] = size[fits] == 4 * num_rx[fits] * num_tx[fits] * subcarriers[fits]
         for offset in np.flatnonzero(fits):
             place = first + int(offset)
             if place + _size(data, place) <= len(data):

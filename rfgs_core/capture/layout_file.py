@@ -122,25 +122,25 @@ def assign(layout: CaptureLayout, files: list[Path]) -> dict[int, Path]:
     Raises:
         RfgsError: A device has no file, or a file no device.
     """
-    left = list(files)
+    unassigned = list(files)
     found: dict[int, Path] = {}
     for device in layout.receivers:
         wanted = layout.files[device]
         if wanted is not None:
-            fitting = [file for file in left if file.name == wanted]
+            fitting = [file for file in unassigned if file.name == wanted]
             if not fitting:
                 raise RfgsError(
                     f"device {layout.devices[device].name!r}: its file {wanted!r} was not given; "
                     f"given are {', '.join(file.name for file in files)}"
                 )
             found[device] = fitting[0]
-            left.remove(fitting[0])
+            unassigned.remove(fitting[0])
     for device in layout.receivers:
-        if device not in found and left:
-            found[device] = left.pop(0)
+        if device not in found and unassigned:
+            found[device] = unassigned.pop(0)
     missing = [layout.devices[d].name for d in layout.receivers if d not in found]
-    if missing or left:
-        what = f"device {missing[0]!r} has no file" if missing else f"{left[0]} has no device"
+    if missing or unassigned:
+        what = f"device {missing[0]!r} has no file" if missing else f"{unassigned[0]} has no device"
         raise RfgsError(
             f"{what}: {len(layout.receivers)} devices receive, {len(files)} files are given"
         )

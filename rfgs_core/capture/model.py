@@ -126,7 +126,7 @@ def reading(path: Path, source: str, captures: list[Capture], damage: dict[str, 
     warnings = [f"{count} {kind}" for kind, count in damage.items() if count]
     captures = [capture for capture in captures if len(capture)]
     if not captures:
-        met = "; ".join(warnings) or "none at all"
-        raise RfgsFormatError(f"{path}: expected {source} records, found {met}; check the file")
+        read = "; ".join(warnings) or "none at all"
+        raise RfgsFormatError(f"{path}: expected {source} records, found {read}; check the file")
     captures.sort(key=len, reverse=True)
     return Reading(path, source, captures, warnings)

@@ -47,7 +47,7 @@ def read(path: Path) -> Reading:
     place, quat_xyzw = _gateway(path / "gateway_info.yml")
     positions = _positions(path / "tx_pos.csv")
     refuse_too_many(path, len(positions) * ELEVATIONS * AZIMUTHS)
-    held = _names(path / "test_index.txt")
+    test = _names(path / "test_index.txt")
     damage = {"pictures missing or not 360 × 90 grey pixels": 0}
     kept, levels = [], []
     for row in range(len(positions)):
@@ -71,7 +71,7 @@ def read(path: Path) -> Reading:
         index=np.arange(ELEVATIONS * AZIMUTHS),
         packets={
             "picture": np.array(kept) + 1,
-            "test": np.array([f"{row + 1:05d}" in held for row in kept]),
+            "test": np.array([f"{row + 1:05d}" in test for row in kept]),
         },
         info={"untimed": True, "orientation_xyzw": quat_xyzw, "position_m": place},
         tx_xyz=positions[kept],

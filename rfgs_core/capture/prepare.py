@@ -183,11 +183,9 @@ def _arranged(
     sender = int(elements.tx_device[0])
     for number, (device, value) in enumerate(zip(given.receivers, values, strict=True)):
         source = device if len(given.devices) == 1 else sender
-        tx = np.flatnonzero(elements.tx_device == source)
-        rx = np.flatnonzero(elements.rx_device == device)
+        tx, rx = elements.block_of(source, device)
         chosen = value[packet[number]][:, :, used]
-        block = np.swapaxes(chosen, 2, 3)
-        csi[:, :, tx[:, None], rx[None, :]] = block
+        csi[:, :, tx, rx] = np.swapaxes(chosen, 2, 3)
     return csi
 
 
@@ -228,7 +226,7 @@ def _prepared(
         bounds_m=np.array(bounds, np.float64),
         fps=plan.fps,
         guesses=guesses,
-        beside={
+        packet_arrays={
             "scale": np.array(scale),
             "packet": plan.packet,
             "packet_time_s": plan.packet_time_s,

@@ -17,7 +17,7 @@ from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
 #: Transmitter beside its receiver in a radar, across the line of sight: it changes no distance
 #: by more than a nanometre at the ranges of an aircraft [m].
-_BESIDE_M = 0.001
+_RADAR_SPACING_M = 0.001
 #: Half the side of the scene around an aperture's centre [m].
 _APERTURE_SCENE_M = 50.0
 
@@ -82,7 +82,7 @@ def _table(capture: Capture, tx: np.ndarray, rx: np.ndarray, scene: str) -> Prep
             guess("radio", "csi_static", "the capture itself", reason),
             guess("radio", "level", scale, "cards report their own units"),
         ],
-        beside={"scale": np.array(scale), "measured_subcarriers": channels.measured},
+        packet_arrays={"scale": np.array(scale), "measured_subcarriers": channels.measured},
     )
 
 
@@ -108,7 +108,7 @@ def _aperture(capture: Capture, places: np.ndarray, scene: str) -> Prepared:
     radio = _one_element(
         channels,
         name="sar_capture",
-        tx_offset_m=(0.0, _BESIDE_M, 0.0),
+        tx_offset_m=(0.0, _RADAR_SPACING_M, 0.0),
         own_device_links="only",
         placement="circle",
         num_devices=1,
@@ -141,7 +141,7 @@ def _aperture(capture: Capture, places: np.ndarray, scene: str) -> Prepared:
             guess(scene, "bounds", f"{_APERTURE_SCENE_M:g} m around the centre", reason),
             guess("sar_capture", "level", scale, "radars report their own units"),
         ],
-        beside={
+        packet_arrays={
             "scale": np.array(scale),
             "centre_distance_m": distance_m,
             "measured_subcarriers": channels.measured,

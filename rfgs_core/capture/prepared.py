@@ -36,7 +36,7 @@ class Prepared:
     """Frames per second."""
     guesses: list[dict[str, Any]] = field(default_factory=list)
     """What was not said and is guessed."""
-    beside: dict[str, np.ndarray] = field(default_factory=dict)
+    packet_arrays: dict[str, np.ndarray] = field(default_factory=dict)
     """Kept beside the channels: times of the packets, the scale, the subcarriers of the bins."""
 
 

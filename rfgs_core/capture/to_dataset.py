@@ -23,7 +23,7 @@ from rfgs_core.radio import FrameSamples, frame_samples, layout
 from rfgs_core.radio.files import radio_values
 
 #: What is kept beside a radio's channels.
-BESIDE = "capture.npz"
+CAPTURE_FILE = "capture.npz"
 
 
 def write_dataset(out: Path, capture: Prepared, config: dict[str, Any]) -> None:
@@ -65,7 +65,7 @@ def _write_channels(files: SequenceFiles, capture: Prepared) -> None:
     for index, frame in enumerate(frames):
         value = np.ascontiguousarray(capture.csi[index])
         write_csi(store, index, value, files.csi_done(name, frame))
-    save_arrays(store.with_name(BESIDE), capture.beside)
+    save_arrays(store.with_name(CAPTURE_FILE), capture.packet_arrays)
 
 
 def _frames(capture: Prepared) -> list[int]:

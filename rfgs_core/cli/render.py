@@ -96,8 +96,8 @@ def _unseen_camera(trained: TrainedRun) -> str:
     names = [str(row["name"]) for row in trained.sequence.cameras]
     if not names:
         raise RfgsError(f"{trained.path}: the dataset has no camera to render through")
-    held = trained.sequence.splits["images"]["test_cameras"]
-    return next((name for name in names if name in held), names[0])
+    test_cameras = trained.sequence.splits["images"]["test_cameras"]
+    return next((name for name in names if name in test_cameras), names[0])
 
 
 def render_run(trained: TrainedRun, args: RenderArgs) -> None:

@@ -67,8 +67,10 @@ def write_transforms(files: SequenceFiles, info: SequenceInfo) -> None:
         rows = []
         for camera in info.cameras:
             for frame in info.frames:
-                held = camera["split"] == "test" or frame in info.splits["images"]["test_frames"]
-                if held == (split == "test"):
+                held_out = (
+                    camera["split"] == "test" or frame in info.splits["images"]["test_frames"]
+                )
+                if held_out == (split == "test"):
                     time = (frame - info.frames[0]) / last
                     rows.append(_transform(files, camera, frame, time))
         write_json(files.transforms(split), {"camera_model": "OPENCV", "frames": rows})

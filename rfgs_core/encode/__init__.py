@@ -3,12 +3,7 @@
 
 from __future__ import annotations
 
-from rfgs_core.encode.matched_filter import (
-    MATCHED_FILTER,
-    MatchedFilter,
-    matched_filter_features,
-    matched_filter_map,
-)
+from rfgs_core.encode.matched_filter import MATCHED_FILTER, MatchedFilter, matched_filter_map
 from rfgs_core.encode.protocol import Encoder, FrameChannel, unit_rms
 
 __all__ = [
@@ -16,7 +11,6 @@ __all__ = [
     "Encoder",
     "FrameChannel",
     "MatchedFilter",
-    "matched_filter_features",
     "matched_filter_map",
     "unit_rms",
 ]

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Complex, Float, Int
 
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.radio.delay import delay_transform
 
 #: Delay-profile samples per resolution cell 1/B; 16 keeps the linear reading within 0.5 %.
 OVERSAMPLING = 16
@@ -60,7 +61,7 @@ def _read_profile(profile, samples_per_m, d_t, d_r, turn_t, turn_r, total):
 
 
 @numba.njit(parallel=True, cache=True)
-def _back_project(profiles, centre_k, samples_per_m, tx_xyz, rx_xyz, links, points, out):
+def _add_profiles(profiles, centre_k, samples_per_m, tx_xyz, rx_xyz, links, points, out):
     """Fills `out[pair, band, re/im, point]`; `links` rows are tx, rx and pair of a profile."""
     for chunk in numba.prange((points.shape[0] + CHUNK - 1) // CHUNK):
         here = slice(chunk * CHUNK, min((chunk + 1) * CHUNK, points.shape[0]))
@@ -104,16 +105,14 @@ def oversampled_profiles(
     subcarriers = np.arange(len(freq_hz)) if subcarriers is None else subcarriers
     size = OVERSAMPLING * len(freq_hz)
     offset = int(subcarriers[len(subcarriers) // 2])
-    spectrum = np.zeros((*csi.shape[:-1], size), dtype=np.complex64)
-    spectrum[..., (subcarriers - offset) % size] = csi
-    # ifft carries exp(+j2π n m / size): the profile at delay m / (size · Δf).
-    profiles = np.fft.ifft(spectrum, axis=-1) * size / len(subcarriers)
+    narrow = csi.astype(np.complex64, copy=False)
+    profiles = delay_transform(narrow, size, subcarriers - offset) * size / len(subcarriers)
     centre_k = 2.0 * np.pi * float(freq_hz[offset]) / SPEED_OF_LIGHT
     spacing_hz = float(freq_hz[1] - freq_hz[0])
     return profiles, centre_k, spacing_hz * size / SPEED_OF_LIGHT
 
 
-def images(
+def back_project(
     profiles: Complex[np.ndarray, "link channel sample"],
     centre_k: Float[np.ndarray, "channel"],
     samples_per_m: float,
@@ -144,7 +143,7 @@ def images(
     # The first sample again at the end: reading between the last two needs no wrap.
     profiles = np.concatenate([profiles, profiles[..., :1]], axis=2)
     split = np.stack([profiles.real, profiles.imag], axis=2)
-    _back_project(
+    _add_profiles(
         split,
         centre_k,
         samples_per_m,

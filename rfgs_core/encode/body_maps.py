@@ -15,7 +15,7 @@ from jaxtyping import Bool, Complex, Float, Float32, Float64
 
 from rfgs_core.radio import Layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
-from rfgs_core.radio.delay import hann
+from rfgs_core.radio.delay import band_window, hann
 from rfgs_core.rotations import rotation_rows
 
 #: Offsets of the beams from the direction of the point, as direction cosines.
@@ -109,12 +109,6 @@ def views_of(layout: Layout, links: Bool[np.ndarray, "tx rx"]) -> list[View]:
     return views
 
 
-def band_weights(subcarriers: Bool[np.ndarray, "subcarrier"]) -> Float64[np.ndarray, "subcarrier"]:
-    """Hann window over the band, zero at hidden subcarriers, sum 1."""
-    window = hann(len(subcarriers)) * subcarriers
-    return window / window.sum()
-
-
 def body_maps(
     change: Complex[np.ndarray, "tx rx subcarrier"],
     layout: Layout,
@@ -138,7 +132,7 @@ def body_maps(
         [m⁴], wherever it is.
     """
     ranges = Ranges.of_band(freq_hz)
-    weights = band_weights(subcarriers)
+    weights = band_window(subcarriers, hann)
     wavenumber = 2.0 * np.pi * freq_hz / SPEED_OF_LIGHT
     centre_k = float(wavenumber.mean())
     maps = []

@@ -14,8 +14,14 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Complex, Float, Float32, Float64, Int
 
-from rfgs_core.encode.back_projection import OVERSAMPLING, POINTS, images, oversampled_profiles
-from rfgs_core.encode.protocol import FEATURES, FrameChannel, unit_rms
+from rfgs_core.encode.back_projection import (
+    OVERSAMPLING,
+    POINTS,
+    back_project,
+    oversampled_profiles,
+)
+from rfgs_core.encode.protocol import FEATURES, FrameChannel
+from rfgs_core.radio import Layout
 
 
 def _band_profiles(
@@ -23,7 +29,7 @@ def _band_profiles(
     freq_hz: Float[np.ndarray, "subcarrier"],
     num_bands: int,
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """Profiles (link, band, sample) of each sub-band, as `images` takes them."""
+    """Profiles (link, band, sample) of each sub-band, as `back_project` takes them."""
     samples_per_m = 0.0
     profiles = np.zeros((len(csi), num_bands, OVERSAMPLING * len(freq_hz)), dtype=np.complex64)
     centre_k = np.zeros(num_bands)
@@ -36,8 +42,7 @@ def _band_profiles(
 
 def matched_filter(
     csi: Complex[np.ndarray, "tx rx subcarrier"],
-    tx_xyz: Float[np.ndarray, "tx 3"],
-    rx_xyz: Float[np.ndarray, "rx 3"],
+    layout: Layout,
     pair: Int[np.ndarray, "tx rx"],
     freq_hz: Float[np.ndarray, "subcarrier"],
     points: Float[np.ndarray, "N 3"],
@@ -47,8 +52,7 @@ def matched_filter(
 
     Args:
         csi: Channel; uniform subcarrier grid.
-        tx_xyz: Transmitting elements [m].
-        rx_xyz: Receiving elements [m].
+        layout: Antenna elements.
         pair: Which sum a link belongs to, 0..P-1; negative links are left out.
         freq_hz: Subcarrier frequencies [Hz], equally spaced.
         points: Where to evaluate [m].
@@ -58,8 +62,31 @@ def matched_filter(
         Mean over the links and subcarriers of a pair, shape (pair, band, N).
     """
     tx_index, rx_index = np.nonzero(pair >= 0)
-    profiles = _band_profiles(csi[tx_index, rx_index], freq_hz, num_bands)
-    return images(*profiles, tx_xyz, rx_xyz, pair, points)
+    return _focused(
+        csi[tx_index, rx_index], layout.tx_xyz, layout.rx_xyz, pair, freq_hz, points, num_bands
+    )
+
+
+def _focused(
+    csi: Complex[np.ndarray, "link subcarrier"],
+    tx_xyz: Float[np.ndarray, "tx 3"],
+    rx_xyz: Float[np.ndarray, "rx 3"],
+    pair: Int[np.ndarray, "tx rx"],
+    freq_hz: Float[np.ndarray, "subcarrier"],
+    points: Float[np.ndarray, "N 3"],
+    num_bands: int,
+) -> Complex[np.ndarray, "pair band N"]:
+    """The filter of the links with `pair >= 0`, in row-major order."""
+    profiles, centre_k, samples_per_m = _band_profiles(csi, freq_hz, num_bands)
+    return back_project(
+        profiles,
+        centre_k=centre_k,
+        samples_per_m=samples_per_m,
+        tx_xyz=tx_xyz,
+        rx_xyz=rx_xyz,
+        pair=pair,
+        points=points,
+    )
 
 
 def aperture_filter(
@@ -82,68 +109,42 @@ def aperture_filter(
         Mean over places and subcarriers, shape (N,).
     """
     own = np.where(np.eye(len(csi), dtype=bool), 0, -1)
-    return images(*_band_profiles(csi, freq_hz, 1), tx_xyz, rx_xyz, own, points)[0, 0]
+    return _focused(csi, tx_xyz, rx_xyz, own, freq_hz, points, 1)[0, 0]
 
 
 def matched_filter_map(
     csi: Complex[np.ndarray, "tx rx subcarrier"],
-    tx_xyz: Float[np.ndarray, "tx 3"],
-    rx_xyz: Float[np.ndarray, "rx 3"],
+    layout: Layout,
     pair: Int[np.ndarray, "tx rx"],
     freq_hz: Float[np.ndarray, "subcarrier"],
     points: Float[np.ndarray, "N 3"],
 ) -> Float[np.ndarray, "pair N"]:
     """Matched-filter power per device pair over the whole band, see `matched_filter`."""
-    return np.abs(matched_filter(csi, tx_xyz, rx_xyz, pair, freq_hz, points)[:, 0]) ** 2
-
-
-def matched_filter_features(
-    csi: Complex[np.ndarray, "tx rx subcarrier"],
-    tx_xyz: Float[np.ndarray, "tx 3"],
-    rx_xyz: Float[np.ndarray, "rx 3"],
-    pair: Int[np.ndarray, "tx rx"],
-    freq_hz: Float[np.ndarray, "subcarrier"],
-    points: Float[np.ndarray, "N 3"],
-    num_features: int = 32,
-) -> Float[np.ndarray, "N feature"]:
-    """φ(p) of paper eq. 2: matched-filter amplitude per sub-band, incoherent between pairs.
-
-    The entries are ordered by frequency, which gives the paper's gradient across frequency
-    bins (section 3.5) a meaning. Scaled so that the RMS of ‖φ‖ over `points` is one.
-    """
-    return unit_rms(_sub_band_amplitudes(csi, tx_xyz, rx_xyz, pair, freq_hz, points, num_features))
-
-
-def _sub_band_amplitudes(
-    csi: Complex[np.ndarray, "tx rx subcarrier"],
-    tx_xyz: Float[np.ndarray, "tx 3"],
-    rx_xyz: Float[np.ndarray, "rx 3"],
-    pair: Int[np.ndarray, "tx rx"],
-    freq_hz: Float[np.ndarray, "subcarrier"],
-    points: Float[np.ndarray, "N 3"],
-    num_features: int,
-) -> Float[np.ndarray, "N feature"]:
-    """Root of the mean power over pairs in each sub-band."""
-    bands = min(num_features, len(freq_hz))
-    power = np.abs(matched_filter(csi, tx_xyz, rx_xyz, pair, freq_hz, points, bands)) ** 2
-    # A radio with fewer subcarriers than features has its sub-bands repeated, still in order.
-    return np.sqrt(power.mean(axis=0)).T[:, np.arange(num_features) * bands // num_features]
+    return np.abs(matched_filter(csi, layout, pair, freq_hz, points)[:, 0]) ** 2
 
 
 class MatchedFilter:
-    """The default encoder: `matched_filter_features` before they are scaled."""
+    """The default encoder: matched-filter amplitude per sub-band, incoherent between pairs.
+
+    The entries are ordered by frequency, which gives the paper's gradient across frequency bins
+    (section 3.5) a meaning.
+    """
 
     def __call__(
         self, seen: FrameChannel, points: Float64[np.ndarray, "N 3"]
     ) -> Float32[np.ndarray, "N 32"]:
-        """Amplitude of each of 32 sub-bands, see `Encoder`."""
-        elements, (pair, _) = seen.layout, seen.pairs
+        """Root of the mean power over pairs in each of 32 sub-bands, see `Encoder`."""
+        bands = min(FEATURES, len(seen.freq_hz))
+        # A radio with fewer subcarriers than features has its sub-bands repeated, still in order.
+        repeated = np.arange(FEATURES) * bands // FEATURES
+        pair, _ = seen.pairs
         rows = [np.zeros((0, FEATURES), np.float32)]
         # Images of all pairs and sub-bands at once would take a gigabyte for the paper's grid.
         for start in range(0, len(points), POINTS):
-            geometry = (elements.tx_xyz, elements.rx_xyz, pair, seen.freq_hz)
             here = points[start : start + POINTS]
-            rows.append(_sub_band_amplitudes(seen.delta, *geometry, here, FEATURES))
+            focused = matched_filter(seen.delta, seen.layout, pair, seen.freq_hz, here, bands)
+            power = (np.abs(focused) ** 2).mean(axis=0)
+            rows.append(np.sqrt(power).T[:, repeated])
         return np.concatenate(rows)
 
 

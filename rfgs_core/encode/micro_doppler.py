@@ -10,6 +10,7 @@ from jaxtyping import Complex, Float64
 
 from rfgs_core.errors import RfgsError
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.radio.delay import hann
 
 #: Velocities per width of a spectral line.
 _OVERSAMPLING = 2.0
@@ -73,7 +74,7 @@ def micro_doppler(
     limit = velocity_limit_m_s or float(wavelength_m.max()) / (4.0 * interval_s)
     line = float(wavelength_m.mean()) / (2.0 * size * interval_s)
     velocity = np.linspace(-limit, limit, 2 * int(np.ceil(_OVERSAMPLING * limit / line)) + 1)
-    window = np.hanning(size + 2)[1:-1]
+    window = hann(size)
     window /= window.sum()
     times = np.arange(size) * interval_s
     samples = change.reshape(len(time_s), -1, len(freq_hz))

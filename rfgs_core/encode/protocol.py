@@ -15,7 +15,7 @@ FEATURES = 32
 
 
 class FrameChannel(Protocol):
-    """One frame's channel and where it was measured; `train.Observations` is one."""
+    """One frame's channel and where it was measured; `measure.Observations` is one."""
 
     @property
     def delta(self) -> Complex64[np.ndarray, "tx rx subcarrier"]:

@@ -82,8 +82,7 @@ class Evidence:
         """Power maps of the visible entries, computed once."""
         layout = self.layout
         pair, pairs = layout.pairs_of(self.link_visible)
-        geometry = (layout.tx_xyz, layout.rx_xyz, pair, self.freq_hz)
-        matched_filter = partial(matched_filter_map, self.delta_or_zero, *geometry)
+        matched_filter = partial(matched_filter_map, self.delta_or_zero, layout, pair, self.freq_hz)
         return thinned_maps(self.power_map or matched_filter, pairs, self.freq_hz, self.grid)
 
     @property

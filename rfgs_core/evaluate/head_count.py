@@ -17,7 +17,7 @@ from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import TrainConfig
 
 #: Frames whose place is also taken by channels without anybody.
-CONTROLS = 3
+EMPTY_FRAMES = 3
 #: By how much gains of devices have drifted in the empty room that is heard anew.
 DRIFT = 0.01
 
@@ -58,9 +58,9 @@ def head_count_table(
         there = [one_more_counts([gain_near(other, _NOBODY, body.place_xy)]) for body in found]
         confirmed += sum(there)
         counts.append(len(found))
-        if index < CONTROLS:
-            for name, control in (("noise", noise_alone), ("empty", empty_room_anew)):
-                nobody[name].append(len(count_bodies(control(one, seed), config, seed)))
+        if index < EMPTY_FRAMES:
+            for name, nobody_there in (("noise", noise_alone), ("empty", empty_room_anew)):
+                nobody[name].append(len(count_bodies(nobody_there(one, seed), config, seed)))
         on_frame()
     return {
         "people": true,

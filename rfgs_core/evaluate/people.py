@@ -67,12 +67,12 @@ def match_people(
     if not bodies or not numbers:
         return FramePeople((), (), (), len(numbers))
     own = np.array([predicted[whose == body].mean(axis=0) for body in bodies])
-    apart = np.linalg.norm(own[:, None] - np.array([people[n] for n in numbers]), axis=2)
-    rows, columns = linear_sum_assignment(apart)
+    gap_m = np.linalg.norm(own[:, None] - np.array([people[n] for n in numbers]), axis=2)
+    rows, columns = linear_sum_assignment(gap_m)
     return FramePeople(
         tuple(bodies[row] for row in rows),
         tuple(numbers[column] for column in columns),
-        tuple(float(apart[row, column]) for row, column in zip(rows, columns, strict=True)),
+        tuple(float(gap_m[row, column]) for row, column in zip(rows, columns, strict=True)),
         len(numbers),
     )
 

@@ -56,7 +56,7 @@ def with_residual(
         evidence: What may be looked at.
         from_less: What there would be of some links and subcarriers only.
     """
-    links, subcarriers = kept = _left(evidence)
+    links, subcarriers = kept = _kept_for_choosing(evidence)
     less = from_less(kept)
     fewer = replace(evidence, delta=less.change, link_visible=links, subcarrier_visible=subcarriers)
     tried, answers = _answers(less.predicted, fewer), _answers(predicted, evidence)
@@ -79,7 +79,7 @@ def with_residual(
     return out
 
 
-def _left(evidence: Evidence) -> Kept:
+def _kept_for_choosing(evidence: Evidence) -> Kept:
     """Links and subcarriers less as many as are held out: last columns, inner subcarriers."""
     column = evidence.layout.rx_column
     seen = np.unique(column[evidence.link_visible.any(axis=0)])

@@ -107,8 +107,8 @@ def pool_rf(frames: Sequence[Mapping[str, Any]]) -> dict[str, float | None]:
     """
     result: dict[str, float | None] = {}
     for name in ("element", "subcarrier"):
-        sums = np.sum([frame[name] for frame in frames], axis=0)
-        result[f"{name}_snr_db"] = snr_db(float(sums[0]), float(sums[1]))
+        totals = np.sum([frame[name] for frame in frames], axis=0)
+        result[f"{name}_snr_db"] = snr_db(float(totals[0]), float(totals[1]))
         single = [snr_db(*frame[name]) for frame in frames]
         known = [value for value in single if value is not None]
         result[f"{name}_snr_median_db"] = float(np.median(known)) if known else None

@@ -37,9 +37,9 @@ class LinkChannels:
     @property
     def error_db(self) -> float:
         """Energy of the difference over that of the measured channel [dB]; 0 explains nothing."""
-        left = np.sum(np.abs(self.measured - self.predicted).astype(np.float64) ** 2)
+        error = np.sum(np.abs(self.measured - self.predicted).astype(np.float64) ** 2)
         whole = np.sum(np.abs(self.measured).astype(np.float64) ** 2)
-        return float(decibels(max(left, 1e-300) / max(whole, 1e-300), least=0.0))
+        return float(decibels(max(error, 1e-300) / max(whole, 1e-300), least=0.0))
 
     @property
     def explained(self) -> str:
@@ -67,9 +67,7 @@ def link_channels(run: Run, tx_device: int, rx_device: int) -> LinkChannels:
     if (tx_device, rx_device) not in pairs:
         known = ", ".join(f"{a}→{b}" for a, b in pairs)
         raise RfgsError(f"{name} measures no link {tx_device}→{rx_device}; it has {known}")
-    tx, rx = np.nonzero(
-        layout.measured & (layout.tx_device[:, None] == tx_device) & (layout.rx_device == rx_device)
-    )
+    tx, rx = np.nonzero(layout.measured & layout.links_between(tx_device, rx_device))
     static = whole_static(sequence, name)
     measured = [(whole_csi(sequence, name, frame) - static)[tx, rx] for frame in run.frames]
     predicted = [run.predict(frame)[tx, rx] for frame in run.frames]

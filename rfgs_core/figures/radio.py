@@ -114,8 +114,7 @@ def _delay_angle(
 ) -> Float[np.ndarray, "delay angle"]:
     """Power over path length and azimuth."""
     layout = scene.layout
-    tx = np.flatnonzero(layout.tx_device == tx_device)
-    rx = np.flatnonzero(layout.rx_device == rx_device)
+    tx, rx = (elements.ravel() for elements in layout.block_of(tx_device, rx_device))
     columns = np.unique(layout.rx_column[rx])
     local_y = (layout.rx_xyz[rx] - layout.rx_xyz[rx].mean(axis=0)) @ world[:, 1]
     by_column = np.stack([rx[layout.rx_column[rx] == c] for c in columns])
@@ -125,7 +124,7 @@ def _delay_angle(
     k = 2.0 * np.pi / scene.radio.wavelength_m
     # A wave from azimuth φ is ahead by k y sin φ at local y.
     steer = np.exp(-1j * k * np.outer(np.sin(np.radians(ANGLES_DEG)), y))
-    beams = np.einsum("ac,tcrd->tard", steer * np.hanning(len(y) + 2)[1:-1], profile)
+    beams = np.einsum("ac,tcrd->tard", steer * hann(len(y)), profile)
     return np.mean(np.abs(beams) ** 2, axis=(0, 2)).T
 
 
@@ -137,9 +136,7 @@ def _marker(
     world: Float[np.ndarray, "3 3"],
 ) -> tuple[float, float]:
     """Azimuth [degree] and path length [m] at which a point appears."""
-    layout = scene.layout
-    receiver = layout.rx_xyz[layout.rx_device == rx_device].mean(axis=0)
-    sender = layout.tx_xyz[layout.tx_device == tx_device].mean(axis=0)
+    sender, receiver = scene.layout.centres_of(tx_device, rx_device)
     towards = world.T @ (point_m - receiver)
     sine = towards[1] / np.linalg.norm(towards)
     path = np.linalg.norm(point_m - receiver) + np.linalg.norm(point_m - sender)
@@ -148,12 +145,7 @@ def _marker(
 
 def _partner(scene: Scene, rx_device: int) -> int:
     """The device's own transmitter where it is measured, else the first one that is."""
-    layout = scene.layout
-    measured = [
-        int(a)
-        for a in np.unique(layout.tx_device)
-        if layout.measured[np.ix_(layout.tx_device == a, layout.rx_device == rx_device)].any()
-    ]
+    measured = [a for a, b in scene.layout.device_pairs if b == rx_device]
     return rx_device if rx_device in measured else measured[0]
 
 

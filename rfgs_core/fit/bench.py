@@ -129,9 +129,9 @@ def _validation(
     whole: Observations, aside: np.ndarray, state: FrameState, config: TrainConfig
 ) -> float:
     """Channel loss of the links that were set aside."""
-    held = replace(whole, links=aside)
-    channel = Channel.of(held, held.links, held.subcarriers)
-    target = comparison_of(held).measured()
-    noise = noise_per_link(held, target, config.unexplained)
+    hidden = replace(whole, links=aside)
+    channel = Channel.of(hidden, hidden.links, hidden.subcarriers)
+    target = comparison_of(hidden).measured()
+    noise = noise_per_link(hidden, target, config.unexplained)
     with torch.no_grad():
         return float(channel_loss(channel.change(state.head, state.gaussians), target, noise))

@@ -18,7 +18,7 @@ from rfgs_core.bodies.posture import tell_postures
 from rfgs_core.bodies.separation import separated
 from rfgs_core.bodies.start import StartCells
 from rfgs_core.bodies.tracks import Tracks
-from rfgs_core.bodies.warm_start import Moving, at_pace, carry_over
+from rfgs_core.bodies.warm_start import Moving, carry_over, follow_motion
 from rfgs_core.device import on_device
 from rfgs_core.encode import MATCHED_FILTER, Encoder
 from rfgs_core.errors import RfgsError
@@ -150,7 +150,7 @@ def start_frame(
         if config.density == "motion" and earlier is not None:
             speed_m_s = speeds_m_s(tracks, novelty(observations, earlier))
             wanted = wanted_counts(config.num_gaussians, speed_m_s)
-            points, track_id = at_pace(
+            points, track_id = follow_motion(
                 before.moving, bodies, cells, wanted, points=points, track_id=track_id, rng=rng
             )
         goes_on, next_track = np.isin(track_id, before.track_id), before.unused_track

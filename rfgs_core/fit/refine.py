@@ -268,11 +268,11 @@ def _resume(
         raise RfgsFormatError(
             f"{checkpoint}: of other Gaussians than this frame's; delete it to start it over"
         )
-    mark, device = "density.", start.means.device
+    prefix, device = "density.", start.means.device
     memory = {
-        name.removeprefix(mark): torch.from_numpy(value.copy()).to(device)
+        name.removeprefix(prefix): torch.from_numpy(value.copy()).to(device)
         for name, value in arrays.items()
-        if name.startswith(mark)
+        if name.startswith(prefix)
     }
     try:
         return TrainableGaussians.restore(arrays, rates, device), steps, memory

@@ -36,8 +36,7 @@ def line_points(observations: Observations, rng: np.random.Generator) -> Float64
     for a, b in names:
         if a == b:
             continue
-        start = observations.layout.tx_xyz[observations.layout.tx_device == a].mean(axis=0)
-        end = observations.layout.rx_xyz[observations.layout.rx_device == b].mean(axis=0)
+        start, end = observations.layout.centres_of(a, b)
         share = (np.arange(POINTS_PER_LINE) + rng.random(POINTS_PER_LINE)) / POINTS_PER_LINE
         lines.append(start + share[:, None] * (end - start))
     return np.concatenate(lines) if lines else np.zeros((0, 3))

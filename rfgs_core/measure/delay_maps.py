@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float, Float32
 
-from rfgs_core.encode.back_projection import images
+from rfgs_core.encode.back_projection import back_project
 from rfgs_core.encode.protocol import FEATURES
 from rfgs_core.measure.observations import Observations
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
@@ -27,7 +27,7 @@ def delay_power_map(
     spacing_hz = float(observations.freq_hz[1] - observations.freq_hz[0])
     profiles = (change[tx, rx] ** 2).astype(np.complex64)[:, None]
     layout = observations.layout
-    read = images(
+    read = back_project(
         profiles,
         centre_k=np.zeros(1),
         samples_per_m=spacing_hz * change.shape[-1] / SPEED_OF_LIGHT,

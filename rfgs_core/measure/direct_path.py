@@ -51,8 +51,7 @@ def direct_background(
     gains = dict(zip(names, direct_gain(observations, pair, len(names)), strict=True))
     layout, direct = observations.layout, direct_channel(observations)
     for a, b in layout.device_pairs:
-        block = np.ix_(layout.tx_device == a, layout.rx_device == b)
-        direct[block] *= np.complex64(gains.get((a, b), gains.get((b, a), 1.0)))
+        direct[layout.block_of(a, b)] *= np.complex64(gains.get((a, b), gains.get((b, a), 1.0)))
     return direct * layout.measured[..., None]
 
 

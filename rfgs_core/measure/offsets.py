@@ -24,6 +24,7 @@ from scipy.optimize import minimize
 from rfgs_core.errors import RfgsError
 from rfgs_core.measure.observations import Observations
 from rfgs_core.radio import Layout
+from rfgs_core.radio.delay import delay_transform
 
 #: Delay samples per resolution cell 1/B of the first guess.
 OVERSAMPLING = 16
@@ -204,9 +205,7 @@ def _first_delays(spectra: CrossSpectra, devices: int) -> np.ndarray:
     """Delays from the peak of each pair's delay profile, least absolute deviations."""
     step = float(np.min(np.diff(spectra.baseband))) / (2 * np.pi)
     size = OVERSAMPLING * (int(spectra.index.max()) + 1)
-    spread = np.zeros((len(spectra.value), size), dtype=np.complex128)
-    spread[:, spectra.index] = spectra.value
-    profile = np.abs(np.fft.ifft(spread, axis=1))
+    profile = np.abs(delay_transform(spectra.value, size, spectra.index))
     lag = np.fft.fftfreq(size, d=step)[profile.argmax(axis=1)]
     design = np.zeros((len(lag), devices))
     design[np.arange(len(lag)), spectra.first] += 1

@@ -26,6 +26,7 @@ from scipy.ndimage import uniform_filter1d
 from scipy.special import gammainccinv
 
 from rfgs_core.radio import Layout
+from rfgs_core.radio.delay import hann
 
 #: Doppler frequencies per resolved one at which spectra are held.
 DOPPLER_GRID = 2
@@ -54,7 +55,7 @@ def noise_power(
     """
     index = np.flatnonzero(subcarriers)
     run = max(np.split(index, np.flatnonzero(np.diff(index) > 1) + 1), key=len)
-    band, time = (np.hanning(size + 2)[1:-1] for size in (len(run), len(change)))
+    band, time = (hann(size) for size in (len(run), len(change)))
     window = band * time[:, None, None] / np.sqrt((band**2).sum() * (time**2).sum())
     cells = np.fft.fft(np.fft.fft(change[:, :, run] * window, axis=2), axis=0)
     return float(np.median(cells.real**2 + cells.imag**2) / np.log(2.0))

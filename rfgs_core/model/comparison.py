@@ -37,7 +37,7 @@ class Comparison(Protocol):
         """The part of `predicted` that is linear in the change, all links; None without one."""
         ...
 
-    def left(
+    def residual(
         self, observations: Observations, change: Complex[Tensor, "link subcarrier"]
     ) -> Observations:
         """The observations less what the change of all links explains of them."""
@@ -67,7 +67,7 @@ class ComplexComparison:
         """The change."""
         return change
 
-    def left(
+    def residual(
         self, observations: Observations, change: Complex[Tensor, "link subcarrier"]
     ) -> Observations:
         """The residual channel."""
@@ -115,14 +115,14 @@ class PowerComparison:
         """2 Re(H₀* Δ) / level."""
         return 2.0 * (self.empty.conj() * change).real / self.level
 
-    def left(
+    def residual(
         self, observations: Observations, change: Complex[Tensor, "link subcarrier"]
     ) -> Observations:
         """The hologram of the residual."""
-        left = self.target - self.predicted(change, np.arange(len(self.target)))
+        residual = self.target - self.predicted(change, np.arange(len(self.target)))
         wave = direct_wave(observations.layout, observations.freq_hz)
         wave = wave[observations.links][:, observations.subcarriers]
-        return observations.with_entries(left.cpu().numpy() * wave)
+        return observations.with_entries(residual.cpu().numpy() * wave)
 
 
 @dataclass(frozen=True)
@@ -163,13 +163,13 @@ class DelayComparison:
         """An amplitude has no linear part."""
         return None
 
-    def left(
+    def residual(
         self, observations: Observations, change: Complex[Tensor, "link subcarrier"]
     ) -> Observations:
         """Amplitudes above the predicted ones."""
-        left = self.target - self.predicted(change, np.arange(len(self.target)))
-        delay_change = np.zeros((*observations.links.shape, left.shape[1]), dtype=np.float32)
-        delay_change[observations.links] = left.clamp(min=0.0).cpu().numpy()
+        residual = self.target - self.predicted(change, np.arange(len(self.target)))
+        delay_change = np.zeros((*observations.links.shape, residual.shape[1]), dtype=np.float32)
+        delay_change[observations.links] = residual.clamp(min=0.0).cpu().numpy()
         return replace(observations, delay_change=delay_change)
 
 

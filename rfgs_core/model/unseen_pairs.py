@@ -76,13 +76,11 @@ def levelled(
     """
     out = csi.copy()
     for a, b in layout.device_pairs:
-        tx, rx = layout.tx_device == a, layout.rx_device == b
-        block = np.ix_(tx, rx)
+        block = layout.block_of(a, b)
         measured = layout.measured[block]
         have = float(np.mean(np.abs(csi[block][measured]) ** 2))
         if visible[block].any() or have == 0.0:
             continue
-        centres = layout.tx_xyz[tx].mean(axis=0), layout.rx_xyz[rx].mean(axis=0)
-        wanted = expected_power(head, gaussians, power, *centres, freq_hz)
+        wanted = expected_power(head, gaussians, power, *layout.centres_of(a, b), freq_hz)
         out[block] *= np.float32(np.sqrt(wanted / have))
     return out

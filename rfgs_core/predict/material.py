@@ -134,7 +134,6 @@ def material_sentence(levels: Levels, weights: dict[str, float]) -> str:
 
 def _some_links(layout: Layout, a: int, b: int) -> np.ndarray:
     """Some measured links of a device pair, spread over its elements; rows tx and rx."""
-    own = layout.measured & (layout.tx_device[:, None] == a) & (layout.rx_device == b)
-    links = np.stack(np.nonzero(own))
+    links = np.stack(np.nonzero(layout.measured & layout.links_between(a, b)))
     chosen = np.linspace(0, links.shape[1] - 1, min(LOOKS_PER_PAIR, links.shape[1])).astype(int)
     return links[:, chosen]

@@ -7,7 +7,7 @@ For Gaussian i, link l and subcarrier f (wavenumber k) the term without its gain
 
 Subcarriers are uniform, so z(f + df) = z(f) r(f) and r(f + df) = r(f) (1 + e), with r complex and
 e = exp(-dk^2 Q) - 1 real: eight multiplications and additions per term instead of three
-transcendental functions. Gaussians are processed in blocks of `LANES`, the innermost loops run
+transcendental functions. Gaussians are processed in blocks of `BLOCK`, the innermost loops run
 over the block and become SIMD code, and the recurrence starts afresh at every chunk of subcarriers.
 Within a chunk the gain is a polynomial in the subcarrier's offset from the chunk's centre, kappa:
 gain = sum_j gain_j kappa^j, so that knots of gamma stay out of the loops.
@@ -24,10 +24,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit, prange
 
-from rfgs_core.propagation.lanes import (
+from rfgs_core.propagation.vector_math import (
+    BLOCK,
     FAST_MATH,
-    FAST_SUMS,
-    LANES,
+    FAST_REDUCTION,
     exponential,
     scratch,
     sine_cosine_of_turns,
@@ -51,7 +51,7 @@ BY_AMPLITUDE, BY_DISTANCE, BY_SPREAD, MOMENTS = 18, 19, 20, 21
 ROWS = MOMENTS + 6
 
 OPTIONS: dict[str, Any] = {"fastmath": FAST_MATH, "cache": True, "error_model": "numpy"}
-_SUM_OPTIONS: dict[str, Any] = OPTIONS | {"fastmath": FAST_SUMS}
+_SUM_OPTIONS: dict[str, Any] = OPTIONS | {"fastmath": FAST_REDUCTION}
 
 
 class Cloud(NamedTuple):
@@ -221,8 +221,8 @@ def scatter_forward(cloud: Cloud, plan: Plan, out: np.ndarray) -> None:
     total = cloud.means.shape[1]
     for link in prange(plan.ends.shape[0]):
         w, distance = scratch(ROWS, cloud.shape), scratch(1, cloud.means)[0]
-        for first in range(0, total, LANES):
-            n = min(LANES, total - first)
+        for first in range(0, total, BLOCK):
+            n = min(BLOCK, total - first)
             illuminate(cloud, plan.ends[link], first, n, distance, w)
             see(cloud, plan.group[link], first, n, w)
             for c in range(plan.chunk.shape[0]):

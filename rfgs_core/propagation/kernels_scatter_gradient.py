@@ -51,7 +51,7 @@ from rfgs_core.propagation.kernels_scatter import (
     start_subcarriers,
     turn,
 )
-from rfgs_core.propagation.lanes import LANES, scratch, six_rows, three_rows
+from rfgs_core.propagation.vector_math import BLOCK, scratch, six_rows, three_rows
 
 
 class CloudGradient(NamedTuple):
@@ -205,10 +205,10 @@ def _chain_visibility(group: int, first: int, n: int, w: np.ndarray, grad: Cloud
 def scatter_backward(cloud: Cloud, plan: Plan, seed: np.ndarray, grad: CloudGradient) -> None:
     """Adds to `grad`, given seed[link, order, re/im, padded subcarrier] = G kappa^order."""
     total = cloud.means.shape[1]
-    for block in prange((total + LANES - 1) // LANES):
+    for block in prange((total + BLOCK - 1) // BLOCK):
         w, distance = scratch(ROWS, cloud.shape), scratch(1, cloud.means)[0]
-        first = block * LANES
-        n = min(LANES, total - first)
+        first = block * BLOCK
+        n = min(BLOCK, total - first)
         for link in range(plan.ends.shape[0]):
             illuminate(cloud, plan.ends[link], first, n, distance, w)
             see(cloud, plan.group[link], first, n, w)

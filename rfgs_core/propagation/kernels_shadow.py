@@ -4,7 +4,7 @@
 T = prod_i (1 - alpha_i e_i g_i) per path, g from `rfgs_core.propagation.fresnel` and e the fade
 at the ends of the leg. Positions and projected covariances are taken in double: det S of a thin
 Gaussian seen edge-on cancels. The rest runs in the precision of the Gaussians, over blocks of
-`LANES` of them from which those without a shadow are removed first.
+`BLOCK` of them from which those without a shadow are removed first.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ import numpy as np
 from numba import njit, prange
 
 from rfgs_core.propagation.fresnel import EDGE_M
-from rfgs_core.propagation.lanes import (
+from rfgs_core.propagation.vector_math import (
+    BLOCK,
     FAST_MATH,
-    LANES,
     exponential,
     scratch,
     sine_cosine_of_turns,
@@ -210,16 +210,16 @@ def shadow_forward(
     total = screens.means.shape[1]
     for path in prange(legs.shape[0]):
         w = scratch(_ROWS, screens.alpha)
-        index = np.zeros(LANES, dtype=np.int64)
+        index = np.zeros(BLOCK, dtype=np.int64)
         tr, ti = scratch(1, screens.alpha)[0], scratch(1, screens.alpha)[0]
         tr[:] = 1.0
-        for first in range(0, total, LANES):
-            n = min(LANES, total - first)
+        for first in range(0, total, BLOCK):
+            n = min(BLOCK, total - first)
             _project(screens, legs[path], wavelength_m, first, n, w)
             _spread(screens, legs[path], first, n, w)
             _multiply(_compact(n, w, index), w, tr, ti)
         x, y = 1.0, 0.0
-        for b in range(LANES):
+        for b in range(BLOCK):
             x, y = _product(x, y, tr[b], ti[b])
         out[path, 0], out[path, 1] = x, y
 
@@ -293,11 +293,11 @@ def shadow_backward(
 ) -> None:
     """Adds to `grad`, given real seed[path, re/im] = conj(dL/dT) T."""
     total = screens.means.shape[1]
-    for block in prange((total + LANES - 1) // LANES):
+    for block in prange((total + BLOCK - 1) // BLOCK):
         w = scratch(_ROWS, screens.alpha)
-        index = np.zeros(LANES, dtype=np.int64)
-        first = block * LANES
-        n = min(LANES, total - first)
+        index = np.zeros(BLOCK, dtype=np.int64)
+        first = block * BLOCK
+        n = min(BLOCK, total - first)
         for path in range(legs.shape[0]):
             if abs(seed[path, 0]) + abs(seed[path, 1]) < _LEAST**2:
                 continue

@@ -3,14 +3,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
-from jaxtyping import Bool, Complex, Float, Float64
+from jaxtyping import Bool, Complex, Float, Float64, Inexact, Int
 
 from rfgs_core.radio.presets import Radio
 
 
 def hann(count: int) -> Float64[np.ndarray, "subcarrier"]:
-    """Hann window whose zeros lie one subcarrier beyond the band, so that each of them counts."""
+    """Hann window whose zeros lie one sample beyond its ends, so that each of them counts."""
     return np.hanning(count + 2)[1:-1]
 
 
@@ -24,10 +26,33 @@ def hann_between(count: int) -> Float64[np.ndarray, "subcarrier"]:
     return 0.5 - 0.5 * np.cos(2.0 * np.pi * (np.arange(count) + 0.5) / count)
 
 
-def band_window(subcarriers: Bool[np.ndarray, "subcarrier"]) -> Float64[np.ndarray, "subcarrier"]:
-    """Hamming window over the band, zero at hidden subcarriers, sum 1."""
-    window = np.hamming(len(subcarriers)) * subcarriers
+def band_window(
+    subcarriers: Bool[np.ndarray, "subcarrier"],
+    taper: Callable[[int], np.ndarray] = np.hamming,
+) -> Float64[np.ndarray, "subcarrier"]:
+    """Window over the whole band, zero at hidden subcarriers, sum 1."""
+    window = taper(len(subcarriers)) * subcarriers
     return window / window.sum()
+
+
+def delay_transform(
+    values: Inexact[np.ndarray, "*link subcarrier"],
+    size: int,
+    place: Int[np.ndarray, "subcarrier"] | None = None,
+) -> Complex[np.ndarray, "*link delay"]:
+    """Inverse transform over subcarriers, Σ H_k e^{j2π k m / size} / size for each delay m.
+
+    Args:
+        values: Channels, windowed or not.
+        size: Delays over one period 1/Δf.
+        place: Number k of each subcarrier on the even grid that they stand on, negative below the
+            one that phases refer to; 0, 1, 2, … if None.
+    """
+    if place is None:
+        return np.fft.ifft(values, n=size, axis=-1)
+    grid = np.zeros((*values.shape[:-1], size), values.dtype)
+    grid[..., place % size] = values
+    return np.fft.ifft(grid, axis=-1)
 
 
 def delay_profile(
@@ -49,7 +74,7 @@ def delay_profile(
         Sample m of `samples_per_subcarrier` · subcarriers stands for the delay m / (samples · Δf).
     """
     size = samples_per_subcarrier * len(window)
-    response = np.fft.ifft(csi * window, n=size, axis=-1)
+    response = delay_transform(csi * window, size)
     return response * size if peak else response
 
 

@@ -87,6 +87,20 @@ class Layout:
         """Links from elements of device `a` to those of device `b`, measured or not."""
         return (self.tx_device[:, None] == a) & (self.rx_device[None, :] == b)
 
+    def block_of(
+        self, a: int, b: int
+    ) -> tuple[Int64[np.ndarray, "from 1"], Int64[np.ndarray, "1 to"]]:
+        """Elements of device `a` that transmit and of `b` that receive: `csi[block]` is theirs."""
+        tx, rx = np.flatnonzero(self.tx_device == a), np.flatnonzero(self.rx_device == b)
+        return tx[:, None], rx[None, :]
+
+    def centres_of(
+        self, a: int, b: int
+    ) -> tuple[Float64[np.ndarray, "3"], Float64[np.ndarray, "3"]]:
+        """Centres of the transmitting array of device `a` and of the receiving one of `b` [m]."""
+        tx = self.tx_xyz[self.tx_device == a].mean(axis=0)
+        return tx, self.rx_xyz[self.rx_device == b].mean(axis=0)
+
 
 def rotation(quat_wxyz: tuple[float, float, float, float]) -> Float64[np.ndarray, "3 3"]:
     """Rotation matrix of a quaternion, w first; the quaternion is normalised first."""

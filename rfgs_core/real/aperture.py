@@ -70,13 +70,13 @@ def judge_aperture(path: Path) -> dict[str, float | str]:
     data = capture.values[:, 0, 0, 0]
     aperture, count = _Aperture.of(capture), len(data)
     everything, quarter = np.arange(count), count // 4
-    held = {
+    held_out = {
         "last": everything[-quarter:],
         "middle": everything[3 * count // 8 : 3 * count // 8 + quarter],
         "every_fourth": everything[2::4],
     }
     result: dict[str, float | str] = {}
-    for name, test in held.items():
+    for name, test in held_out.items():
         train = np.setdiff1d(everything, test)
         for method, solve in (("omp", _omp), ("ours", _ours)):
             seen = aperture.see(solve(aperture, data[train], train), test)
@@ -116,18 +116,18 @@ def _posterior(
 ) -> Complex64[np.ndarray, "r x"]:
     """Mean of the picture: (A W Aᴴ + σ²)-regularised least squares in y = W^{−½} I."""
     root = np.sqrt(prior).astype(np.float32)
-    left = root * aperture.project(data, pulses)
-    found, step = np.zeros_like(left), left.copy()
-    size = first = float(np.vdot(left, left).real)
+    residual = root * aperture.project(data, pulses)
+    found, step = np.zeros_like(residual), residual.copy()
+    size = first = float(np.vdot(residual, residual).real)
     for _ in range(_STEPS):
         image = root * aperture.project(aperture.see(root * step, pulses), pulses) + noise * step
         length = size / float(np.vdot(step, image).real)
         found += length * step
-        left = left - length * image
-        size, before = float(np.vdot(left, left).real), size
+        residual = residual - length * image
+        size, before = float(np.vdot(residual, residual).real), size
         if size < 1e-6 * first:
             break
-        step = left + size / before * step
+        step = residual + size / before * step
     return root * found
 
 
@@ -135,21 +135,21 @@ def _omp(
     aperture: _Aperture, data: np.ndarray, pulses: Int64[np.ndarray, "pulse"]
 ) -> Complex64[np.ndarray, "r x"]:
     """Orthogonal matching pursuit on the same cells; gains are refitted every ten scatterers."""
-    left, columns, cells = data, [], []
+    residual, columns, cells = data, [], []
     gains = np.zeros(0, np.complex64)
     for number in range(1, _SCATTERERS + 1):
-        match = aperture.project(left, pulses)
+        match = aperture.project(residual, pulses)
         cell = np.unravel_index(int(np.abs(match).argmax()), match.shape)
         single = np.zeros_like(match)
         single[cell] = 1.0
         cells.append(cell)
         columns.append(aperture.see(single, pulses).ravel())
         if number % 10 and number != _SCATTERERS:
-            left = left - match[cell] / data.size * columns[-1].reshape(data.shape)
+            residual = residual - match[cell] / data.size * columns[-1].reshape(data.shape)
             continue
         matrix = np.stack(columns, axis=1)
         gains = np.linalg.lstsq(matrix, data.ravel(), rcond=None)[0]
-        left = data - (matrix @ gains).reshape(data.shape)
+        residual = data - (matrix @ gains).reshape(data.shape)
     picture = np.zeros((_RANGES, _ACROSS), np.complex64)
     for cell, gain in zip(cells, gains, strict=True):
         picture[cell] += gain

@@ -148,8 +148,8 @@ def _covariance(
     if number == 0:
         return _DIRECT * outer
     square = (point**2).sum(axis=1)
-    apart = np.maximum(square[:, None] + square - 2 * point @ point.T, 0.0)
-    return _REFLECTED * outer * (0.5 + 0.5 * np.exp(-0.5 * apart / length_m**2))
+    squared = np.maximum(square[:, None] + square - 2 * point @ point.T, 0.0)
+    return _REFLECTED * outer * (0.5 + 0.5 * np.exp(-0.5 * squared / length_m**2))
 
 
 def surfaces(room: _Room, csi: np.ndarray, train: Bool[np.ndarray, "receiver"]) -> list[_Surface]:
@@ -171,8 +171,8 @@ def surfaces(room: _Room, csi: np.ndarray, train: Bool[np.ndarray, "receiver"]) 
     chosen: list[_Surface] = []
     for _ in range(_SURFACES):
         own, _ = np.linalg.qr(basis)
-        left = csi[train] - own @ (own.conj().T @ csi[train])
-        gained = {s: _explained(rows, own, left) for s, rows in columns.items()}
+        residual = csi[train] - own @ (own.conj().T @ csi[train])
+        gained = {s: _explained(rows, own, residual) for s, rows in columns.items()}
         chosen.append(max(gained, key=lambda surface: gained[surface]))
         basis = np.concatenate([basis, columns[chosen[-1]]], axis=1)
     return chosen
@@ -183,7 +183,7 @@ def _columns(room: _Room, surface: _Surface) -> Complex[np.ndarray, "receiver 3"
     return channel[:, None] * np.stack([np.ones_like(cosine), cosine, cosine**2], axis=1)
 
 
-def _explained(rows: np.ndarray, own: np.ndarray, left: np.ndarray) -> float:
+def _explained(rows: np.ndarray, own: np.ndarray, residual: np.ndarray) -> float:
     """Power of a residual that some columns explain beyond others."""
     new, _ = np.linalg.qr(rows - own @ (own.conj().T @ rows))
-    return float((np.abs(new.conj().T @ left) ** 2).sum())
+    return float((np.abs(new.conj().T @ residual) ** 2).sum())

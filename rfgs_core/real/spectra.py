@@ -47,9 +47,9 @@ def judge_spectra(path: Path) -> dict[str, float | str]:
     result: dict[str, float | str] = {
         f"{name}_ssim": _ssim(pictures, answer) for name, answer in answers.items()
     }
-    held = capture.packets["test"]
-    if held.any() and not held.all():
-        test, train = np.flatnonzero(held), np.flatnonzero(~held)
+    test_pictures = capture.packets["test"]
+    if test_pictures.any() and not test_pictures.all():
+        test, train = np.flatnonzero(test_pictures), np.flatnonzero(~test_pictures)
         nearest = pictures[_nearest(places, test, train)]
         result["nearest_random_ssim"] = _ssim(pictures[test], nearest)
     return result
@@ -57,8 +57,8 @@ def judge_spectra(path: Path) -> dict[str, float | str]:
 
 def _nearest(places: np.ndarray, wanted: np.ndarray, among: np.ndarray) -> np.ndarray:
     """Index of the nearest of some places for each of others."""
-    apart = np.linalg.norm(places[wanted][:, None] - places[among], axis=2)
-    return among[apart.argmin(axis=1)]
+    distance = np.linalg.norm(places[wanted][:, None] - places[among], axis=2)
+    return among[distance.argmin(axis=1)]
 
 
 def _kriged(
@@ -85,8 +85,8 @@ def _kriged(
 
 
 def _covariance(one: np.ndarray, two: np.ndarray, length_m: float) -> np.ndarray:
-    apart = np.linalg.norm(one[:, None] - two, axis=2)
-    return np.exp(-apart / length_m)
+    distance = np.linalg.norm(one[:, None] - two, axis=2)
+    return np.exp(-distance / length_m)
 
 
 def _ssim(true: np.ndarray, predicted: np.ndarray) -> float:

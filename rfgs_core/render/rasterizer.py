@@ -52,11 +52,11 @@ def plan_splats(gaussians: Gaussians, camera: Camera) -> SplatPlan:
     """Projects and sorts M Gaussians for one camera; detached from autograd."""
     tiles = tile_splats(gaussians, camera)
     ones_and_depths = np.stack([np.ones_like(tiles.depths), tiles.depths], axis=1)
-    sums = _blend(ones_and_depths, tiles)
-    alpha = sums[..., 0]
+    blended = _blend(ones_and_depths, tiles)
+    alpha = blended[..., 0]
     covered = alpha > 0.0
     depth = np.full(alpha.shape, np.inf)
-    depth[covered] = sums[covered, 1] / alpha[covered]
+    depth[covered] = blended[covered, 1] / alpha[covered]
     return SplatPlan(
         tiles=tiles,
         alpha=torch.from_numpy(alpha.astype(np.float32)),

@@ -48,7 +48,7 @@ def splat_plain(
     opacities = torch.sigmoid(gaussians.logit_opacities.double())[order]
     values = torch.cat([rgb.double()[order], depths[:, None]], dim=1)
     top, bottom = rows or (0, camera.height)
-    sums, covers = [], []
+    blended, covers = [], []
     for pixels in _pixel_centres(top, bottom, camera.width).split(chunk_px):
         dx = pixels[:, :1] - centres[:, 0]
         dy = pixels[:, 1:] - centres[:, 1]
@@ -59,10 +59,10 @@ def splat_plain(
         light = torch.cumprod(1.0 - alpha, dim=1)
         before = torch.cat([torch.ones_like(light[:, :1]), light[:, :-1]], dim=1)
         weights = alpha * before
-        sums.append(weights @ values)
+        blended.append(weights @ values)
         covers.append(weights.sum(dim=1))
     shape = (bottom - top, camera.width)
-    total = torch.cat(sums).reshape(*shape, 4)
+    total = torch.cat(blended).reshape(*shape, 4)
     cover = torch.cat(covers).reshape(shape)
     infinite = torch.full_like(cover, torch.inf)
     depth = torch.where(cover > 0.0, total[..., 3] / cover.clamp_min(1e-12), infinite)

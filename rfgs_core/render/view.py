@@ -91,11 +91,11 @@ def pictures_of(run: TrainedRun, split: Split) -> list[tuple[str, int]]:
 
 def split_pictures(sequence: Sequence, frames: list[int], split: Split) -> list[tuple[str, int]]:
     """What `pictures_of` says of a run on these frames, also before there is one."""
-    held = sequence.splits["images"]
+    held_out = sequence.splits["images"]
     pictures = []
     for row in sequence.cameras:
         for frame in frames:
-            unseen = row["name"] in held["test_cameras"] or frame in held["test_frames"]
+            unseen = row["name"] in held_out["test_cameras"] or frame in held_out["test_frames"]
             if unseen == (split == "test"):
                 pictures.append((str(row["name"]), frame))
     return pictures

@@ -31,7 +31,7 @@ WORDS = {
     "spectrum": "kriging by angle and delay spectra",
 }
 #: No competitors: the fit that starts on the truth, and a part of the method itself.
-_APART = ("oracle_init", GAUSSIANS_ALONE)
+_NO_BASELINES = ("oracle_init", GAUSSIANS_ALONE)
 
 
 def strongest(metrics: Mapping[str, Any], group: str, key: str) -> tuple[str, float] | None:
@@ -39,7 +39,7 @@ def strongest(metrics: Mapping[str, Any], group: str, key: str) -> tuple[str, fl
     known = {
         name: part[group][key]
         for name, part in metrics["baselines"].items()
-        if name not in _APART and (part.get(group) or {}).get(key) is not None
+        if name not in _NO_BASELINES and (part.get(group) or {}).get(key) is not None
     }
     best = max(sorted(known), key=lambda name: known[name], default=None)
     return None if best is None else (best, known[best])

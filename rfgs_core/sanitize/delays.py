@@ -6,6 +6,8 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool, Complex, Float64, Int
 
+from rfgs_core.radio.delay import delay_transform
+
 
 def windowed_profile(
     values: Complex[np.ndarray, "*link bin"],
@@ -35,10 +37,9 @@ def windowed_profile(
     place = (index - index[0]) // step
     window = np.hamming(count)[place] if count > 1 else np.ones(1)
     window = window * (1.0 if valid is None else valid)
-    grid = np.zeros((*values.shape[:-1], count), np.complex128)
-    grid[..., place] = values * window / max(window.sum(), 1e-300)
     size = oversample * count
-    profile = np.fft.ifft(grid, n=size, axis=-1) * size
+    weighed = values.astype(np.complex128) * window / max(window.sum(), 1e-300)
+    profile = delay_transform(weighed, size, place) * size
     delay_s = np.arange(size) / (size * step * spacing_hz)
     # The first bin is not the centre: its offset turns every delay by a known phase.
     return delay_s, profile * np.exp(2j * np.pi * index[0] * spacing_hz * delay_s)

@@ -65,20 +65,20 @@ def phase_step(
     axis = (-2, -1) if shared else -1
     if len(index) < 2:
         return np.zeros(values.shape[:-2] if shared else values.shape[:-1])
-    apart = np.diff(index)
-    near = np.flatnonzero(apart == apart.min())
+    spacing = np.diff(index)
+    near = np.flatnonzero(spacing == spacing.min())
     products = np.conj(values[..., near]) * values[..., near + 1]
-    step = np.angle(products.sum(axis=axis)) / apart.min()
-    if 2 * len(near) >= len(apart):
+    step = np.angle(products.sum(axis=axis)) / spacing.min()
+    if 2 * len(near) >= len(spacing):
         return step
     # Pairs across a wide hole turn too far to tell by.
-    close = np.flatnonzero(apart <= 2 * apart.min())
+    close = np.flatnonzero(spacing <= 2 * spacing.min())
     products = np.conj(values[..., close]) * values[..., close + 1]
     shaped = step[..., None, None] if shared else step[..., None]
-    left = products * np.exp(-1j * shaped * apart[close])
+    left = products * np.exp(-1j * shaped * spacing[close])
     weight = np.abs(products)
-    mean = (weight * apart[close]).sum(axis=axis) / np.maximum(weight.sum(axis=axis), 1e-30)
-    return step + np.angle(left.sum(axis=axis)) / np.maximum(mean, apart.min())
+    mean = (weight * spacing[close]).sum(axis=axis) / np.maximum(weight.sum(axis=axis), 1e-30)
+    return step + np.angle(left.sum(axis=axis)) / np.maximum(mean, spacing.min())
 
 
 def _fill(

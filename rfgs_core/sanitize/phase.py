@@ -99,9 +99,9 @@ def remove_linear_phase(
     if offset:
         still = rows * np.exp(-1j * slope[:, None, None] * known)
         # One link tells the phase of all: sums over antennas cancel where these point apart.
-        sums = still.sum(axis=2)
-        clearest = int(np.abs(sums).mean(axis=0).argmax())
-        turn = turn * np.exp(-1j * np.angle(sums[:, clearest]))[:, None]
+        combined = still.sum(axis=2)
+        clearest = int(np.abs(combined).mean(axis=0).argmax())
+        turn = turn * np.exp(-1j * np.angle(combined[:, clearest]))[:, None]
     shaped = turn.reshape(len(values), *[1] * (values.ndim - 2), -1)
     return (values * shaped).astype(values.dtype)
 

@@ -196,8 +196,8 @@ class FastTracer:
                 body = posed[kept]
                 near = near_segments(paths, body, float(self._grid.max()))
                 free = partial(free_segments, standing)
-                beside = segments_in_view(free, paths.vertices, body, mesh.faces, near)
-                outlines.append(Outline(body, mesh, beside))
+                seen = segments_in_view(free, paths.vertices, body, mesh.faces, near)
+                outlines.append(Outline(body, mesh, seen))
         return outlines
 
     def _look(self, room: Room) -> Surroundings:

@@ -41,7 +41,7 @@ _NEAREST_M = 0.02
 #: Steps of the search, as a share of the range resolution c/B, and no more than this [m].
 _STEP, _STEP_M = 0.125, 0.02
 #: Materials that walls may be made of.
-_CHOICE = ("plasterboard", "wood", "glass", "concrete", "metal")
+_MATERIALS = ("plasterboard", "wood", "glass", "concrete", "metal")
 #: Cosines of the angles of incidence over which their reflection is averaged.
 _COSINES = np.linspace(0.3, 1.0, 15)
 
@@ -73,7 +73,7 @@ class _Pair(NamedTuple):
     """Transmitting element of each link [m], shape (link, 3)."""
     rx: np.ndarray
     """Receiving element of each [m], shape (link, 3)."""
-    left: np.ndarray
+    residual: np.ndarray
     """What is not explained yet, complex128, shape (link, subcarrier)."""
     direct: float
     """Gain of the line of sight."""
@@ -119,7 +119,7 @@ def find_walls(
     for _ in range(_ROUNDS):
         for n, (wall, gains) in enumerate(found):
             for pair, gain in zip(pairs, gains, strict=True):
-                pair.left[:] += gain * _channel(pair, wall.axis, wall.at_m, band)
+                pair.residual[:] += gain * _channel(pair, wall.axis, wall.at_m, band)
             again = _best(pairs, band, wall.axis, wall.high, hull, away)
             found[n] = _taken(pairs, again, band)
     return sorted((wall for wall, _ in found), key=lambda wall: -wall.gain)
@@ -167,12 +167,14 @@ def _pairs(csi_static: np.ndarray, layout: Layout, band: tuple[float, float]) ->
         tx, rx = np.nonzero(layout.links_between(a, b) & layout.measured)
         some = np.unique(np.linspace(0, len(tx) - 1, _LINKS).round().astype(int))
         tx, rx = tx[some], rx[some]
-        left = csi_static[tx, rx].astype(np.complex128)
-        if not np.abs(left).any():
+        residual = csi_static[tx, rx].astype(np.complex128)
+        if not np.abs(residual).any():
             continue
-        pair = _Pair(layout.tx_xyz[tx], layout.rx_xyz[rx], left, 1.0, 0.0)
-        direct = _take(pair, _waves(pair.tx, pair.rx, *band, left.shape[1]))
-        pairs.append(pair._replace(direct=max(abs(direct), 1e-30), floor=_MISSED * _power(left)))
+        pair = _Pair(layout.tx_xyz[tx], layout.rx_xyz[rx], residual, 1.0, 0.0)
+        direct = _take(pair, _waves(pair.tx, pair.rx, *band, residual.shape[1]))
+        pairs.append(
+            pair._replace(direct=max(abs(direct), 1e-30), floor=_MISSED * _power(residual))
+        )
     if not pairs:
         raise RfgsError("walls: csi_static is zero for every measured link")
     return pairs
@@ -184,8 +186,8 @@ def _power(values: np.ndarray) -> float:
 
 def _take(pair: _Pair, wave: np.ndarray) -> complex:
     """Takes a wave out of what is left, at the gain that explains most of it, and returns that."""
-    gain = complex(np.vdot(wave, pair.left) / np.vdot(wave, wave).real)
-    pair.left[:] -= gain * wave
+    gain = complex(np.vdot(wave, pair.residual) / np.vdot(wave, wave).real)
+    pair.residual[:] -= gain * wave
     return gain
 
 
@@ -200,7 +202,7 @@ def _channel(pair: _Pair, axis: int, at_m: float, band: tuple[float, float]) -> 
     """Channel of the transmitters' images in a plane, of unit gain, (link, subcarrier)."""
     image = pair.tx.copy()
     image[:, axis] = 2.0 * at_m - image[:, axis]
-    return _waves(image, pair.rx, *band, pair.left.shape[1])
+    return _waves(image, pair.rx, *band, pair.residual.shape[1])
 
 
 def _best(
@@ -215,8 +217,8 @@ def _best(
     at = hull[int(high), axis] + (away if high else -away)
     gain = np.zeros(len(at))
     for pair in pairs:
-        power = _power(pair.left) + pair.floor
-        gain -= np.log1p(-_explains(pair.tx, pair.rx, axis, at, *band, pair.left) / power)
+        power = _power(pair.residual) + pair.floor
+        gain -= np.log1p(-_explains(pair.tx, pair.rx, axis, at, *band, pair.residual) / power)
     i = int(np.argmax(gain))
     place = at[i]
     if 0 < i < len(at) - 1:
@@ -247,7 +249,7 @@ def _explains(
     at_m: np.ndarray,
     first_k: float,
     step_k: float,
-    left: np.ndarray,
+    residual: np.ndarray,
 ) -> np.ndarray:
     """Power of a pair that a wall at each place explains, shape (place,)."""
     explained = np.zeros(len(at_m))
@@ -262,10 +264,10 @@ def _explains(
                 squared += away * away
             d = np.sqrt(squared)
             wave, turn = np.exp(1j * first_k * d) / d, np.exp(1j * step_k * d)
-            for f in range(left.shape[1]):
-                sum_of += wave * left[link, f]
+            for f in range(residual.shape[1]):
+                sum_of += wave * residual[link, f]
                 wave *= turn
-            weight += left.shape[1] / squared
+            weight += residual.shape[1] / squared
         explained[i] = np.abs(sum_of) ** 2 / weight
     return explained
 
@@ -278,6 +280,6 @@ def _material(reflection: float, radio: Radio) -> SlabMaterial:
         power = np.abs(factors.reflected_te) ** 2 + np.abs(factors.reflected_tm) ** 2
         return float(np.sqrt(0.5 * power.mean()))
 
-    known = [name for name in _CHOICE if MATERIALS[name].covers(radio)]
+    known = [name for name in _MATERIALS if MATERIALS[name].covers(radio)]
     name = min(known, key=lambda name: abs(np.log(reflects(name) / max(reflection, 1e-6))))
     return SlabMaterial(name, MATERIALS[name].thickness_m)

@@ -15,15 +15,15 @@ from rfgs_core.study.cases import Case
 #: Baselines whose best F10 the method's is held against.
 RIVALS = ("matched_filter", "clean", "omp")
 #: Share of the best rival's error 1 − F10 that is to be cut, or of its gap to the ceiling closed.
-CUT_MARK = {"wifi": 0.5, "mmwave": 0.4, "uwb": 0.4}
+CUT_TARGET = {"wifi": 0.5, "mmwave": 0.4, "uwb": 0.4}
 #: Largest distance between a person's true centroid and that of the body found [m].
-CENTROID_MARK_M = {"wifi": 0.25, "mmwave": 0.10, "uwb": 0.10}
+CENTROID_TARGET_M = {"wifi": 0.25, "mmwave": 0.10, "uwb": 0.10}
 #: F-scores in which the template is to be beaten.
-TEMPLATE_MARKS = {"wifi": ("f10",), "mmwave": ("f05", "f10"), "uwb": ("f05", "f10")}
+TEMPLATE_TARGETS = {"wifi": ("f10",), "mmwave": ("f05", "f10"), "uwb": ("f05", "f10")}
 #: Least share of people whose body's centroid is within half a metre.
-FOUND_MARK = 0.95
+FOUND_TARGET = 0.95
 #: Decibels above linear interpolation that held-out elements are to reach.
-ELEMENT_MARK_DB = 6.0
+ELEMENT_TARGET_DB = 6.0
 #: Baselines that only interpolate the channel.
 INTERPOLATORS = ("linear", "gaussian_process", "spectrum")
 
@@ -139,12 +139,15 @@ def _targets(radio: str, values: Mapping[str, float | None]) -> dict[str, bool |
     kept = values["identity_kept"]
     shares = [share for share in (values["cut"], values["gap"]) if share is not None]
     return {
-        "cut": max(shares) >= CUT_MARK[radio] if shares else None,
-        **{f"template_{key}": better(key, f"template_{key}", 0.0) for key in TEMPLATE_MARKS[radio]},
-        "centroid": _less(values["centroid_m"], CENTROID_MARK_M[radio]),
-        "found": above("found", FOUND_MARK),
+        "cut": max(shares) >= CUT_TARGET[radio] if shares else None,
+        **{
+            f"template_{key}": better(key, f"template_{key}", 0.0)
+            for key in TEMPLATE_TARGETS[radio]
+        },
+        "centroid": _less(values["centroid_m"], CENTROID_TARGET_M[radio]),
+        "found": above("found", FOUND_TARGET),
         "identity": None if kept is None else kept == 1.0,
-        "linear": better("element_snr_db", "linear_snr_db", ELEMENT_MARK_DB),
+        "linear": better("element_snr_db", "linear_snr_db", ELEMENT_TARGET_DB),
         "gaussian_process": better("element_snr_db", "gaussian_process_snr_db", 0.0),
         "pair_gain": _less(values["device_gain_mae_db"], values["baseline_device_gain_mae_db"]),
         "profiles": better("delay_profile_corr", "baseline_delay_profile_corr", 0.0),

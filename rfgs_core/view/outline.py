@@ -40,5 +40,5 @@ def level_lines(mesh: Mesh, spacing_m: float = SPACING_M) -> Float32[np.ndarray,
         crossed[:, edge] = (low < 0) != (high < 0)
         share = np.divide(low, low - high, out=np.zeros_like(low), where=low != high)
         ends[:, edge] = cut[:, edge] + share[:, None] * (cut[:, (edge + 1) % 3] - cut[:, edge])
-    met = crossed.sum(axis=1) == 2
-    return ends[met][crossed[met]].reshape(-1, 2, 3).astype(np.float32)
+    crosses = crossed.sum(axis=1) == 2
+    return ends[crosses][crossed[crosses]].reshape(-1, 2, 3).astype(np.float32)

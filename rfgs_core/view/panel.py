@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rfgs_core.view.colors import TITLES
-from rfgs_core.view.pictures import Beside
+from rfgs_core.view.pictures import ComparedPicture
 from rfgs_core.view.selection import ColorMode, Selection, TruthDrawing
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ class Panel:
                 self._add_pictures(gui, offer, start)
             below.dock_below(gui.main_panel)
 
-    def choice(self) -> Selection:
+    def selection(self) -> Selection:
         """What is chosen now."""
         value = {name: handle.value for name, handle in self._inputs.items()}
         nearest = int(self._frames[np.abs(self._frames - value["frame"]).argmin()])
@@ -123,7 +123,7 @@ class Panel:
 
     def next_frame(self) -> tuple[int, int]:
         """The frame shown and the one after it; the first follows the last."""
-        frame = self.choice().frame
+        frame = self.selection().frame
         index = int(np.flatnonzero(self._frames == frame)[0])
         return frame, int(self._frames[(index + 1) % len(self._frames)])
 
@@ -147,10 +147,10 @@ class Panel:
         self._shown.content = shown
         self._legend.content = legend
 
-    def show_picture(self, beside: Beside) -> None:
+    def show_picture(self, shown: ComparedPicture) -> None:
         """Replaces the rendered picture and its caption."""
-        self._picture.image = beside.picture
-        self._caption.content = beside.caption
+        self._picture.image = shown.picture
+        self._caption.content = shown.caption
 
     def _add_time(self, gui: Any, start: Selection, play: bool) -> None:
         first, last, step = self._ends_and_step()

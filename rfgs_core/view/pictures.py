@@ -13,7 +13,7 @@ from rfgs_core.render.view import camera_of, pictures_of, render_view
 from rfgs_core.run import Run
 
 
-class Beside(NamedTuple):
+class ComparedPicture(NamedTuple):
     """What a camera sees of a frame."""
 
     picture: UInt8[np.ndarray, "h w 3"]
@@ -25,7 +25,7 @@ class Beside(NamedTuple):
     """What stands where, and whether the shader was fitted to the true picture."""
 
 
-def beside_true(run: Run, camera: str, frame: int) -> Beside:
+def rendered_and_true(run: Run, camera: str, frame: int) -> ComparedPicture:
     """Renders a frame through a camera of the dataset.
 
     Raises:
@@ -34,9 +34,11 @@ def beside_true(run: Run, camera: str, frame: int) -> Beside:
     """
     rendered = to_bytes(render_view(run, camera_of(run.sequence, camera), frame).rgb)
     if not run.sequence.files.image(camera, frame).is_file():
-        return Beside(enlarged(rendered, WIDTH_PX), "rendered; the dataset has no true picture")
+        return ComparedPicture(
+            enlarged(rendered, WIDTH_PX), "rendered; the dataset has no true picture"
+        )
     true = run.sequence.image(camera, frame)[..., :3]
     seen = (camera, frame) in pictures_of(run, "train")
     fitted = "the shader was fitted to it" if seen else "the shader never saw it"
     both = enlarged(side_by_side(rendered, true), WIDTH_PX)
-    return Beside(both, f"left: rendered; right: true, {fitted}")
+    return ComparedPicture(both, f"left: rendered; right: true, {fitted}")

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float64
 
 from rfgs_core.dataset import Sequence
-from rfgs_core.radio import DevicePose, Layout, frame_samples
+from rfgs_core.radio import DevicePose, frame_samples
 from rfgs_core.radio.layout import rotation
 
 
@@ -45,7 +45,7 @@ def radio_shapes(sequence: Sequence, radio: str) -> RadioShapes:
         boresights=np.array([_boresight(device) for device in devices]),
         tx_xyz=elements.tx_xyz if samples.tx_xyz is None else samples.tx_xyz.reshape(-1, 3),
         rx_xyz=elements.rx_xyz if samples.rx_xyz is None else samples.rx_xyz.reshape(-1, 3),
-        links=np.array([_link(elements, pair) for pair in pairs]).reshape(-1, 2, 3),
+        links=np.array([elements.centres_of(*pair) for pair in pairs]).reshape(-1, 2, 3),
         held_out=np.array([frozenset(pair) in hidden for pair in pairs], dtype=bool),
     )
 
@@ -53,9 +53,3 @@ def radio_shapes(sequence: Sequence, radio: str) -> RadioShapes:
 def _boresight(device: DevicePose) -> Float64[np.ndarray, "3"]:
     """Local +X."""
     return rotation(device.quat_wxyz)[:, 0]
-
-
-def _link(elements: Layout, pair: tuple[int, int]) -> Float64[np.ndarray, "2 3"]:
-    tx = elements.tx_xyz[elements.tx_device == pair[0]].mean(axis=0)
-    rx = elements.rx_xyz[elements.rx_device == pair[1]].mean(axis=0)
-    return np.stack([tx, rx])

@@ -112,7 +112,7 @@ def _labelled(picture: Image.Image, viewer: Viewer, time_s: float) -> UInt8[np.n
     """A picture with its time, and what its colours mean, below."""
     from matplotlib.font_manager import findfont
 
-    mode = viewer.panel.choice().mode
+    mode = viewer.panel.selection().mode
     width, height = picture.size
     page = Image.new("RGB", (width, height + _BAR_PX), (24, 26, 31))
     page.paste(picture, (0, 0))

@@ -73,16 +73,16 @@ class Stage:
         frame: ShownFrame,
         rows: Bool[np.ndarray, "M"],
         rgb: Float[np.ndarray, "M 3"],
-        choice: Selection,
+        selection: Selection,
     ) -> None:
         """Replaces the Gaussians by those of the marked rows."""
-        if choice.drawn_as == "points" or not rows.any():
+        if selection.drawn_as == "points" or not rows.any():
             handle = self._scene.add_point_cloud(
                 "/points", frame.means[rows], rgb[rows],
                 point_size=_GAUSSIAN_M, point_shape="circle", precision="float32",
             )  # fmt: skip
         else:
-            opacities = np.minimum(frame.opacities[rows] * choice.brightness, 1.0)
+            opacities = np.minimum(frame.opacities[rows] * selection.brightness, 1.0)
             handle = self._scene.add_gaussian_splats(
                 "/splats", frame.means[rows], frame.covariances[rows], rgb[rows],
                 opacities[:, None],
@@ -179,11 +179,11 @@ class Stage:
             client.camera.position = camera.position_m
             client.camera.fov = _fov_rad(camera)
 
-    def set_visible(self, choice: Selection) -> None:
+    def set_visible(self, selection: Selection) -> None:
         """Shows and hides groups as chosen."""
-        shown = {name: getattr(choice, name) for name in SCENE_TICKS}
-        shown |= {name: choice.truth == name for name in ("outline", "surface")}
-        shown["truth"] = choice.truth != "hidden"
+        shown = {name: getattr(selection, name) for name in SCENE_TICKS}
+        shown |= {name: selection.truth == name for name in ("outline", "surface")}
+        shown["truth"] = selection.truth != "hidden"
         for name, visible in shown.items():
             for handle in self._groups.get(name, []):
                 handle.visible = visible

@@ -17,7 +17,7 @@ from rfgs_core.view.colors import PREFERRED, colors_of, legend_html, scales_of
 from rfgs_core.view.frame import ShownFrame
 from rfgs_core.view.frames import Frames, where_people_are
 from rfgs_core.view.panel import Offer, Panel
-from rfgs_core.view.pictures import beside_true
+from rfgs_core.view.pictures import rendered_and_true
 from rfgs_core.view.radios import RadioShapes, radio_shapes
 from rfgs_core.view.room import Room, room_of
 from rfgs_core.view.selection import GAUSSIAN_FIELDS, ColorMode, Selection
@@ -127,27 +127,27 @@ class Viewer:
 
     def update(self) -> None:
         """Draws whatever has been chosen since the last time."""
-        choice, before = self.panel.choice(), self._drawn
-        self._drawn = choice
-        frame = self.frames.read(choice.frame)
+        selection, before = self.panel.selection(), self._drawn
+        self._drawn = selection
+        frame = self.frames.read(selection.frame)
         with self.server.atomic():
-            if choice.differs(before, *GAUSSIAN_FIELDS):
-                self._show_gaussians(frame, choice)
-            if choice.differs(before, "frame"):
+            if selection.differs(before, *GAUSSIAN_FIELDS):
+                self._show_gaussians(frame, selection)
+            if selection.differs(before, "frame"):
                 self.stage.draw_truth(frame.truth)
-                self.stage.draw_skeletons(self.frames.bones(choice.frame))
-            self.stage.set_visible(choice)
-        if choice.camera is not None and choice.differs(before, "frame", "camera"):
-            self.panel.show_picture(beside_true(self._run, choice.camera, choice.frame))
+                self.stage.draw_skeletons(self.frames.bones(selection.frame))
+            self.stage.set_visible(selection)
+        if selection.camera is not None and selection.differs(before, "frame", "camera"):
+            self.panel.show_picture(rendered_and_true(self._run, selection.camera, selection.frame))
 
-    def _show_gaussians(self, frame: ShownFrame, choice: Selection) -> None:
-        scale = self.scales[choice.mode]
+    def _show_gaussians(self, frame: ShownFrame, selection: Selection) -> None:
+        scale = self.scales[selection.mode]
         strongest_db = float(np.nanmax(frame.power_db, initial=-np.inf))
-        rows = frame.rows(choice.min_opacity, strongest_db - choice.below_peak_db)
-        self.stage.draw_gaussians(frame, rows, colors_of(frame, choice.mode, scale), choice)
+        rows = frame.rows(selection.min_opacity, strongest_db - selection.below_peak_db)
+        self.stage.draw_gaussians(frame, rows, colors_of(frame, selection.mode, scale), selection)
         self.panel.tell(
-            f"{self.time_s(choice.frame):.2f} s, {rows.sum():,} of {len(frame):,} Gaussians",
-            legend_html(choice.mode, scale),
+            f"{self.time_s(selection.frame):.2f} s, {rows.sum():,} of {len(frame):,} Gaussians",
+            legend_html(selection.mode, scale),
         )
 
     def _advance(self) -> float:
@@ -157,7 +157,7 @@ class Viewer:
         return max(self.time_s(following) - self.time_s(now), 1.0 / self._run.sequence.fps)
 
     def _look(self, client: ClientHandle | None) -> None:
-        camera = self.panel.choice().camera
+        camera = self.panel.selection().camera
         if camera is not None and client is not None:
             self.stage.look_through(client, self._cameras[camera])
 

@@ -23,6 +23,7 @@ from jaxtyping import Bool, Complex128, Float64
 
 from rfgs_core.encode.body_maps import AZIMUTHS, ELEVATIONS, ArrayEnd, Ranges, View
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.radio.delay import delay_transform
 
 #: Direction cosines and resolution cells are tabulated in steps of one over this.
 _PER_COSINE, _PER_CELL = 128, 32
@@ -66,7 +67,7 @@ class Band(NamedTuple):
         size = len(freq_hz) * _PER_CELL
         sample = np.arange(-reach * _PER_CELL, reach * _PER_CELL + 1)
         to_centre = np.exp(-1j * np.pi * (len(freq_hz) - 1) / size * sample)
-        response = np.fft.ifft(weights, size)[sample % size] * size * to_centre
+        response = delay_transform(weights, size)[sample % size] * size * to_centre
         cell_m = SPEED_OF_LIGHT / (spacing_hz * len(freq_hz))
         return Band(2.0 * np.pi * centre_hz / SPEED_OF_LIGHT, cell_m, response, reach, skin)
 

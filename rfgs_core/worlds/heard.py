@@ -12,9 +12,10 @@ import numpy as np
 from jaxtyping import Bool, Float32, Float64
 
 from rfgs_core.articulated import Pose, people
-from rfgs_core.encode.body_maps import CENTRE_HEIGHT_M, ArrayEnd, View, band_weights, views_of
+from rfgs_core.encode.body_maps import CENTRE_HEIGHT_M, ArrayEnd, View, views_of
 from rfgs_core.radio import Radio
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.radio.delay import band_window, hann
 from rfgs_core.radio.tissue import normal_reflection, skin_permittivity
 from rfgs_core.seeds import sub_seed
 from rfgs_core.worlds.echoes import Band, Listener, Seen, mirrored
@@ -95,7 +96,7 @@ def _moments(
         sight = Sight.random(rng, radio, room, spot)
         if sight is None:
             continue
-        band = Band.of(sight.freq_hz, band_weights(sight.subcarriers), _skin(radio.centre_hz))
+        band = Band.of(sight.freq_hz, band_window(sight.subcarriers, hann), _skin(radio.centre_hz))
         pose = motion.at(float(rng.uniform(0.0, motion.duration_s)))
         pose = pose.turned(about(Z, float(rng.uniform(-np.pi, np.pi))))
         # Wherever the motion has led, somebody is at this spot now.
@@ -120,7 +121,7 @@ def body_echoes(
     facets = posed.points, posed.normals, figure.areas_m2
     points, normals, areas = (np.ascontiguousarray(values[::_EVERY]) for values in facets)
     direct = _Sights(lambda place: seen_from(posed, figure.body.faces, place), _SAME_PLACE_M)
-    by_walls = _Sights(lambda place: seen_roughly(points, normals, place, centre), _SAME_IMAGE_M)
+    by_bounces = _Sights(lambda place: seen_roughly(points, normals, place, centre), _SAME_IMAGE_M)
     above = [posed.points[:, 2] > height for height in sight.above_m.tolist()]
     maps = []
     for view in views:
@@ -130,11 +131,11 @@ def body_echoes(
         by_rx = direct.of(view.rx.centre) & above[view.pair[1]]
         listener.add(out, Seen(*facets, by_tx, by_rx), view.tx, view.rx)
         thin_tx, thin_rx = by_tx[::_EVERY], by_rx[::_EVERY]
-        for tx, rx, gain in _by_walls(view, room, centre):
-            met = thin_tx if tx is view.tx else by_walls.of(tx.centre)
-            heard = thin_rx if rx is view.rx else by_walls.of(rx.centre)
+        for tx, rx, gain in _by_bounces(view, room, centre):
+            sent = thin_tx if tx is view.tx else by_bounces.of(tx.centre)
+            heard = thin_rx if rx is view.rx else by_bounces.of(rx.centre)
             listener.add(
-                out, Seen(points, normals, areas, met, heard), tx, rx, gain * math.sqrt(_EVERY)
+                out, Seen(points, normals, areas, sent, heard), tx, rx, gain * math.sqrt(_EVERY)
             )
         maps.append(np.abs(out * band.skin) ** 2)
     return np.array(maps, dtype=np.float32)
@@ -156,7 +157,7 @@ class _Sights:
         return self._known[-1][1]
 
 
-def _by_walls(
+def _by_bounces(
     view: View, room: Room, centre: Float64[np.ndarray, "3"]
 ) -> Iterator[tuple[ArrayEnd, ArrayEnd, float]]:
     """Ends of a view with one of them behind a wall, and the wall's amplitude."""

@@ -44,9 +44,9 @@ class Blocks:
         """Subcarriers scaled to equal power (section 3.6), then pairs to an RMS of one."""
         normal, _ = normalise_subcarriers(seen.delta, seen.links)
         _, pairs = seen.pairs
-        tx = np.array([np.flatnonzero(seen.layout.tx_device == a) for a, _ in pairs])
-        rx = np.array([np.flatnonzero(seen.layout.rx_device == b) for _, b in pairs])
-        rows = (tx[:, :, None], rx[:, None, :])
+        elements = [seen.layout.block_of(*pair) for pair in pairs]
+        rows = (np.array([tx for tx, _ in elements]), np.array([rx for _, rx in elements]))
+        tx, rx = rows[0][:, :, 0], rows[1][:, 0]
         visible = seen.links[rows][..., None] & seen.subcarriers
         csi = np.where(visible, normal[rows], 0)
         return Blocks(

@@ -10,7 +10,7 @@ import torch
 from jaxtyping import Complex, Float, Float32, Float64
 from torch import Tensor, nn
 
-from rfgs_core.encode.back_projection import POINTS, images, oversampled_profiles
+from rfgs_core.encode.back_projection import POINTS, back_project, oversampled_profiles
 from rfgs_core.encode.learned.attention import PairAttention
 from rfgs_core.encode.learned.blocks import Blocks
 from rfgs_core.encode.learned.networks import NETWORKS, NetworkKind
@@ -124,9 +124,16 @@ class LearnedEncoder:
         pair: np.ndarray,
         points: Float64[np.ndarray, "N 3"],
     ) -> Float32[np.ndarray, "N 32"]:
-        geometry = (seen.layout.tx_xyz, seen.layout.rx_xyz, pair, points)
         parts = [
-            images(profile, np.full(_CHANNELS, centre_k), samples_per_m, *geometry)
+            back_project(
+                profile,
+                centre_k=np.full(_CHANNELS, centre_k),
+                samples_per_m=samples_per_m,
+                tx_xyz=seen.layout.tx_xyz,
+                rx_xyz=seen.layout.rx_xyz,
+                pair=pair,
+                points=points,
+            )
             for profile, centre_k, samples_per_m in profiles
         ]
         focused = torch.from_numpy(np.concatenate(parts, axis=1))

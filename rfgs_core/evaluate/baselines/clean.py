@@ -30,14 +30,14 @@ LEAST_GAIN = 1e-3
 
 def separated_peaks(points: np.ndarray, power: np.ndarray, count: int) -> list[int]:
     """Indices of the brightest points that keep their distance."""
-    left = power.astype(np.float64).copy()
+    remaining = power.astype(np.float64).copy()
     chosen = []
     for _ in range(count):
-        best = int(left.argmax())
-        if left[best] <= 0.0:
+        best = int(remaining.argmax())
+        if remaining[best] <= 0.0:
             break
         chosen.append(best)
-        left[np.linalg.norm(points - points[best], axis=1) < SEPARATION_M] = 0.0
+        remaining[np.linalg.norm(points - points[best], axis=1) < SEPARATION_M] = 0.0
     return chosen
 
 

@@ -11,10 +11,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from jaxtyping import Complex, Float, Int
+from jaxtyping import Complex, Int
 
 from rfgs_core.evaluate.evidence import BaselineResult, Evidence
-from rfgs_core.radio import Layout
 from rfgs_core.radio.levels import decibels, power_of
 
 #: Values at `wanted` coordinates from values at `known` ones: (values [known, sample], known
@@ -52,13 +51,14 @@ def fill(
     layout, subcarrier_visible = evidence.layout, evidence.subcarrier_visible
     out = np.zeros_like(field)
     pairs: dict[tuple[int, int], np.ndarray] = {}
-    for (a, b), (tx, rx) in _device_blocks(layout).items():
-        seen = evidence.link_visible[np.ix_(tx, rx)].any(axis=0)
+    for pair in layout.device_pairs:
+        tx, rx = layout.block_of(*pair)
+        seen = evidence.link_visible[tx, rx].any(axis=0)
         if not seen.any():
             continue
-        block = _fill_subcarriers(field[np.ix_(tx, rx[seen])], subcarrier_visible, along)
-        block = _fill_columns(block, layout.rx_column[rx], seen, along)
-        out[np.ix_(tx, rx)] = pairs[a, b] = block
+        block = _fill_subcarriers(field[tx, rx[:, seen]], subcarrier_visible, along)
+        block = _fill_columns(block, layout.rx_column[rx[0]], seen, along)
+        out[tx, rx] = pairs[pair] = block
     _fill_pairs(out, pairs, evidence, level_db)
     out[~layout.measured] = 0.0
     return out
@@ -74,24 +74,13 @@ def completed(
 
     Between devices that heard nothing of each other the prediction stays as it is.
     """
-    left = field - np.where(np.isnan(field), 0.0, predicted)
-    residual = fill(left.astype(np.complex64), evidence, along)
-    for tx, rx in _device_blocks(evidence.layout).values():
-        block = np.ix_(tx, rx)
+    unexplained = field - np.where(np.isnan(field), 0.0, predicted)
+    residual = fill(unexplained.astype(np.complex64), evidence, along)
+    for pair in evidence.layout.device_pairs:
+        block = evidence.layout.block_of(*pair)
         if not evidence.link_visible[block].any():
             residual[block] = 0.0
     return predicted + residual
-
-
-def _device_blocks(layout: Layout) -> dict[tuple[int, int], tuple[np.ndarray, np.ndarray]]:
-    """Elements of each ordered pair of devices that has a measured link."""
-    blocks = {}
-    for a in np.unique(layout.tx_device):
-        for b in np.unique(layout.rx_device):
-            tx, rx = np.flatnonzero(layout.tx_device == a), np.flatnonzero(layout.rx_device == b)
-            if layout.measured[np.ix_(tx, rx)].any():
-                blocks[int(a), int(b)] = (tx, rx)
-    return blocks
 
 
 def _fill_subcarriers(
@@ -142,11 +131,11 @@ def _fill_pairs(
     level_db: Interpolator | None,
 ) -> None:
     """Fills hidden device pairs in place from the nearest visible one."""
-    blocks = _device_blocks(evidence.layout)
-    hidden = [pair for pair in blocks if pair not in pairs]
+    layout = evidence.layout
+    hidden = [pair for pair in layout.device_pairs if pair not in pairs]
     if not hidden or not pairs:
         return
-    where = {pair: _pair_position(evidence.layout, *pair) for pair in blocks}
+    where = {pair: np.concatenate(layout.centres_of(*pair)) for pair in layout.device_pairs}
     names = list(pairs)
     known = np.stack([where[name] for name in names])
     power = np.array([np.mean(np.abs(pairs[name]) ** 2) for name in names])
@@ -156,15 +145,4 @@ def _fill_pairs(
         if level_db is not None and (power > 0.0).all():
             level = level_db(decibels(power, least=0.0)[:, None], known, where[pair][None])[0, 0]
             value = value * np.sqrt(power_of(level) / power[nearest])
-        tx, rx = blocks[pair]
-        out[np.ix_(tx, rx)] = value
-
-
-def _pair_position(layout: Layout, a: int, b: int) -> Float[np.ndarray, "6"]:
-    """Centres of the transmitting and of the receiving array [m]."""
-    return np.concatenate(
-        [
-            layout.tx_xyz[layout.tx_device == a].mean(axis=0),
-            layout.rx_xyz[layout.rx_device == b].mean(axis=0),
-        ]
-    )
+        out[layout.block_of(*pair)] = value

@@ -57,21 +57,13 @@ class PointModel:
         full = np.zeros(self.evidence.delta.shape, dtype=np.complex64)
         for (tx, rx), values in zip(self.links, residual, strict=True):
             full[tx[:, None], rx[:, None], self.subcarriers[None, :]] = values
-        answer = matched_filter(
-            full,
-            self.layout.tx_xyz,
-            self.layout.rx_xyz,
-            self.pair,
-            self.evidence.freq_hz,
-            points,
-        )[:, 0]
+        answer = matched_filter(full, self.layout, self.pair, self.evidence.freq_hz, points)[:, 0]
         # The filter divides by all subcarriers; hidden ones are zero here.
         return answer * (full.shape[2] / len(self.subcarriers))
 
     def spreading(self, points: Float[np.ndarray, "N 3"], a: int, b: int) -> np.ndarray:
         """d_t · d_r between points and the arrays of a device pair [m²], shape (N,)."""
-        tx = self.layout.tx_xyz[self.layout.tx_device == a].mean(axis=0)
-        rx = self.layout.rx_xyz[self.layout.rx_device == b].mean(axis=0)
+        tx, rx = self.layout.centres_of(a, b)
         return np.linalg.norm(points - tx, axis=1) * np.linalg.norm(points - rx, axis=1)
 
     def result(
@@ -93,8 +85,7 @@ class PointModel:
         layout = self.layout
         delta = np.zeros(self.evidence.delta.shape, dtype=np.complex64)
         for a, b in layout.device_pairs:
-            here = (layout.tx_device[:, None] == a) & (layout.rx_device == b)
-            tx, rx = np.nonzero(here & layout.measured)
+            tx, rx = np.nonzero(layout.links_between(a, b) & layout.measured)
             if (a, b) in self.pairs:
                 gain = amplitude[self.pairs.index((a, b))]
             else:

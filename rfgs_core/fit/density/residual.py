@@ -108,18 +108,18 @@ class ResidualDensity:
     def _new(self, g: Gaussians, energy: Tensor) -> Gaussians:
         with torch.no_grad():
             change = self.channel.change(self.head, g)
-        left = self.comparison.left(self.observations, change)
+        remaining = self.comparison.residual(self.observations, change)
         room = min(self.rule.cap - len(g), max(1, int(self.rule.most_share * len(g))))
-        if not left.changed or room <= 0:
+        if not remaining.changed or room <= 0:
             return Gaussians.none()
         near_m = g.means.double().cpu().numpy()
-        points = residual_peaks(pair_maps(left), near_m, self.rule)[:room]
+        points = residual_peaks(pair_maps(remaining), near_m, self.rule)[:room]
         new = gaussians_at(points, outward_normals(points, self.bodies))
         new = on_device(new, g.means.device)
         new = replace(new, logit_opacities=g.logit_opacities.median().expand(len(new)).clone())
         power = energy.median().expand(len(new))
         gamma = torch.polar(power.sqrt(), torch.zeros_like(power))
-        if len(new) and left.kind != "delay_power":
+        if len(new) and remaining.kind != "delay_power":
             residual = self.comparison.measured() - self.comparison.predicted(
                 change, np.arange(len(self.channel.links))
             )

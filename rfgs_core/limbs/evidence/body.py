@@ -59,7 +59,7 @@ def direct(posed: Posed, pair: Pair, shift: np.ndarray) -> np.ndarray:
     return covariance(pair, posed.facets.moved(shift), *seen, LOBE_RAD)
 
 
-def by_walls(
+def by_bounces(
     facets: Facets, pair: Pair, bounds_m: Float64[np.ndarray, "2 3"], centre: np.ndarray
 ) -> np.ndarray:
     """Covariance of the echoes by way of one wall on either leg, every wall a mirror."""

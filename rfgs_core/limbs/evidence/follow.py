@@ -21,7 +21,7 @@ _RATES = np.linspace(0.7, 1.4, 15)
 _STRAYS_RAD = 0.12
 #: A place strays from where it was beside the track by this much in a tenth of a second, and is
 #: this far from the track [m].
-_STRAYS_M, _BESIDE_M = 0.015, 0.05
+_STRAYS_M, _OFF_TRACK_M = 0.015, 0.05
 
 
 class Path(NamedTuple):
@@ -75,8 +75,8 @@ def _finer(log: np.ndarray) -> np.ndarray:
 def _best(log: np.ndarray, shifts: np.ndarray, time_s: np.ndarray, rate_hz: float) -> Path:
     """The likeliest path at one rate [strides/s]."""
     frames, phases = log.shape[:2]
-    gained = log - 0.5 * np.sum(shifts**2, axis=1) / _BESIDE_M**2
-    apart = np.sum((shifts[:, None] - shifts) ** 2, axis=2)
+    gained = log - 0.5 * np.sum(shifts**2, axis=1) / _OFF_TRACK_M**2
+    jump_m2 = np.sum((shifts[:, None] - shifts) ** 2, axis=2)
     turn = np.arange(phases) / phases
     total = gained[0]
     back: list[tuple[np.ndarray, np.ndarray]] = []
@@ -86,7 +86,7 @@ def _best(log: np.ndarray, shifts: np.ndarray, time_s: np.ndarray, rate_hz: floa
         off = 2.0 * np.pi * (off - np.round(off))
         steps = max(elapsed / 0.1, 1e-3)
         by_phase = -0.5 * off**2 / (_STRAYS_RAD**2 * steps)
-        by_place = -0.5 * apart / (_STRAYS_M**2 * steps)
+        by_place = -0.5 * jump_m2 / (_STRAYS_M**2 * steps)
         from_place = total[:, :, None] + by_place
         place, total = from_place.argmax(axis=1), from_place.max(axis=1)
         from_phase = total[:, None] + by_phase[:, :, None]

@@ -103,8 +103,8 @@ class Levels(NamedTuple):
         inverse = np.linalg.inv(np.linalg.cholesky(self.covariance))
         white = inverse @ self.change
         before = -len(white) * (math.log(np.vdot(white, white).real / len(white)) + 1.0)
-        left = (inverse @ _whole(part) @ inverse.conj().T for part in parts)
-        rise = [log_evidence(white, part) - before for part in left]
+        whitened = (inverse @ _whole(part) @ inverse.conj().T for part in parts)
+        rise = [log_evidence(white, part) - before for part in whitened]
         return np.maximum(rise, 0.0)
 
 

@@ -8,7 +8,7 @@ from jaxtyping import Float64
 
 from rfgs_core.articulated import Pose
 from rfgs_core.encode.body_maps import CENTRE_HEIGHT_M
-from rfgs_core.limbs.evidence.body import by_walls, direct, posed
+from rfgs_core.limbs.evidence.body import by_bounces, direct, posed
 from rfgs_core.limbs.evidence.entries import pairs_of
 from rfgs_core.limbs.evidence.kernel import log_evidence
 from rfgs_core.limbs.evidence.library import about_z
@@ -45,13 +45,14 @@ def evidence_table(
     for row, pose in enumerate(poses):
         body = posed(figure, pose.turned(about_z(place[1])).moved(spot), pairs)
         for pair in pairs:
-            walls = 0.0
+            bounces = 0.0
             if any(alphas):
-                walls = by_walls(body.facets, pair, observations.bounds_m, centre)
+                bounces = by_bounces(body.facets, pair, observations.bounds_m, centre)
             for column, shift in enumerate(shifts):
                 straight = direct(body, pair, shift)
                 table[pair.devices][row, column] = [
-                    log_evidence(pair.change, straight + alpha * alpha * walls) for alpha in alphas
+                    log_evidence(pair.change, straight + alpha * alpha * bounces)
+                    for alpha in alphas
                 ]
     return table
 

@@ -25,8 +25,8 @@ def oscillator_phase_rad(
     late_s = draw.sto_s[samples] + 1e-6 * draw.sfo_ppm * time_s
     baseband = 2 * np.pi * (radio.freq_hz - radio.centre_hz)
     between = carrier[:, :, None] - carrier[:, None, :]
-    apart_s = late_s[:, :, None] - late_s[:, None, :]
-    return between[..., None] - apart_s[..., None] * baseband
+    difference_s = late_s[:, :, None] - late_s[:, None, :]
+    return between[..., None] - difference_s[..., None] * baseband
 
 
 def oscillator_turn(

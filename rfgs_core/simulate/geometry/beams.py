@@ -48,18 +48,18 @@ def beams(faces: Faces, place: np.ndarray, lit: np.ndarray) -> Beams:
     rim = np.zeros((room, 4))
     found = 0
     near = np.zeros(len(corners), dtype=np.bool_)
-    met, prints = np.zeros(len(corners), dtype=np.int64), np.zeros((len(corners), 4))
+    struck, prints = np.zeros(len(corners), dtype=np.int64), np.zeros((len(corners), 4))
     for face in lit:
         image = mirrored(faces, face, place)
         h = height(faces, face, image)
         _nearby(faces, face, image, h, centre, radius, near)
         near[face] = False
-        count = _footprints(faces, face, image, h, corners, near, met, prints)
+        count = _footprints(faces, face, image, h, corners, near, struck, prints)
         while found + count > room:
             onto, by = _grown(onto), _grown(by)
             rim = np.concatenate((rim, np.zeros_like(rim)))
             room *= 2
-        onto[found : found + count], by[found : found + count] = met[:count], face
+        onto[found : found + count], by[found : found + count] = struck[:count], face
         rim[found : found + count] = prints[:count]
         found += count
     return _gathered(faces, place, onto[:found], by[:found], rim[:found])
@@ -150,7 +150,7 @@ def _footprints(
     h: float,
     corners: np.ndarray,
     near: np.ndarray,
-    met: np.ndarray,
+    struck: np.ndarray,
     prints: np.ndarray,
 ) -> int:
     """Faces that the beam from an image through a face falls on, and where; errs towards more.
@@ -162,11 +162,11 @@ def _footprints(
         h: Its height over that face [m].
         corners: Corners of all rectangles [m], shape (face, 4, 3).
         near: Which faces to look at.
-        met: Filled with those that are met.
+        struck: Filled with those that it falls on.
         prints: Filled with the rectangle on each: low and high along both axes [m].
 
     Returns:
-        How many are met.
+        How many it falls on.
     """
     normal, offset, axes, low, high = faces[:5]
     x, y, z = image
@@ -195,7 +195,7 @@ def _footprints(
             rim[2 * axis] = max(rim[2 * axis], low[other, axis])
             rim[2 * axis + 1] = min(rim[2 * axis + 1], high[other, axis])
         if rim[0] <= rim[1] and rim[2] <= rim[3]:
-            met[count] = other
+            struck[count] = other
             prints[count] = rim
             count += 1
     return count

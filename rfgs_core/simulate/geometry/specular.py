@@ -216,8 +216,8 @@ def _verified(
             continue
         known = False
         for k in range(count):
-            apart = np.abs(corners[k] - corners[count]).max() if depth else 0.0
-            known |= apart < SAME_M and (kinds[k] == kinds[count]).all()
+            distance_m = np.abs(corners[k] - corners[count]).max() if depth else 0.0
+            known |= distance_m < SAME_M and (kinds[k] == kinds[count]).all()
         if not known:
             count += 1
     return kinds[:count], triangles[:count], corners[:count]

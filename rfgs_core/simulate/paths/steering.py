@@ -23,7 +23,7 @@ from rfgs_core.simulate.paths.path_set import PathSet
 from rfgs_core.simulate.paths.plain_sum import summed
 
 #: Most paths at a time, and what their number is rounded up to, for vector code.
-_BLOCK, _LANES = 128, 8
+_BLOCK, _SIMD_WIDTH = 128, 8
 
 
 def steer(
@@ -180,7 +180,7 @@ def _steer(
     out = np.zeros((n_tx, n_rx, len(left)), dtype=np.complex128)
     for link in numba.prange(n_tx * n_rx):
         t, r = link // n_rx, link % n_rx
-        width = min(_BLOCK, (n_paths + _LANES - 1) // _LANES * _LANES)
+        width = min(_BLOCK, (n_paths + _SIMD_WIDTH - 1) // _SIMD_WIDTH * _SIMD_WIDTH)
         phasor, turn = np.zeros((2, width)), np.zeros((2, width))
         block = np.zeros((n_nodes, 2, width))
         for first in range(0, n_paths, width):

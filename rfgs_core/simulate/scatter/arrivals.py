@@ -12,8 +12,9 @@ import numpy as np
 from rfgs_core.simulate.geometry.bvh import SAME_M
 from rfgs_core.simulate.geometry.faces import Faces
 from rfgs_core.simulate.geometry.rays import blocked, crossings, new_stack
-from rfgs_core.simulate.scatter.antenna import Antenna, sent_towards
+from rfgs_core.simulate.scatter.antenna import Antenna
 from rfgs_core.simulate.scatter.kernel import seen_from_centres
+from rfgs_core.simulate.scatter.waves import components, past, send
 from rfgs_core.simulate.sight.bodies import HIDDEN, UNSURE, Picture, hides
 from rfgs_core.simulate.sight.mirrors import Mirror, free_by_mirror, on_mirror
 from rfgs_core.simulate.sight.panorama import Panorama, sees
@@ -100,15 +101,15 @@ def straight(
             continue
         for axis in range(3):
             way[axis] = facets.points[p, axis] - around.place[axis]
-        _send(antenna, way, wave)
+        send(antenna, way, wave)
         if free:
-            _components(wave, way, clear[p])
+            components(wave, way, clear[p])
             n_clear += 1
         elif crossings(faces.bvh, around.place, lifted, 2.0 * SAME_M, at_m, hit) == 1:
             face = faces.of_triangle[hit[0]]
             if face >= 0:
                 past(wave, way, faces.normal[face], False, slabs.passed[slabs.of_face[face]])
-                _components(wave, way, through[p])
+                components(wave, way, through[p])
                 n_through += 1
     return n_clear, n_through
 
@@ -138,22 +139,22 @@ def free_facets(
         Which facets, and where they are mirrored [m], shape (found, 3): the first of the scratch.
     """
     points = facets.lifted, facets.normals, balls
-    met, at = on_mirror(faces, view.face, view.image, points, 2.0 * ends.size_m, scratch)
+    lit, at = on_mirror(faces, view.face, view.image, points, 2.0 * ends.size_m, scratch)
     stack, count = new_stack(), 0
-    for k in range(len(met)):
-        p = met[k]
+    for k in range(len(lit)):
+        p = lit[k]
         if _heard_together(facets, p, view.image, ends) and free_by_mirror(
             faces, view, around, facets.lifted[p], at[k], stack
         ):
-            met[count], at[count] = p, at[k]
+            lit[count], at[count] = p, at[k]
             count += 1
-    return met[:count], at[:count]
+    return lit[:count], at[:count]
 
 
 @numba.njit(cache=True, nogil=True)
 def by_mirror(
     facets: Facets,
-    met: tuple[np.ndarray, np.ndarray],
+    lit: tuple[np.ndarray, np.ndarray],
     pictures: Pictures,
     around: Panorama,
     faces: Faces,
@@ -166,7 +167,7 @@ def by_mirror(
 
     Args:
         facets: The facets.
-        met: Those that may be met and where they are mirrored, from `free_facets`.
+        lit: Those that the mirror may light and where they are mirrored, from `free_facets`.
         pictures: What moves, as seen from the site.
         around: What stands around the site.
         faces: The same as faces.
@@ -183,8 +184,8 @@ def by_mirror(
     into, stack, count = np.zeros(3), new_stack(), 0
     factors = slabs.mirrored[slabs.of_face[view.face]]
     normal = faces.normal[view.face]
-    for k in range(len(met[0])):
-        p, at = met[0][k], met[1][k]
+    for k in range(len(lit[0])):
+        p, at = lit[0][k], lit[1][k]
         if blocked(facets.bvh, at, facets.lifted[p], 2.0 * SAME_M, stack):
             continue
         hidden = False
@@ -199,11 +200,11 @@ def by_mirror(
             continue
         for axis in range(3):
             into[axis] = at[axis] - around.place[axis]
-        _send(antenna, into, wave)
+        send(antenna, into, wave)
         past(wave, into, normal, True, factors)
         for axis in range(3):
             into[axis] = facets.points[p, axis] - view.image[axis]
-        _components(wave, into, out[p])
+        components(wave, into, out[p])
         count += 1
     return count
 
@@ -250,79 +251,7 @@ def _heard_together(facets: Facets, p: int, place: np.ndarray, ends: Ends) -> bo
 
 
 @numba.njit(cache=True, nogil=True, inline="always")
-def _send(antenna: Antenna, way: np.ndarray, wave: np.ndarray) -> None:
-    """Fills in what an antenna sends in a direction, the same at each node."""
-    x, y, z = sent_towards(antenna, way)
-    for m in range(len(wave)):
-        wave[m, 0], wave[m, 1], wave[m, 2] = x, y, z
-
-
-@numba.njit(cache=True, nogil=True, inline="always")
 def _picture(pictures: Pictures, place: np.ndarray, body: int) -> Picture:
     """One of several pictures from a place."""
     nearest, depth = pictures.nearest[body], pictures.depth[body]
     return Picture(place, pictures.axes[body], pictures.per_pixel[body], nearest, depth)
-
-
-@numba.njit(cache=True, nogil=True)
-def past(
-    wave: np.ndarray, into: np.ndarray, normal: np.ndarray, mirrors: bool, factors: np.ndarray
-) -> None:
-    """Sends a wave past a slab, in place; the twin of `rfgs_core.simulate.paths.fields.past_slab`.
-
-    Args:
-        wave: Field at each node, complex64, shape (node, 3).
-        into: Its direction, of any length, shape (3,).
-        normal: Unit normal of the slab, either side.
-        mirrors: Whether the wave is mirrored, else it passes.
-        factors: TE and TM factors over cosines, shape (cosine, 2, node).
-    """
-    d = math.sqrt(into[0] * into[0] + into[1] * into[1] + into[2] * into[2])
-    k = into[0] / d, into[1] / d, into[2] / d
-    n = normal[0], normal[1], normal[2]
-    along = k[0] * n[0] + k[1] * n[1] + k[2] * n[2]
-    across = _cross(k, n)
-    size = math.sqrt(across[0] ** 2 + across[1] ** 2 + across[2] ** 2)
-    if size < 1e-9:
-        # At normal incidence any direction in the wall is across.
-        across = _cross(n, (1.0, 0.0, 0.0) if abs(n[0]) < 0.6 else (0.0, 1.0, 0.0))
-        size = math.sqrt(across[0] ** 2 + across[1] ** 2 + across[2] ** 2)
-    across = across[0] / size, across[1] / size, across[2] / size
-    bend = 2.0 * along if mirrors else 0.0
-    before = _cross(across, k)
-    after = _cross(across, (k[0] - bend * n[0], k[1] - bend * n[1], k[2] - bend * n[2]))
-    place = min(abs(along), 1.0) * (len(factors) - 1)
-    low = min(int(place), len(factors) - 2)
-    share = np.float32(place - low)
-    for m in range(len(wave)):
-        te = factors[low, 0, m] + share * (factors[low + 1, 0, m] - factors[low, 0, m])
-        tm = factors[low, 1, m] + share * (factors[low + 1, 1, m] - factors[low, 1, m])
-        te *= wave[m, 0] * across[0] + wave[m, 1] * across[1] + wave[m, 2] * across[2]
-        tm *= wave[m, 0] * before[0] + wave[m, 1] * before[1] + wave[m, 2] * before[2]
-        for axis in range(3):
-            wave[m, axis] = te * across[axis] + tm * after[axis]
-
-
-@numba.njit(cache=True, nogil=True, inline="always")
-def _cross(
-    a: tuple[float, float, float], b: tuple[float, float, float]
-) -> tuple[float, float, float]:
-    """Cross product."""
-    return (
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    )
-
-
-@numba.njit(cache=True, nogil=True, inline="always")
-def _components(wave: np.ndarray, way: np.ndarray, out: np.ndarray) -> None:
-    """Fills in θ and φ of a wave at each node, complex64, shape (2, node)."""
-    flat = math.hypot(way[0], way[1])
-    d = math.hypot(flat, way[2])
-    cos_phi, sin_phi = (way[0] / flat, way[1] / flat) if flat > 1e-7 * d else (1.0, 0.0)
-    cos_theta, sin_theta = way[2] / d, flat / d
-    for m in range(len(wave)):
-        along = wave[m, 0] * cos_phi + wave[m, 1] * sin_phi
-        out[0, m] = along * cos_theta - wave[m, 2] * sin_theta
-        out[1, m] = wave[m, 1] * cos_phi - wave[m, 0] * sin_phi

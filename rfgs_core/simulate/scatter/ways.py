@@ -123,18 +123,16 @@ def find_ways(
         pictures: What moves as seen from each site.
     """
     facets, faces = body.facets, scope.faces
-    met = [_mirrors(faces, site, body) for site in sites]
-    shape = (sum(2 + len(row) for row in met), len(facets.points), 2, scope.nodes)
+    mirrors = [_mirrors(faces, site, body) for site in sites]
+    shape = (sum(2 + len(row) for row in mirrors), len(facets.points), 2, scope.nodes)
     field = np.zeros(shape, dtype=np.complex64)
     scratch = np.zeros(len(facets.points), np.int64), np.zeros((len(facets.points), 3))
     rows: list[tuple[int, int, np.ndarray, np.ndarray]] = []
-    for s, (site, seen, views) in enumerate(zip(sites, pictures, met, strict=True)):
-        ends = np.array([other.around.place for other in partners[s]]).reshape(-1, 3)
-        images = [view.image for other in partners[s] for view in _mirrors(faces, other, body)]
-        every = _ends(scope, np.concatenate([ends, np.array(images).reshape(-1, 3)]))
+    for s, (site, seen, views) in enumerate(zip(sites, pictures, mirrors, strict=True)):
+        ends, with_images = _ends(scope, partners[s], body)
         elements, antenna = site.elements[port], site.antennas[port]
         clear, through = field[len(rows)], field[len(rows) + 1]
-        wanted = wanted_facets(facets, site.around.place, every)
+        wanted = wanted_facets(facets, site.around.place, with_images)
         count = straight(
             facets,
             seen,
@@ -150,9 +148,7 @@ def find_ways(
         if count[1]:
             rows.append((s, 1, site.around.place, elements))
         for view in views:
-            found = free_facets(
-                facets, body.balls, _ends(scope, ends), site.around, faces, view, scratch
-            )
+            found = free_facets(facets, body.balls, ends, site.around, faces, view, scratch)
             onto = field[len(rows)]
             if len(found[0]) and by_mirror(
                 facets, found, seen, site.around, faces, view, antenna, scope.slabs, onto
@@ -167,9 +163,15 @@ def find_ways(
     )
 
 
-def _ends(scope: Scope, places: np.ndarray) -> Ends:
-    """The other ends of links, at places [m], shape (end, 3)."""
-    return Ends(places, scope.lowest_k, scope.size_m)
+def _ends(scope: Scope, partners: list[Site], body: Body) -> tuple[Ends, Ends]:
+    """The other ends of a site's links, and these together with their mirror images."""
+    places = np.array([other.around.place for other in partners]).reshape(-1, 3)
+    images = [view.image for other in partners for view in _mirrors(scope.faces, other, body)]
+    both = np.concatenate([places, np.array(images).reshape(-1, 3)])
+    return (
+        Ends(places, scope.lowest_k, scope.size_m),
+        Ends(both, scope.lowest_k, scope.size_m),
+    )
 
 
 def _mirrors(faces: Faces, site: Site, body: Body) -> list[Mirror]:

@@ -81,6 +81,6 @@ def _lagrange(angle: np.ndarray, at: np.ndarray) -> np.ndarray:
     """
     sign = np.where(np.arange(len(angle)) % 2, -1.0, 1.0) * np.sin(angle)
     away = at - np.cos(angle)[:, None]
-    met = np.abs(away) < 1e-14
-    terms = np.where(met.any(axis=0), met, sign[:, None] / np.where(met, 1.0, away))
+    at_node = np.abs(away) < 1e-14
+    terms = np.where(at_node.any(axis=0), at_node, sign[:, None] / np.where(at_node, 1.0, away))
     return terms / terms.sum(axis=0)

@@ -67,7 +67,7 @@ def transmission(
     rx_places = _places(layout.rx_xyz, layout.rx_site, layout.rx_port)
     lines, relative = unfold(paths), relative_amplitude(paths)
     near = [
-        outline.beside & near_segments(paths, outline.vertices, grid_hz.max())
+        outline.in_view & near_segments(paths, outline.vertices, grid_hz.max())
         for outline in outlines
     ]
     shaded = np.flatnonzero(np.any([rows.any(axis=1) for rows in near], axis=0))
@@ -147,9 +147,9 @@ def _shade(
             # Seconds that the farthest edge answers later, by which its share turns.
             x_m, y_m, corner_m = silhouette.farthest(runs, heights, shifts)
             late = corner_m**2 * scale / (2.0 * SPEED_OF_LIGHT)
-            choice = _choice(nodes.counts, np.pi * band * late)
-            first = nodes.counts[:choice].sum()
-            count = nodes.counts[choice]
+            rule = _rule_of(nodes.counts, np.pi * band * late)
+            first = nodes.counts[:rule].sum()
+            count = nodes.counts[rule]
             per_m_at = np.sqrt(2.0 * scale * nodes.hz[first : first + count] / SPEED_OF_LIGHT)
             factors = _of_pairs(table, runs, heights, shifts, (x_m, y_m), per_m_at)
             weights, n_rx = nodes.weights[first : first + count], rx_offset.shape[1]
@@ -194,16 +194,16 @@ def _shifts(
 
 
 @numba.njit(cache=True)
-def _choice(counts: np.ndarray, degree: float) -> int:
+def _rule_of(counts: np.ndarray, degree: float) -> int:
     """Which number of nodes tells a wave that turns by ± `degree` [rad] over the band.
 
     Its Chebyshev coefficients are Bessel functions J_n of the degree, 5e-4 or less from there on.
     """
     least = degree + np.cbrt(degree) + 1.0
-    choice = 0
-    while choice < len(counts) - 1 and counts[choice] < least:
-        choice += 1
-    return choice
+    rule = 0
+    while rule < len(counts) - 1 and counts[rule] < least:
+        rule += 1
+    return rule
 
 
 @numba.njit(cache=True)

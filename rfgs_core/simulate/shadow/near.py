@@ -80,9 +80,9 @@ def _near(
             low, high = max(depth - radius, 0.0), min(depth + radius, length)
             if low >= high:
                 continue
-            beside = np.sqrt(max((to * to).sum() - depth * depth, 0.0)) - radius
+            clearance_m = np.sqrt(max((to * to).sum() - depth * depth, 0.0)) - radius
             whole = before[p, i] + length + after[p, i]
             at = min(max(0.5 * whole, before[p, i] + low), before[p, i] + high)
             per_m = np.sqrt(2.0 * (1.0 / at + 1.0 / (whole - at)) * freq_hz / SPEED_OF_LIGHT)
-            near[p, i] = beside * per_m <= reach(relative[p])
+            near[p, i] = clearance_m * per_m <= reach(relative[p])
     return near

@@ -50,7 +50,7 @@ class Outline:
     """Vertices [m], shape (V, 3)."""
     mesh: ShadowMesh
     """Triangles over them."""
-    beside: np.ndarray
+    in_view: np.ndarray
     """Which segments of the paths it may shade, bool, shape (path, segment)."""
 
 

@@ -161,7 +161,7 @@ def on_mirror(
 
     Returns:
         Those that face the image and meet the rectangle, int64, and the places where [m], shape
-        (met, 3): the first of the scratch.
+        (lit, 3): the first of the scratch.
     """
     n, u, w = faces.normal[face], faces.axes[face, 0], faces.axes[face, 1]
     nx, ny, nz, offset = n[0], n[1], n[2], faces.offset[face]
@@ -170,7 +170,7 @@ def on_mirror(
     high_u, high_w = faces.high[face, 0], faces.high[face, 1]
     ix, iy, iz = image[0], image[1], image[2]
     h = offset - (nx * ix + ny * iy + nz * iz)
-    (where, normals, balls), (met, at) = points, scratch
+    (where, normals, balls), (lit, at) = points, scratch
     count = 0
     for group in range(len(balls)):
         if not _meets(faces, face, image, balls[group, :3], balls[group, 3]):
@@ -186,9 +186,9 @@ def on_mirror(
             a, b = ux * x + uy * y + uz * z, wx * x + wy * y + wz * z
             if a < low_u or a > high_u or b < low_w or b > high_w:
                 continue
-            met[count], at[count, 0], at[count, 1], at[count, 2] = p, x, y, z
+            lit[count], at[count, 0], at[count, 1], at[count, 2] = p, x, y, z
             count += 1
-    return met[:count], at[:count]
+    return lit[:count], at[:count]
 
 
 @numba.njit(cache=True, nogil=True, inline="always")

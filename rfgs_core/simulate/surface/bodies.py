@@ -13,7 +13,7 @@ from rfgs_core.simulate.surface.points import LIFT_M, surface_points
 from rfgs_core.simulate.surface.posed import Facets
 
 #: Distance by which bodies are held apart while their hierarchy is built [m].
-_APART_M = 1e3
+_SPREAD_M = 1e3
 
 
 class BodySurface:
@@ -41,8 +41,8 @@ class BodySurface:
         instance = people.instance[self._points.triangle]
         # Neighbours one after the other: they meet the same mirrors and the same triangles.
         places = self._points.at(people.rest_vertices)[0]
-        beside = build_bvh(np.repeat(places[:, None], 3, axis=1)).triangle
-        self._order = beside[np.argsort(instance[beside], kind="stable")]
+        neighbours = build_bvh(np.repeat(places[:, None], 3, axis=1)).triangle
+        self._order = neighbours[np.argsort(instance[neighbours], kind="stable")]
         self._body = np.unique(instance[self._order], return_inverse=True)[1]
         self._areas = self._points.areas[self._order]
         self._material = self._points.material[self._order].astype(np.int64)
@@ -50,8 +50,8 @@ class BodySurface:
         rest = np.concatenate([people.rest_vertices, vehicles.rest_vertices]).astype(np.float64)
         # Bodies may rest at one place and move apart: no branch may hold parts of two.
         moved = np.concatenate([people.instance, vehicles.instance])
-        apart = _APART_M * np.unique(moved, return_inverse=True)[1]
-        self._bvh = build_bvh(rest[self._corners] + apart[:, None, None])
+        shift = _SPREAD_M * np.unique(moved, return_inverse=True)[1]
+        self._bvh = build_bvh(rest[self._corners] + shift[:, None, None])
 
     def facets(self, vertices: np.ndarray) -> Facets:
         """Facets with everything that moves at places [m], shape (V, 3)."""

@@ -41,8 +41,8 @@ def smooth_sides(vertices: np.ndarray, faces: np.ndarray, edges: np.ndarray) -> 
     order = np.lexsort((ends[:, 1], ends[:, 0]))
     order = order[ends[order, 0] != ends[order, 1]]
     pairs = [np.zeros((0, 2), dtype=np.int64)]
-    for apart in range(1, _MOST_AT_AN_EDGE):
-        first, second = order[:-apart], order[apart:]
+    for step in range(1, _MOST_AT_AN_EDGE):
+        first, second = order[:-step], order[step:]
         same = (ends[first] == ends[second]).all(axis=1)
         pairs.append(np.stack([first[same], second[same]], axis=1))
     pairs = np.concatenate(pairs)

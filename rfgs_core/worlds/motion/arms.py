@@ -84,9 +84,9 @@ class Shoulder:
             swivel: How far the elbow is lifted outwards from pointing down [rad].
             wrist: Flexion of the wrist [rad].
         """
-        apart = target - self.place
-        far = float(np.clip(np.linalg.norm(apart), 0.25 * self.reach_m, 0.995 * self.reach_m))
-        up = -apart / max(float(np.linalg.norm(apart)), 1e-6)
+        towards = target - self.place
+        far = float(np.clip(np.linalg.norm(towards), 0.25 * self.reach_m, 0.995 * self.reach_m))
+        up = -towards / max(float(np.linalg.norm(towards)), 1e-6)
         # Elbows point down and a little back, or outwards where the arm goes down or up.
         down = np.array([-0.35, 0.35 * self.sign, -1.0 if abs(up[2]) < 0.8 else 0.0])
         elbow_way = down - (down @ up) * up

@@ -8,7 +8,7 @@ import numpy as np
 from rfgs_core.articulated import Body
 from rfgs_core.worlds.motion.arms import ArmPose, Shoulder, set_arm
 from rfgs_core.worlds.motion.curves import X, Y, about, keyed, noise
-from rfgs_core.worlds.motion.legs import Feet, plant, stand_apart
+from rfgs_core.worlds.motion.legs import Feet, plant, stance
 from rfgs_core.worlds.motion.manner import quiet_arm
 from rfgs_core.worlds.motion.motion import RATE_HZ
 from rfgs_core.worlds.motion.standing import follow_feet
@@ -24,7 +24,7 @@ def squat(rng: np.random.Generator, body: Body) -> Track:
     deep_m = body.height_m * (0.02 + 0.28 * knees) * rng.uniform(0.7, 1.0)
     pelvis = (0.95 - 0.5 * knees) * rng.uniform(0.6, 1.1)
     spine = rng.uniform(0.2, 0.9)
-    places, heading = stand_apart(body, rng)
+    places, heading = stance(body, rng)
     track.root[:, 0] -= share * body.height_m * (0.02 + 0.05 * pelvis)
     track.root[:, 1] = 0.005 * noise(rng, track.times, 0.4)
     track.root[:, 2] -= 0.006 * body.height_m + deep_m * share
@@ -45,9 +45,9 @@ def squat(rng: np.random.Generator, body: Body) -> Track:
             up = shoulder.hang(rng.uniform(0.1, 0.4), 0.05)
             far = rng.uniform(1.2, 1.7) if hands == "ahead" else rng.uniform(0.8, 1.1) * lean
             low = _ahead(shoulder, float(np.clip(far, 0.4, 2.4)), rng.uniform(0.05, 0.5))
-            held = up if rng.uniform() < 0.5 else _ahead(shoulder, 0.5, 1.3)
+            grasped = up if rng.uniform() < 0.5 else _ahead(shoulder, 0.5, 1.3)
             first = int(np.argmax(down > 0.5))
-            poses = [low if d > 0.5 else (up if i < first else held) for i, d in enumerate(down)]
+            poses = [low if d > 0.5 else (up if i < first else grasped) for i, d in enumerate(down)]
             set_arm(track, side, knots, poses)
         else:
             quiet_arm(rng, track, side)
@@ -59,7 +59,7 @@ def reach_high(rng: np.random.Generator, body: Body) -> Track:
     track = Track(body, rng.uniform(4.0, 8.0))
     knots, up = _visits(rng, track.times[-1], (0.6, 1.4), (0.3, 2.0))
     share = keyed(track.times, knots, up)
-    places, heading = stand_apart(body, rng)
+    places, heading = stance(body, rng)
     feet = Feet.standing(track.times, places, heading)
     follow_feet(rng, track, feet, rng.uniform(0.0, 0.3))
     heel = rng.choice([0.0, rng.uniform(0.2, 0.6)]) * share

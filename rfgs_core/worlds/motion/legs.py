@@ -83,7 +83,7 @@ class Feet:
             heading[later] = pointing + share[later] * (step.heading - pointing)
 
 
-def stand_apart(body: Body, rng: np.random.Generator) -> tuple[dict, dict]:
+def stance(body: Body, rng: np.random.Generator) -> tuple[dict, dict]:
     """Random places [3] of both feet under the hips, and where they point."""
     hip = abs(body.heads[bone("upperleg_left")][1])
     wide = hip * rng.uniform(0.7, 1.7)
@@ -159,9 +159,9 @@ def _ankle(body: Body, side: str, feet: Feet, pitch: np.ndarray) -> np.ndarray:
 def _bend(track: Track, side: str, ankle: np.ndarray, pointing: np.ndarray) -> np.ndarray:
     """Sets thigh and shin; returns the shin's rotation [T, 3, 3] against the world."""
     thigh_m, shin_m = _lengths(track.body, side)
-    apart = ankle - _hip(track, side)
-    far = np.linalg.norm(apart, axis=1)
-    up = -apart / np.maximum(far, 1e-6)[:, None]
+    leg = ankle - _hip(track, side)
+    far = np.linalg.norm(leg, axis=1)
+    up = -leg / np.maximum(far, 1e-6)[:, None]
     far = np.clip(far, abs(thigh_m - shin_m) + 0.02, _STRETCHED * (thigh_m + shin_m))
     # A knee points where its foot does, and up where the thigh lies level.
     pole = np.stack([np.cos(pointing), np.sin(pointing), np.full(len(far), 0.35)], axis=1)

@@ -9,7 +9,7 @@ from rfgs_core.articulated import Body, Pose
 from rfgs_core.articulated.bones import BONES, bone
 from rfgs_core.worlds.motion.arms import Shoulder
 from rfgs_core.worlds.motion.curves import Y, about, between, noise
-from rfgs_core.worlds.motion.legs import Feet, Step, plant, stand_apart
+from rfgs_core.worlds.motion.legs import Feet, Step, plant, stance
 from rfgs_core.worlds.motion.manner import gesture, lap_pose, quiet_arm
 from rfgs_core.worlds.motion.standing import move_arms
 from rfgs_core.worlds.motion.track import SIDES, SIGN, Track
@@ -27,7 +27,7 @@ def sit(rng: np.random.Generator, body: Body) -> Track:
         seated = seated * between(times, start, start + lasts)
     if kind in ("up", "both"):
         seated = seated * (1.0 - between(times, end_s - lasts - 0.4, end_s - 0.4))
-    places, heading = stand_apart(body, rng)
+    places, heading = stance(body, rng)
     feet = Feet.standing(times, places, heading)
     if kind in ("seated", "both"):
         feet.walk(times, _shuffles(rng, seated, times, places, heading))
@@ -56,8 +56,8 @@ def seat_below_m(body: Body) -> float:
     world = Pose.from_local(np.zeros(3), local)
     skin = body.skin(Pose(np.zeros(3), world.turns @ body.neutral))
     rows, weight = body.weights
-    held = [bone("pelvis"), bone("upperleg_left"), bone("upperleg_right")]
-    share = np.where(np.isin(rows, held), weight, 0.0).sum(axis=1)
+    on_seat = [bone("pelvis"), bone("upperleg_left"), bone("upperleg_right")]
+    share = np.where(np.isin(rows, on_seat), weight, 0.0).sum(axis=1)
     near = (share > 0.9) & (np.abs(skin[:, 0]) < 0.2)
     # Flesh gives way by a centimetre or two.
     return float(-skin[near, 2].min()) - 0.015

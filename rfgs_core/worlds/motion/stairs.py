@@ -103,7 +103,7 @@ def _body(rng: np.random.Generator, track: Track, feet: Feet, up: float) -> None
 
 def _arms(rng: np.random.Generator, track: Track, feet: Feet) -> None:
     """Arms swing against the legs, hold a rail, or do something else."""
-    apart = smoothed(feet.places["left"][:, 0] - feet.places["right"][:, 0], RATE_HZ, 0.05)
+    between_feet = smoothed(feet.places["left"][:, 0] - feet.places["right"][:, 0], RATE_HZ, 0.05)
     size = rng.uniform(0.0, 1.2)
     rail = str(rng.choice([*SIDES, "none", "none"]))
     busy = str(rng.choice([*SIDES, "none", "none", "none"]))
@@ -118,5 +118,5 @@ def _arms(rng: np.random.Generator, track: Track, feet: Feet) -> None:
             gesture(rng, track, side)
         else:
             hang = shoulder.hang(0.0, rng.uniform(0.0, 0.08))
-            swing = -SIGN[side] * size * np.clip(apart, -0.5, 0.5)
+            swing = -SIGN[side] * size * np.clip(between_feet, -0.5, 0.5)
             place_arm(track, side, hang.shoulder @ about(Y, -swing), 0.3 + 0.2 * np.abs(swing))

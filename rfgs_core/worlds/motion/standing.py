@@ -7,7 +7,7 @@ import numpy as np
 
 from rfgs_core.articulated import Body
 from rfgs_core.worlds.motion.curves import noise
-from rfgs_core.worlds.motion.legs import Feet, Step, plant, stand_apart
+from rfgs_core.worlds.motion.legs import Feet, Step, plant, stance
 from rfgs_core.worlds.motion.manner import carry, clap, gesture, quiet_arm
 from rfgs_core.worlds.motion.track import SIDES, Track
 
@@ -69,7 +69,7 @@ def sway(rng: np.random.Generator, track: Track, lively: float) -> None:
 def _upright(rng: np.random.Generator, track: Track, lively: float, stepping: bool = False) -> None:
     """Pelvis, trunk, head and legs of somebody on both feet."""
     body, times = track.body, track.times
-    places, heading = stand_apart(body, rng)
+    places, heading = stance(body, rng)
     feet = Feet.standing(times, places, heading)
     if stepping:
         feet.walk(times, steps_about(rng, track, places, heading))
@@ -81,12 +81,12 @@ def follow_feet(rng: np.random.Generator, track: Track, feet: Feet, lively: floa
     """Pelvis between both feet, with sway and shifted weight; then trunk and head."""
     times = track.times
     middle = 0.5 * (feet.places["left"] + feet.places["right"])
-    apart = feet.places["left"] - feet.places["right"]
+    between_feet = feet.places["left"] - feet.places["right"]
     # Weight on one leg moves the pelvis over it and drops the other side.
     shift = np.clip(rng.uniform(0.0, 0.35) * noise(rng, times, 0.25), -0.4, 0.4)
     wander = np.stack([noise(rng, times, 0.6), noise(rng, times, 0.6)], axis=1)
     turning = 0.5 * (feet.heading["left"] + feet.heading["right"])
-    track.root[:, :2] = (middle + shift[:, None] * apart)[:, :2]
+    track.root[:, :2] = (middle + shift[:, None] * between_feet)[:, :2]
     track.root[:, :2] += rng.uniform(0.003, 0.015) * wander
     # Between slack and stretched knees.
     track.root[:, 2] += middle[:, 2] - track.body.height_m * rng.uniform(0.002, 0.012)

@@ -113,7 +113,7 @@ def test_a_vehicle_between_keeps_the_shadow_off_like_a_wall(
     straight = (trace.paths.kinds == 0).all(axis=1) & (trace.paths.tx != trace.paths.rx)
     assert straight.any()
     (outline,) = trace.outlines
-    assert outline.beside[straight, 0].any() == (driven_x_m > 1.7)
+    assert outline.in_view[straight, 0].any() == (driven_x_m > 1.7)
     table, empty = tracer.paths(frame, trace), tracer.static_paths()
     levels = [
         np.abs(rows.amplitude[(rows.kind == 0).all(axis=1) & (rows.tx_site != rows.rx_site)]).max()

@@ -4,6 +4,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
+from antennas import one_device
 
 from rfgs_core.radio import Layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
@@ -22,15 +23,7 @@ def line_of_sight(tx: np.ndarray, rx: np.ndarray, elements: np.ndarray) -> tuple
     vertices = np.stack([tx, rx])[None].astype(np.float64)
     none = np.zeros((1, 0), np.int64)
     paths = PathSet(zero, zero, np.ones((1, 1, 1), np.complex128), vertices, none, none, none)
-    return paths, one_site(tx[None].astype(float), rx + elements)
-
-
-def one_site(tx_xyz: np.ndarray, rx_xyz: np.ndarray) -> Layout:
-    """One upright device of each kind."""
-    tx, rx = (np.zeros(len(xyz), np.int64) for xyz in (tx_xyz, rx_xyz))
-    upright = [np.tile([1.0, 0.0, 0.0, 0.0], (len(xyz), 1)) for xyz in (tx_xyz, rx_xyz)]
-    measured = np.ones((len(tx), len(rx)), bool)
-    return Layout(tx_xyz, rx_xyz, tx, rx, rx, measured, tx, rx, tx, rx, *upright)
+    return paths, one_device(tx[None].astype(float), rx + elements)
 
 
 def screen(low: float, high: float) -> tuple[np.ndarray, np.ndarray]:
@@ -103,7 +96,7 @@ def test_reflected_path_is_shaded_on_its_unfolded_line() -> None:
     zero, kind = np.zeros(1, np.int64), np.ones((1, 1), np.int64)
     vertices = np.stack([tx, corner, rx])[None]
     paths = PathSet(zero, zero, np.ones((1, 1, 1), np.complex128), vertices, kind, kind, kind)
-    layout = one_site(tx[None], rx[None])
+    layout = one_device(tx[None], rx[None])
     wide = np.array([[-1.0, -4.0], [1.0, -4.0], [1.0, 0.07], [-1.0, 0.07]])
     middle = [np.stack([np.full(4, D_1), wide[:, 0], wide[:, 1]], axis=1)]
     middle.append(np.stack([3.0 + wide[:, 0], np.full(4, 6.0 - D_1 - 3.0), wide[:, 1]], axis=1))

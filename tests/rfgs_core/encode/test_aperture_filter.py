@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
+from antennas import one_device
 
 from rfgs_core.encode.matched_filter import aperture_filter, matched_filter
 from rfgs_core.radio import frame_samples, place_devices, preset
@@ -51,6 +52,6 @@ def test_it_is_the_matched_filter_of_so_many_devices() -> None:
     every = np.zeros((len(value), len(value), len(freq_hz)), np.complex64)
     every[np.arange(len(value)), np.arange(len(value))] = value
     pair = np.where(np.eye(len(value), dtype=bool), 0, -1)
-    expected = matched_filter(every, tx_xyz, rx_xyz, pair, freq_hz, points)[0, 0]
+    expected = matched_filter(every, one_device(tx_xyz, rx_xyz), pair, freq_hz, points)[0, 0]
     got = aperture_filter(value, tx_xyz, rx_xyz, freq_hz, points)
     assert np.allclose(got, expected, atol=1e-6)

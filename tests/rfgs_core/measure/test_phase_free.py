@@ -68,8 +68,7 @@ def test_the_map_of_a_hologram_peaks_where_the_echo_is(make_observations) -> Non
     axes = [np.arange(0.2, high, 0.1) for high in (4.0, 3.5, 2.5)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
     pair, _ = seen.pairs
-    geometry = (seen.layout.tx_xyz, seen.layout.rx_xyz, pair, seen.freq_hz)
-    power = matched_filter_map(change.delta, *geometry, points)
+    power = matched_filter_map(change.delta, seen.layout, pair, seen.freq_hz, points)
     best = points[np.log(power).mean(axis=0).argmax()]
     np.testing.assert_allclose(best, PLACE_M, atol=0.11)
 

@@ -8,7 +8,14 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from rfgs_core.radio.delay import band_window, delay_profile, hann, hann_between, hann_to_zero
+from rfgs_core.radio.delay import (
+    band_window,
+    delay_profile,
+    delay_transform,
+    hann,
+    hann_between,
+    hann_to_zero,
+)
 
 
 @pytest.mark.parametrize("window", [hann, hann_to_zero, hann_between])
@@ -29,3 +36,15 @@ def test_hidden_subcarriers_have_no_weight() -> None:
     window = band_window(subcarriers)
     assert window.sum() == pytest.approx(1.0)
     assert (window[~subcarriers] == 0).all() and (window[subcarriers] > 0).all()
+
+
+def test_places_on_the_grid_are_the_plain_sum() -> None:
+    """Σ H_k e^{j2π k m / size} / size of subcarriers with gaps, below and above the reference."""
+    rng = np.random.default_rng(3)
+    place = np.array([-5, -4, -1, 0, 2, 3])
+    values = rng.standard_normal((2, 6)) + 1j * rng.standard_normal((2, 6))
+    got = delay_transform(values, 24, place)
+    turn = np.exp(2j * np.pi * np.outer(place, np.arange(24)) / 24)
+    np.testing.assert_allclose(got, values @ turn / 24, atol=1e-12)
+    counted = delay_transform(values, 24)
+    np.testing.assert_allclose(counted, delay_transform(values, 24, np.arange(6)), atol=1e-15)

@@ -96,6 +96,17 @@ def test_measured_links(own: str, expected: list[list[int]]) -> None:
     np.testing.assert_array_equal(elements.measured, by_device)
 
 
+def test_blocks_and_centres_of_a_device_pair() -> None:
+    radio = preset("wifi")
+    elements = layout(radio, place_devices(radio, BOUNDS_M))
+    marked = np.zeros(elements.measured.shape, bool)
+    marked[elements.block_of(1, 2)] = True
+    np.testing.assert_array_equal(marked, elements.links_between(1, 2))
+    sender, receiver = elements.centres_of(1, 2)
+    np.testing.assert_allclose(sender, elements.tx_xyz[1])
+    np.testing.assert_allclose(receiver, elements.rx_xyz[128:192].mean(axis=0))
+
+
 def test_ports_of_an_element_share_its_place_and_site() -> None:
     radio = replace(preset("wifi_commodity"), polarization="VH")
     elements = layout(radio, place_devices(radio, BOUNDS_M))

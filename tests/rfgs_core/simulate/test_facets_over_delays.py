@@ -11,9 +11,9 @@ from rfgs_core.radio.antennas import PATTERNS, field, spherical_basis
 from rfgs_core.radio.reflection import slab
 from rfgs_core.simulate.paths.fields import past_slab
 from rfgs_core.simulate.scatter.antenna import CODES, Antenna, sent_towards
-from rfgs_core.simulate.scatter.arrivals import past
 from rfgs_core.simulate.scatter.grid import array_reach, delay_grid, to_subcarriers
 from rfgs_core.simulate.scatter.kernel import Arrays, Patches, spread_facets
+from rfgs_core.simulate.scatter.waves import past
 from rfgs_core.simulate.scatter.ways import _offsets
 from rfgs_core.simulate.surface.facets import facet_sum
 

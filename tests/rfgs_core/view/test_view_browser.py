@@ -103,7 +103,7 @@ def test_gaussians_are_drawn_move_and_hide(browser: Browser) -> None:
     second = far_ones(pixels(page))
     # The sphere goes 20 cm along x, which is to the right from where the page looks.
     assert second.mean() > first.mean() + 5
-    everything = viewer.panel.choice()
+    everything = viewer.panel.selection()
     viewer.panel.set("min_opacity", 0.9)
     viewer.update()
     assert len(far_ones(pixels(page))) < 5
@@ -112,10 +112,10 @@ def test_gaussians_are_drawn_move_and_hide(browser: Browser) -> None:
 
 def test_clicks_on_the_page_reach_the_viewer(browser: Browser) -> None:
     panel = browser.viewer.panel
-    tick(browser, "Room", lambda: not panel.choice().room)
+    tick(browser, "Room", lambda: not panel.selection().room)
     tick(browser, "Play", lambda: panel.playing)
     tick(browser, "Play", lambda: not panel.playing)
-    tick(browser, "Room", lambda: panel.choice().room)
+    tick(browser, "Room", lambda: panel.selection().room)
     assert browser.complaints == []
 
 

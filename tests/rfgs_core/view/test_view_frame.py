@@ -19,7 +19,7 @@ from rfgs_core.run import Run
 from rfgs_core.view.frame import Mesh, ShownFrame, distance_m, load_frame
 from rfgs_core.view.frames import Frames, finished_frames, where_people_are
 from rfgs_core.view.outline import level_lines
-from rfgs_core.view.pictures import beside_true
+from rfgs_core.view.pictures import rendered_and_true
 from rfgs_core.view.radios import radio_shapes
 from rfgs_core.view.room import cut_open, room_of
 from rfgs_core.view.skeletons import fitted_bones
@@ -133,7 +133,8 @@ def test_a_smooth_mesh_has_no_edges(shown: ShownFrame) -> None:
 
 def test_the_rendered_picture_stands_left_of_the_true_one(known_run: Run) -> None:
     seen = {
-        row["name"]: beside_true(known_run, row["name"], 1) for row in known_run.sequence.cameras
+        row["name"]: rendered_and_true(known_run, row["name"], 1)
+        for row in known_run.sequence.cameras
     }
     held = known_run.sequence.splits["images"]
     for name, beside in seen.items():

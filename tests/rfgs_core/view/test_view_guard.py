@@ -39,10 +39,10 @@ def fresh(known_run: Run) -> Iterator[Viewer]:
 
 def toggle(viewer: Viewer, client: Client, label: str) -> None:
     """Ticks a control and waits until the viewer has heard of it."""
-    before = viewer.panel.choice()
+    before = viewer.panel.selection()
     client.choose(label, not getattr(before, label.lower()))
     end = time.monotonic() + 20.0
-    while not viewer.panel.choice().differs(before, label.lower()):
+    while not viewer.panel.selection().differs(before, label.lower()):
         assert time.monotonic() < end, "nobody told the viewer"
         viewer.step(limit_s=0.5)
 
@@ -120,13 +120,13 @@ def test_everywhere_means_numbers_and_the_own_name(known_run: Run) -> None:
 def test_values_that_no_control_has_change_nothing(
     viewer: Viewer, label: str, value: object, caplog: pytest.LogCaptureFixture
 ) -> None:
-    before = viewer.panel.choice()
+    before = viewer.panel.selection()
     with connected(viewer.server) as client:
         client.read(lambda: label in client.controls)
         client.choose(label, value)
         toggle(viewer, client, "Links")
-        assert not viewer.panel.choice().differs(before, "frame", "mode", "room", "camera")
-        assert viewer.panel.choice().brightness == before.brightness
+        assert not viewer.panel.selection().differs(before, "frame", "mode", "room", "camera")
+        assert viewer.panel.selection().brightness == before.brightness
         assert caplog.text.count(label) <= 1
     answers(viewer)
 
@@ -159,7 +159,7 @@ def test_a_thousand_junk_messages_and_it_still_answers(
     fresh: Viewer, caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]
 ) -> None:
     state = random.Random(5)
-    before = fresh.panel.choice()
+    before = fresh.panel.selection()
     with connected(fresh.server) as client:
         client.read(lambda: "Room" in client.controls)
         for _ in range(1000):
@@ -167,7 +167,7 @@ def test_a_thousand_junk_messages_and_it_still_answers(
         toggle(fresh, client, "Room")
         toggle(fresh, client, "Room")
     answers(fresh)
-    assert fresh.panel.choice() == before
+    assert fresh.panel.selection() == before
     # One line per kind, and not more than a screen of them.
     assert 1 <= len(caplog.records) <= 25
     assert all(record.exc_info is None for record in caplog.records)

@@ -167,11 +167,11 @@ def test_ticks_show_and_hide(page: tuple[Viewer, Client], known_run: Run) -> Non
 def test_playing_moves_to_the_next_frame_and_round(page: tuple[Viewer, Client]) -> None:
     viewer, _ = page
     change(page, Play=True)
-    frames = [viewer.panel.choice().frame]
+    frames = [viewer.panel.selection().frame]
     for _ in range(60):
         viewer.step()
-        if viewer.panel.choice().frame != frames[-1]:
-            frames.append(viewer.panel.choice().frame)
+        if viewer.panel.selection().frame != frames[-1]:
+            frames.append(viewer.panel.selection().frame)
         if len(frames) == 4:
             break
     change(page, Play=False)
@@ -200,7 +200,7 @@ def test_what_a_capture_does_not_hold_is_not_offered(tiny_dataset: Path, tmp_pat
             client.read(lambda: "no true picture" in str(client.labelled("GuiMarkdownMessage")))
         assert not {"/truth/outline", "/truth/name", "/room/edges"} & set(client.nodes)
         assert client.controls["Ground truth"]["disabled"]
-        assert viewer.panel.choice().mode == "power", "the next best to the unknown error"
+        assert viewer.panel.selection().mode == "power", "the next best to the unknown error"
         with pytest.raises(RfgsError, match="nothing to colour by error; expected one of display"):
             Viewer(run, server, mode="error")
 
@@ -208,8 +208,12 @@ def test_what_a_capture_does_not_hold_is_not_offered(tiny_dataset: Path, tmp_pat
 def test_a_page_begins_with_errors_as_points_over_a_thin_named_outline(known_run: Run) -> None:
     with running_server("127.0.0.1", 0) as server:
         viewer = Viewer(known_run, server, play=True)
-        choice = viewer.panel.choice()
-        assert (choice.mode, choice.drawn_as, choice.truth) == ("error", "points", "outline")
+        selection = viewer.panel.selection()
+        assert (selection.mode, selection.drawn_as, selection.truth) == (
+            "error",
+            "points",
+            "outline",
+        )
         assert viewer.panel.playing
         with connected(server) as client:
             client.read(lambda: "/points" in client.nodes and "Camera" in client.controls)

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rfgs_core.encode.body_maps import band_weights, body_maps, views_of
+from rfgs_core.encode.body_maps import body_maps, views_of
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.radio.delay import band_window, hann
 from rfgs_core.radio.layout import DevicePose, Layout, layout
 from rfgs_core.radio.presets import preset
 from rfgs_core.simulate.surface.facets import facet_sum
@@ -60,7 +61,7 @@ def test_maps_of_facets_are_those_of_their_channel(name: str, gap: bool, toleran
         subcarriers[5 * len(freq_hz) // 8 : 6 * len(freq_hz) // 8] = False
     views = views_of(lay, lay.measured)
     change = np.zeros((len(lay.tx_xyz), len(lay.rx_xyz), len(freq_hz)), dtype=np.complex128)
-    band = Band.of(freq_hz, band_weights(subcarriers), SKIN)
+    band = Band.of(freq_hz, band_window(subcarriers, hann), SKIN)
     found = []
     for view in views:
         by_tx, by_rx = (facing(points, normals, end.centre) for end in (view.tx, view.rx))
@@ -83,7 +84,7 @@ def test_a_wall_shows_what_the_mirrored_body_would() -> None:
     """Transmitter and receiver mirrored in a wall hear what they heard of the mirrored body."""
     lay, freq_hz = placed("wifi")
     points, normals, areas = body()
-    band = Band.of(freq_hz, band_weights(np.ones(len(freq_hz), dtype=bool)), SKIN)
+    band = Band.of(freq_hz, band_window(np.ones(len(freq_hz), dtype=bool), hann), SKIN)
     view = views_of(lay, lay.measured)[0]
     listener = Listener.at(CENTRE, view, band)
     tx, rx = (mirrored(end, 1, -2.0) for end in (view.tx, view.rx))
@@ -115,7 +116,7 @@ def test_a_disc_on_the_line_of_sight_shadows_as_kirchhoff_says() -> None:
     normals = np.tile([-1.0, 0.0, 0.0], (len(points), 1))
     areas = np.full(len(points), np.pi * radius**2 / len(points))
     everything = np.ones(radio.num_subcarriers, dtype=bool)
-    band = Band.of(radio.freq_hz, band_weights(everything), SKIN)
+    band = Band.of(radio.freq_hz, band_window(everything, hann), SKIN)
     view = next(v for v in views_of(lay, lay.measured) if v.pair == (0, 1))
     centre = np.array([0.0, 0.0, 0.95])
     listener = Listener.at(centre, view, band)

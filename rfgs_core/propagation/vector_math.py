@@ -25,15 +25,15 @@ FAST_MATH = {"nnan", "ninf", "nsz", "arcp", "contract"}
 #: Where a sum over Gaussians shall become a vector sum, in an order fixed at compile time. Not
 #: elsewhere: numba optimises code that it caches once more than code that it runs at once, and
 #: terms that may be reordered then end in other last bits.
-FAST_SUMS = FAST_MATH | {"reassoc"}
+FAST_REDUCTION = FAST_MATH | {"reassoc"}
 
 #: Gaussians per block: about thirty rows of this many float32 numbers stay in the L1 cache.
-LANES = 128
+BLOCK = 128
 
 #: Rows kept free on both sides of a block's scratch. Vector code asks at run time whether what it
 #: writes lies near what it reads, and takes the scalar way (other last bits) where it does: the
 #: heap's layout would show in the result.
-_APART = 32
+_SPARE_ROWS = 32
 
 _OPTIONS: Any = {"fastmath": FAST_MATH, "error_model": "numpy"}
 _F = np.float32
@@ -44,8 +44,8 @@ _LOWEST = _F(-87.0)
 
 @njit(**_OPTIONS)
 def scratch(rows: int, like: np.ndarray) -> np.ndarray:
-    """Zeroed [rows, LANES] for one block in the precision of `like`, apart from other arrays."""
-    return np.zeros((rows + 2 * _APART, LANES), dtype=like.dtype)[_APART:-_APART]
+    """Zeroed [rows, BLOCK] for one block in the precision of `like`, apart from other arrays."""
+    return np.zeros((rows + 2 * _SPARE_ROWS, BLOCK), dtype=like.dtype)[_SPARE_ROWS:-_SPARE_ROWS]
 
 
 @njit(inline="always", **_OPTIONS)

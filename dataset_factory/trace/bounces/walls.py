@@ -156,8 +156,9 @@ def _legs(paths: PathSet) -> tuple[_Legs, _Legs]:
     at = np.argmax(paths.kinds == SCATTERING, axis=1)
     count = (paths.kinds != 0).sum(axis=1)
     tables = paths.kinds, paths.objects, paths.primitives
-    sent = _Legs(paths.vertices, *tables, at)
+    sent = _Legs(paths.vertices, paths.kinds, paths.objects, paths.primitives, at)
     back = np.maximum(count[:, None] + 1 - np.arange(paths.vertices.shape[1]), 0)
     corner = np.maximum(back[:, 1:-1] - 1, 0)
-    turned = (table[rows, corner] for table in tables)
-    return sent, _Legs(paths.vertices[rows, back], *turned, count - 1 - at)
+    kinds, objects, primitives = (table[rows, corner] for table in tables)
+    heard = _Legs(paths.vertices[rows, back], kinds, objects, primitives, count - 1 - at)
+    return sent, heard

@@ -65,7 +65,7 @@ def _spread(shape, row, mask, total, qx, qy, qz):
 
 @triton.jit
 def _sine_cosine(turns):
-    """Sine and cosine of 2 pi `turns` in [-0.5, 0.5], as `vector_math` has them: no branch, no table."""
+    """Sine and cosine of 2 pi `turns` in [-0.5, 0.5], as in `vector_math`: no branch, no table."""
     x = turns * turns
     s = -0.0070283 * x + 0.08205035
     s = s * x - 0.59925219

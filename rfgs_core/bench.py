@@ -63,7 +63,7 @@ class PropagationBench:
 
 
 @dataclass(frozen=True)
-class _Scene:
+class CloudAndLinks:
     """Inputs that both twins get, and a random gradient of the CSI."""
 
     gaussians: RadioGaussians
@@ -89,9 +89,9 @@ def bench_propagation(config: PropagationBench | None = None) -> dict[str, float
         tensor), seconds of each twin, sizes and hardware.
     """
     config = config or PropagationBench()
-    scene = _scene(config)
-    _fast_gradients(scene)  # Compiles, or loads compiled code.
-    fast_s, (fast_csi, fast_grads) = _best(lambda: _fast_gradients(scene), config.repeats)
+    scene = cloud_and_links(config)
+    with_gradients(scene)  # Compiles, or loads compiled code.
+    fast_s, (fast_csi, fast_grads) = _best(lambda: with_gradients(scene), config.repeats)
     fast_forward_s, _ = _best(lambda: _fast_forward(scene), config.repeats)
     plain_forward_s, _ = _best(lambda: _plain(scene, MAX_ELEMENTS, False), 2)
     plain_s, (plain_csi, plain_grads) = _best(lambda: _plain(scene, MAX_ELEMENTS, True), 2)
@@ -118,7 +118,7 @@ def bench_propagation(config: PropagationBench | None = None) -> dict[str, float
     }
 
 
-def _scene(config: PropagationBench) -> _Scene:
+def cloud_and_links(config: PropagationBench) -> CloudAndLinks:
     """A random cloud between a transmitter and an array, float32."""
     generator = torch.Generator().manual_seed(config.seed)
 
@@ -158,7 +158,7 @@ def _scene(config: PropagationBench) -> _Scene:
     csi_shape = (links, config.num_subcarriers)
     grad = torch.complex(normal(*csi_shape), normal(*csi_shape)).to(torch.complex64)
     paths = _paths(link_rows, config.paths_per_link, wavelength_m, uniform)
-    return on_device(_Scene(gaussians, link_rows, subcarriers, paths, grad), config.device)
+    return on_device(CloudAndLinks(gaussians, link_rows, subcarriers, paths, grad), config.device)
 
 
 def _paths(
@@ -199,18 +199,18 @@ def _grads(gaussians: RadioGaussians) -> dict[str, Tensor]:
     }
 
 
-def _fast_forward(scene: _Scene) -> Complex[Tensor, "link subcarrier"]:
+def _fast_forward(scene: CloudAndLinks) -> Complex[Tensor, "link subcarrier"]:
     """CSI of the compiled model without a graph."""
     with torch.no_grad():
         return propagate(scene.gaussians, scene.links, scene.subcarriers, scene.paths)
 
 
-def _pull(csi: Complex[Tensor, "link subcarrier"], scene: _Scene) -> None:
+def _pull(csi: Complex[Tensor, "link subcarrier"], scene: CloudAndLinks) -> None:
     """Sends the scene's gradient back through the CSI."""
     torch.autograd.backward(csi, scene.grad)
 
 
-def _fast_gradients(scene: _Scene) -> tuple[Tensor, dict[str, Tensor]]:
+def with_gradients(scene: CloudAndLinks) -> tuple[Tensor, dict[str, Tensor]]:
     """CSI and gradients of the compiled model."""
     g = _leaves(scene.gaussians)
     csi = propagate(g, scene.links, scene.subcarriers, scene.paths)
@@ -218,7 +218,9 @@ def _fast_gradients(scene: _Scene) -> tuple[Tensor, dict[str, Tensor]]:
     return csi.detach(), _grads(g)
 
 
-def _plain(scene: _Scene, elements: int, gradients: bool) -> tuple[Tensor, dict[str, Tensor]]:
+def _plain(
+    scene: CloudAndLinks, elements: int, gradients: bool
+) -> tuple[Tensor, dict[str, Tensor]]:
     """CSI and gradients of the plain twin, in blocks of `elements` of (M, link, subcarrier)."""
     g = _leaves(scene.gaussians)
     links, subcarriers, paths = scene.links, scene.subcarriers, scene.paths

@@ -29,6 +29,8 @@ class BenchArgs:
     tracers: the fast tracer beside Sionna RT on our scenes, as `rfgs-factory tracers`.
     limbs: joints and surface of a dataset's one person beside what knows less.
     people: how often a dataset's people are counted right, beside channels without any.
+    scaling: how the cost of the fast tracer and of propagation grows over two decades of facets,
+    Gaussians, links and subcarriers: CPU seconds and exponents, some two minutes.
     """
 
     part: tyro.conf.Positional[
@@ -42,6 +44,7 @@ class BenchArgs:
             "tracers",
             "limbs",
             "people",
+            "scaling",
         ]
     ]
     """What to time or judge."""
@@ -90,6 +93,8 @@ def _bench(args: BenchArgs) -> Callable[[], dict[str, Any]]:
         return partial(_limbs, args)
     if args.part == "people":
         return partial(_people, args)
+    if args.part == "scaling":
+        return _scaling
     if args.part == "raster":
         from rfgs_core.render.bench import bench_raster
 
@@ -170,6 +175,12 @@ def _people(args: BenchArgs) -> dict[str, Any]:
             sequence, args.radio, frames, everything=not args.hold_out, on_frame=bar.update
         )
     return {**table, **hardware()}
+
+
+def _scaling() -> dict[str, Any]:
+    from rfgs_core.scaling import bench_scaling
+
+    return bench_scaling(lambda words: _note(f"timing {words}"))
 
 
 def _note(line: str) -> None:

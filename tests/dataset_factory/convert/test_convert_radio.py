@@ -18,6 +18,11 @@ from rfgs_core.dataset.csi_store import write_csi
 from rfgs_core.radio.impairments import IMPAIRMENT_PRESETS
 
 
+def _pixels(file: Path) -> np.ndarray:
+    with Image.open(file) as image:
+        return np.asarray(image)
+
+
 def test_nerf2_spectra_point_at_the_transmitter(tiny_copy: Path, tmp_path: Path) -> None:
     sequence = open_dataset(tiny_copy).sequence()
     # Line of sight alone: the strongest direction is then known exactly.
@@ -41,7 +46,7 @@ def test_nerf2_spectra_point_at_the_transmitter(tiny_copy: Path, tmp_path: Path)
         with (gateway / "samples.csv").open() as stream:
             rows = list(csv.DictReader(stream))
         for row, place in zip(rows, tx, strict=True):
-            spectrum = pixels(gateway / "spectrum" / f"{row['name']}.png")
+            spectrum = _pixels(gateway / "spectrum" / f"{row['name']}.png")
             assert spectrum.shape == (90, 360) and spectrum.max() == 255
             away = turn.T @ (place - info["position"])
             distance_m = np.linalg.norm(away)

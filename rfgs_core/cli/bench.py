@@ -29,6 +29,8 @@ class BenchArgs:
     tracers: the fast tracer beside Sionna RT on our scenes, as `rfgs-factory tracers`.
     limbs: joints and surface of a dataset's one person beside what knows less.
     people: how often a dataset's people are counted right, beside channels without any.
+    fields: the grid search that settings of neural fields, our rivals, were taken from.
+
     scaling: how the cost of the fast tracer and of propagation grows over two decades of facets,
     Gaussians, links and subcarriers: CPU seconds and exponents, some two minutes.
     """
@@ -44,6 +46,7 @@ class BenchArgs:
             "tracers",
             "limbs",
             "people",
+            "fields",
             "scaling",
         ]
     ]
@@ -53,9 +56,9 @@ class BenchArgs:
     blender: Path | None = None
     """Blender program for the part `blender`; else $BLENDER, else pip's bpy."""
     dataset: Path | None = None
-    """Dataset for the parts `training`, `limbs` and `people`."""
+    """Dataset for the parts `training`, `limbs`, `people` and `fields`."""
     radio: str = "wifi"
-    """Radio for the parts `training`, `limbs` and `people`."""
+    """Radio for these parts."""
     network: Path | None = None
     """Network for the part `limbs`, as `rfgs limbs` makes it; left out: the one that comes with
     the package."""
@@ -64,11 +67,11 @@ class BenchArgs:
     frames: str | None = None
     """Frames A:B[:STEP] (inclusive) for the part `people`; all when left out."""
     frame: int | None = None
-    """Frame for the part `training`; the first one when left out."""
+    """Frame for the parts `training` and `fields`; the first one when left out."""
     gaussians: int = 20_000
     """Gaussians for the parts `propagation` and `training`."""
     steps: int | None = None
-    """Adam steps for the part `training`; left out: until the loss stands still."""
+    """Adam steps for the parts `training` (left out: until the loss stands still) and `fields`."""
     device: Device = "cpu"
     """Where the parts `propagation` and `training` run: cpu, or cuda, the current GPU."""
     json: Path | None = None
@@ -93,6 +96,8 @@ def _bench(args: BenchArgs) -> Callable[[], dict[str, Any]]:
         return partial(_limbs, args)
     if args.part == "people":
         return partial(_people, args)
+    if args.part == "fields":
+        return partial(_fields, args)
     if args.part == "scaling":
         return _scaling
     if args.part == "raster":
@@ -175,6 +180,37 @@ def _people(args: BenchArgs) -> dict[str, Any]:
             sequence, args.radio, frames, everything=not args.hold_out, on_frame=bar.update
         )
     return {**table, **hardware()}
+
+
+def _fields(args: BenchArgs) -> dict[str, Any]:
+    from tqdm import tqdm
+
+    from rfgs_core.bench import hardware
+    from rfgs_core.dataset import open_dataset
+    from rfgs_core.errors import RfgsError
+    from rfgs_core.evaluate.field_search import candidates, search, search_table
+    from rfgs_core.frames import chosen_frames
+    from rfgs_core.neural.settings import FieldSettings
+    from rfgs_core.settings import TrainConfig
+
+    if args.dataset is None:
+        raise RfgsError("bench fields: expected --dataset FOLDER, see `rfgs-factory generate`")
+    dataset = open_dataset(args.dataset)
+    frames = dataset.sequence().frames
+    frame = chosen_frames(None if args.frame is None else str(args.frame), frames)[0]
+    tried = candidates(args.steps or FieldSettings().steps)
+    with tqdm(total=len(tried), desc="fields") as bar:
+        rows = search(dataset, args.radio, frame, TrainConfig(grid_side=32), tried, bar.update)
+    _note(search_table(rows))
+    names = ("kind", "objective", "learning_rate", "octaves", "finest_m", "contrast", "evenness")
+    table = {
+        " ".join(f"{name} {row[name]}" for name in names): [
+            row[key] for key in ("f05", "f10", "f20")
+        ]
+        for row in rows
+    }
+    steps = {"steps": tried[0].steps, "radio": args.radio, "frame": frame}
+    return {**table, **steps, **hardware()}
 
 
 def _scaling() -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -15,7 +15,7 @@ from jaxtyping import Float
 from tqdm import tqdm
 
 from rfgs_core.evaluate.background import Backgrounds, background_metrics
-from rfgs_core.evaluate.baselines import BASELINES, BaselineResult, phase_free
+from rfgs_core.evaluate.baselines import BASELINES, Baseline, BaselineResult, phase_free
 from rfgs_core.evaluate.geometry import GEOMETRY_KEYS, geometry_metrics
 from rfgs_core.evaluate.image import IMAGE_KEYS
 from rfgs_core.evaluate.oracle import oracle_scores
@@ -93,6 +93,19 @@ def _circumstances(scene: Scene) -> dict[str, Any]:
     }
 
 
+def evaluate_method(run: EvaluatedRun) -> dict[str, dict[str, Values]]:
+    """Geometry and channels of a run by itself, without baselines, ceiling, pictures or files.
+
+    Returns:
+        The groups of the method, and of its Gaussians without their residual.
+    """
+    scene, table = Scene.of(run), _Table()
+    for frame in run.frames:
+        _evaluate_frame(scene, frame, table, None, lambda: None, {})
+    groups = table.groups({})
+    return {name: groups[name] for name in (METHOD, GAUSSIANS_ALONE)}
+
+
 class _Table:
     """Per-frame rows of the method and of each baseline, its people, and why values are missing."""
 
@@ -166,6 +179,7 @@ def _evaluate_frame(
     table: _Table,
     room: Backgrounds | None,
     on_step: Callable[[], Any],
+    baselines: Mapping[str, Baseline] = BASELINES,
 ) -> None:
     """Method and baselines on one frame."""
     reference, csi = scene.reference(frame), scene.csi(frame)
@@ -188,7 +202,7 @@ def _evaluate_frame(
     )
     _add(scene, table, GAUSSIANS_ALONE, frame, model, reference, csi)
     on_step()
-    for name, baseline in BASELINES.items():
+    for name, baseline in baselines.items():
         result = phase_free.answer(name, baseline, evidence, scene.observe)
         _add(scene, table, name, frame, result, reference, csi)
         on_step()

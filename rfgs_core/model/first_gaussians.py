@@ -30,16 +30,20 @@ def quats_from_normals(normals: Float[np.ndarray, "N 3"]) -> Float[Tensor, "N 4"
     return torch.from_numpy(quats / np.linalg.norm(quats, axis=1, keepdims=True)).float()
 
 
-def gaussians_at(points: Float[np.ndarray, "N 3"], normals: Float[np.ndarray, "N 3"]) -> Gaussians:
-    """Flat Gaussians at `points` facing along `normals`, features zero."""
+def gaussians_at(
+    points: Float[np.ndarray, "N 3"],
+    normals: Float[np.ndarray, "N 3"],
+    scales_m: tuple[float, float, float] = START_SCALES_M,
+) -> Gaussians:
+    """Gaussians of one size at `points` facing along `normals`, features zero."""
     count = len(points)
-    blob_m2 = 2 * math.pi * START_SCALES_M[0] * START_SCALES_M[1]
+    blob_m2 = 2 * math.pi * scales_m[0] * scales_m[1]
     layers = START_COVERAGE * SILHOUETTE_M2 / (max(count, 1) * blob_m2)
     opacity = torch.full((count,), min(layers, 0.5))
     return Gaussians(
         means=torch.from_numpy(np.ascontiguousarray(points)).float(),
         quats=quats_from_normals(normals),
-        log_scales=torch.log(torch.tensor(START_SCALES_M)).repeat(count, 1),
+        log_scales=torch.log(torch.tensor(scales_m)).repeat(count, 1),
         logit_opacities=torch.logit(opacity),
         features=torch.zeros(count, FEATURE_DIM),
     )

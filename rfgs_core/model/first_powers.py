@@ -34,16 +34,26 @@ def visibility(
     return np.array(rows, dtype=np.float32)
 
 
-def fit_power(observations: Observations, gaussians: Gaussians) -> Float[Tensor, "M"]:
-    """Reflected powers from delay–angle maps: equal ones, at the level of the typical map.
+def fit_power(
+    observations: Observations,
+    gaussians: Gaussians,
+    shares: Float[np.ndarray, "M"] | None = None,
+) -> Float[Tensor, "M"]:
+    """Reflected powers from delay–angle maps, at the level of the typical map.
 
     Each map has a gain of its own against the model: wall bounces and the neighbours of an
     antenna lift or lower whole device pairs.
+
+    Args:
+        observations: The frame.
+        gaussians: Where they are and how they face.
+        shares: How powers are to each other; None: equal.
     """
+    shares = np.ones(len(gaussians)) if shares is None else shares
     points = gaussians.means.numpy().astype(np.float64)
     model = DelayPowerModel(observations, points)
     seen = visibility(points, gaussians.rotations[:, :, 2].numpy(), model)
-    start = model.scaled(np.ones(len(points), dtype=np.float32), seen)
+    start = model.scaled(shares.astype(np.float32), seen)
     gain = [
         data.sum() / max(float(model.expected(k, start * seen[k]).sum()), 1e-30)
         for k, (_, _, data) in enumerate(model.parts)

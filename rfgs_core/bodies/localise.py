@@ -74,15 +74,19 @@ class PairMaps:
         return np.stack([map_coordinates(pair, index, order=1, mode="nearest") for pair in column])
 
 
-def pair_maps(observations: Observations) -> PairMaps:
+def pair_maps(observations: Observations, spacing_m: float | None = None) -> PairMaps:
     """Matched-filter maps over the scene bounds.
 
-    Within one pair the map is as smooth as range resolution and beam width; the grid follows
-    the finer of the two, between 4 and 12 cm.
+    Within one pair the map is as smooth as range resolution and beam width.
+
+    Args:
+        observations: The frame.
+        spacing_m: Spacing of the grid [m]; None follows the range resolution, between 4 and 12 cm.
     """
     freq_hz = observations.freq_hz
-    bandwidth_hz = float(freq_hz[-1] - freq_hz[0])
-    spacing_m = float(np.clip(0.5 * SPEED_OF_LIGHT / (2 * bandwidth_hz), 0.04, 0.12))
+    if spacing_m is None:
+        bandwidth_hz = float(freq_hz[-1] - freq_hz[0])
+        spacing_m = float(np.clip(0.5 * SPEED_OF_LIGHT / (2 * bandwidth_hz), 0.04, 0.12))
     low, high = observations.bounds_m
     axes = [np.arange(low[k] + spacing_m / 2, high[k], spacing_m) for k in range(3)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)

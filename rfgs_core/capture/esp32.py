@@ -89,7 +89,25 @@ def read(path: Path) -> Reading:
         RfgsError: The file cannot be read.
         RfgsFormatError: It is empty, too large or holds no channel.
     """
-    data = read_bytes(path)
+    return decode(path, read_bytes(path))
+
+
+def is_record(data: bytes) -> bool:
+    """Whether bytes are one whole line of a packet, with or without its end."""
+    line = data.rstrip(b"\r\n")
+    return line.startswith(b"CSI_DATA,") and line.rstrip(b'"').endswith(b"]") and b"\n" not in line
+
+
+def decode(path: Path, data: bytes) -> Reading:
+    """Reads lines that are at hand; see `read`.
+
+    Args:
+        path: Where they are from, for messages.
+        data: The lines.
+
+    Raises:
+        RfgsFormatError: They hold no channel, or too many.
+    """
     damage = {"lines that hold no whole channel": 0}
     groups: dict[tuple[int, ...], list[_Row]] = {}
     for row in _rows(data, damage):

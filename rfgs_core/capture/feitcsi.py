@@ -62,7 +62,24 @@ def read(path: Path) -> Reading:
         RfgsError: The file cannot be read.
         RfgsFormatError: It is empty, too large or holds no record.
     """
-    data = read_bytes(path)
+    return decode(path, read_bytes(path))
+
+
+def is_record(data: bytes) -> bool:
+    """Whether bytes are one whole record."""
+    return 0 < _size(data, 0) == len(data)
+
+
+def decode(path: Path, data: bytes) -> Reading:
+    """Reads records that are at hand; see `read`.
+
+    Args:
+        path: Where they are from, for messages.
+        data: The records.
+
+    Raises:
+        RfgsFormatError: They hold no record, or too many.
+    """
     places, damage = _places(data)
     groups: dict[tuple[int, int, int, int], list[int]] = {}
     for place in places:

@@ -14,7 +14,7 @@ from jaxtyping import Complex64, Int64
 
 from rfgs_core.capture.file_bytes import read_bytes, refuse_too_many, unwrapped_s
 from rfgs_core.capture.model import Capture, Reading, reading
-from rfgs_core.capture.picoscenes_frames import FORMATS, Frame, frames, is_frame
+from rfgs_core.capture.picoscenes_frames import FORMATS, Frame, frames, is_frame, is_whole_frame
 from rfgs_core.capture.wifi_grid import INTEL_5300, SPACING_HZ, occupied, pilots
 from rfgs_core.sanitize.gaps import fill_gaps
 
@@ -44,10 +44,28 @@ def read(path: Path) -> Reading:
         RfgsError: The file cannot be read.
         RfgsFormatError: It is empty, too large or holds no packet with a channel.
     """
+    return decode(path, read_bytes(path))
+
+
+def is_record(data: bytes) -> bool:
+    """Whether bytes are one whole frame."""
+    return is_whole_frame(data)
+
+
+def decode(path: Path, data: bytes) -> Reading:
+    """Reads frames that are at hand; see `read`.
+
+    Args:
+        path: Where they are from, for messages.
+        data: The frames.
+
+    Raises:
+        RfgsFormatError: They hold no packet with a channel, or too many.
+    """
     damage: dict[str, int] = {}
     groups: dict[tuple, tuple[list[Frame], list[np.ndarray]]] = {}
     values_so_far = stamp = 0
-    for frame in frames(read_bytes(path), damage):
+    for frame in frames(data, damage):
         value = _channel(frame)
         if value is None:
             what = f"packets of {_DEVICES.get(frame.device, hex(frame.device))} that do not decode"

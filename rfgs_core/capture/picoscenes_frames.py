@@ -95,6 +95,11 @@ def is_frame(data: bytes) -> bool:
     return len(data) >= _FRAME.size and data[4:8] == MAGIC
 
 
+def is_whole_frame(data: bytes) -> bool:
+    """Whether bytes are one frame and nothing else."""
+    return _bounds(data, 0)[1] == len(data)
+
+
 def _bounds(data: bytes, at: int) -> tuple[int, int]:
     """First byte after a frame's header and after the frame; (at, −1) where none begins.
 

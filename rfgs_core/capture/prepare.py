@@ -62,8 +62,9 @@ def prepare(
     _need_alike(receivers)
     times_s = [r.capture.time_s + given.offsets_s[d] for d, r in receivers.items()]
     plan = schedule(times_s, given.fps, given.rate_hz)
-    used = _used_antennas([receiver.channels.values for receiver in receivers.values()])
-    radio = _radio(given, next(iter(receivers.values())).channels, used, plan)
+    used = used_antennas([receiver.channels.values for receiver in receivers.values()])
+    first = next(iter(receivers.values())).channels
+    radio = radio_of(given, first, used, plan.packet.shape[2], plan.interval_s)
     csi = _links(given, radio, list(receivers.values()), used, plan.packet)
     if empty is None:
         static = csi.mean(axis=(0, 1))
@@ -71,8 +72,8 @@ def prepare(
         rooms = read(assign(given, empty))
         _need_alike({**receivers, **{-1 - d: room for d, room in rooms.items()}})
         means = [room.channels.values.mean(axis=0, keepdims=True) for room in rooms.values()]
-        first = np.zeros((len(rooms), 1, 1), np.int64)
-        static = _arranged(given, radio, means, used, first)[0, 0]
+        only = np.zeros((len(rooms), 1, 1), np.int64)
+        static = _arranged(given, radio, means, used, only)[0, 0]
     done = _prepared(given, radio, csi, static, receivers, plan, empty is None)
     if sanitise:
         reason = "asked for; absolute delays and levels are gone"
@@ -118,13 +119,28 @@ def _need_alike(receivers: dict[int, _Receiver]) -> None:
             )
 
 
-def _used_antennas(values: list[Complex64[np.ndarray, "time rx tx subcarrier"]]) -> np.ndarray:
+def used_antennas(values: list[Complex64[np.ndarray, "time rx tx subcarrier"]]) -> np.ndarray:
     """RX antennas that any device heard anything with."""
     heard = np.any([value.any(axis=(0, 2, 3)) for value in values], axis=0)
     return np.flatnonzero(heard) if heard.any() else np.arange(len(heard))
 
 
-def _radio(given: CaptureLayout, channels: Channels, used: np.ndarray, plan: Schedule) -> Radio:
+def radio_of(
+    given: CaptureLayout,
+    channels: Channels,
+    used: np.ndarray,
+    samples: int = 1,
+    interval_s: float = 0.0,
+) -> Radio:
+    """The radio that a device's channels come from.
+
+    Args:
+        given: Where the devices stood.
+        channels: What one of them heard.
+        used: RX antennas that any device heard anything with.
+        samples: Packets of a frame.
+        interval_s: Time between them [s].
+    """
     freq_hz, half = channels.freq_hz, 0.5 * channels.spacing_hz
     own = any(device.role == "ACCESS_POINT" for device in given.devices)
     centre_hz = float(freq_hz.mean())
@@ -145,8 +161,8 @@ def _radio(given: CaptureLayout, channels: Channels, used: np.ndarray, plan: Sch
         tx_spacing_m=given.tx_spacing_m,
         own_device_links="only" if len(given.devices) == 1 else "excluded",
         num_devices=len(given.devices),
-        samples_per_frame=plan.packet.shape[2],
-        sample_interval_s=plan.interval_s,
+        samples_per_frame=samples,
+        sample_interval_s=interval_s,
     )
 
 

@@ -26,6 +26,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "room": ("room", "RoomArgs"),
     "inspect": ("inspect_capture", "InspectArgs"),
     "import": ("import_capture", "ImportArgs"),
+    "live": ("live", "LiveArgs"),
     "addon": ("addon", "AddonArgs"),
     "bench": ("bench", "BenchArgs"),
 }

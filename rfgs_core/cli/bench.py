@@ -29,8 +29,8 @@ class BenchArgs:
     tracers: the fast tracer beside Sionna RT on our scenes, as `rfgs-factory tracers`.
     limbs: joints and surface of a dataset's one person beside what knows less.
     people: how often a dataset's people are counted right, beside channels without any.
+    live: six receivers of 1,000 packets/s each over UDP, made here: packets lost, latency, updates.
     fields: the grid search that settings of neural fields, our rivals, were taken from.
-
     scaling: how the cost of the fast tracer and of propagation grows over two decades of facets,
     Gaussians, links and subcarriers: CPU seconds and exponents, some two minutes.
     """
@@ -46,6 +46,7 @@ class BenchArgs:
             "tracers",
             "limbs",
             "people",
+            "live",
             "fields",
             "scaling",
         ]
@@ -66,6 +67,8 @@ class BenchArgs:
     """For the parts `limbs` and `people`: hide what the dataset holds out, as training does."""
     frames: str | None = None
     """Frames A:B[:STEP] (inclusive) for the part `people`; all when left out."""
+    seconds: float = 60.0
+    """How long the part `live` follows its receivers [s]."""
     frame: int | None = None
     """Frame for the parts `training` and `fields`; the first one when left out."""
     gaussians: int = 20_000
@@ -79,32 +82,35 @@ class BenchArgs:
 
 
 def _bench(args: BenchArgs) -> Callable[[], dict[str, Any]]:
-    if args.part == "blender":
-        from rfgs_core.bench import hardware
-        from rfgs_core.blender_bench import bench_blender
-
-        return lambda: {**bench_blender(args.blender), **hardware()}
-    if args.part == "training":
-        return partial(_training, args)
+    """What a part runs; nothing of another part is imported."""
+    parts: dict[str, Callable[[BenchArgs], dict[str, Any]]] = {
+        "blender": _blender,
+        "training": _training,
+        "real": _real,
+        "limbs": _limbs,
+        "people": _people,
+        "live": _live,
+        "fields": _fields,
+        "propagation": _propagation,
+    }
+    if args.part in parts:
+        return partial(parts[args.part], args)
     if args.part == "readers":
         from rfgs_core.real.reading import bench_readers
 
         return bench_readers
-    if args.part == "real":
-        return partial(_real, args)
-    if args.part == "limbs":
-        return partial(_limbs, args)
-    if args.part == "people":
-        return partial(_people, args)
-    if args.part == "fields":
-        return partial(_fields, args)
     if args.part == "scaling":
         return _scaling
-    if args.part == "raster":
-        from rfgs_core.render.bench import bench_raster
+    from rfgs_core.render.bench import bench_raster
 
-        return bench_raster
-    return partial(_propagation, args)
+    return bench_raster
+
+
+def _blender(args: BenchArgs) -> dict[str, Any]:
+    from rfgs_core.bench import hardware
+    from rfgs_core.blender_bench import bench_blender
+
+    return {**bench_blender(args.blender), **hardware()}
 
 
 def _propagation(args: BenchArgs) -> dict[str, Any]:
@@ -180,6 +186,16 @@ def _people(args: BenchArgs) -> dict[str, Any]:
             sequence, args.radio, frames, everything=not args.hold_out, on_frame=bar.update
         )
     return {**table, **hardware()}
+
+
+def _live(args: BenchArgs) -> dict[str, Any]:
+    from rfgs_core.bench import hardware
+    from rfgs_core.errors import RfgsError
+    from rfgs_core.live.bench import bench_live
+
+    if not 1.0 <= args.seconds <= 3600.0:
+        raise RfgsError(f"--seconds {args.seconds:g}: expected 1 to 3600")
+    return {**bench_live(args.seconds, note=_note), **hardware()}
 
 
 def _fields(args: BenchArgs) -> dict[str, Any]:

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float64
@@ -35,16 +36,35 @@ class RadioShapes:
 
 def radio_shapes(sequence: Sequence, radio: str) -> RadioShapes:
     """Shapes of a radio of a sequence; links of a device with itself have no length to show."""
-    devices, elements = sequence.devices(radio), sequence.layout(radio)
+    devices = sequence.devices(radio)
     samples = frame_samples(sequence.radio_spec(radio), sequence.fps, devices)
-    pairs = [pair for pair in elements.device_pairs if pair[0] != pair[1]]
     hidden = {frozenset(pair) for pair in sequence.held_out(radio)["device_pairs"]}
+    shapes = shapes_of(devices, sequence.layout(radio), hidden)
+    if samples.tx_xyz is None or samples.rx_xyz is None:
+        return shapes
+    everywhere = samples.tx_xyz.reshape(-1, 3), samples.rx_xyz.reshape(-1, 3)
+    return replace(shapes, tx_xyz=everywhere[0], rx_xyz=everywhere[1])
+
+
+def shapes_of(
+    devices: list[DevicePose],
+    elements: Layout,
+    hidden: Collection[frozenset[int]] = (),
+) -> RadioShapes:
+    """Shapes of devices that stand still.
+
+    Args:
+        devices: The devices.
+        elements: Their antenna elements.
+        hidden: Pairs of devices that training does not see.
+    """
+    pairs = [pair for pair in elements.device_pairs if pair[0] != pair[1]]
     return RadioShapes(
         names=[device.name for device in devices],
         places=np.array([device.position_m for device in devices]),
         boresights=np.array([_boresight(device) for device in devices]),
-        tx_xyz=elements.tx_xyz if samples.tx_xyz is None else samples.tx_xyz.reshape(-1, 3),
-        rx_xyz=elements.rx_xyz if samples.rx_xyz is None else samples.rx_xyz.reshape(-1, 3),
+        tx_xyz=elements.tx_xyz,
+        rx_xyz=elements.rx_xyz,
         links=np.array([elements.centres_of(*pair) for pair in pairs]).reshape(-1, 2, 3),
         held_out=np.array([frozenset(pair) in hidden for pair in pairs], dtype=bool),
     )

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import yaml
+from PIL import Image
 from scipy.io import loadmat
 from scipy.spatial.transform import Rotation
 

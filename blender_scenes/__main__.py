@@ -68,7 +68,11 @@ def _shapes(description: Path, out: Path) -> int:
         return 2
     from blender_scenes.verification import build
 
-    build(parts, out)
+    try:
+        build(parts, out)
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        sys.stderr.write(f"error: {description}: expected parts as in verification.py: {error!r}\n")
+        return 2
     sys.stdout.write(f"wrote {out}\n")
     return 0
 

@@ -50,6 +50,7 @@ def load_arrays(
     *,
     types: Mapping[str, str] | None = None,
     others: bool = False,
+    optional: Mapping[str, Shape] | None = None,
 ) -> dict[str, np.ndarray]:
     """Reads the arrays of a file.
 
@@ -61,6 +62,7 @@ def load_arrays(
         unknown: Arrays in which a whole row may be NaN, for what is not known.
         types: NumPy's names of the types that arrays may have, with spaces between.
         others: Also read arrays that `shapes` does not name.
+        optional: Shapes of arrays that may be missing.
 
     Raises:
         RfgsError: There is no such file.
@@ -76,7 +78,8 @@ def load_arrays(
                 raise RfgsFormatError(
                     f"{path}: expected named arrays, found a single one; {remedy}"
                 )
-            arrays = _read(stream, None if others or shapes is None else shapes)
+            wanted = None if others or shapes is None else {**shapes, **(optional or {})}
+            arrays = _read(stream, wanted)
     except FileNotFoundError as error:
         raise RfgsError(f"{path}: no such file; {remedy}") from error
     except RfgsFormatError:
@@ -84,7 +87,9 @@ def load_arrays(
     except _DAMAGE as error:
         raise RfgsFormatError(f"{path}: damaged ({error}); {remedy}") from error
     known = {name: _without_unknown(arrays[name]) for name in unknown if name in arrays}
-    problem = _misfit({**arrays, **known}, shapes or {}) or _mistyped(arrays, types or {})
+    there = {name: shape for name, shape in (optional or {}).items() if name in arrays}
+    wanted = {**(shapes or {}), **there}
+    problem = _misfit({**arrays, **known}, wanted) or _mistyped(arrays, types or {})
     if problem:
         raise RfgsFormatError(f"{path}: {problem}; {remedy}")
     return arrays

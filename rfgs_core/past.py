@@ -226,8 +226,8 @@ def _of_usual(kind: str) -> float | None:
 
 
 def _share(file: Path) -> float | None:
-    with suppress(OSError, ValueError, KeyError, TypeError):
-        return float(json.loads(file.read_text())["of_usual"])
+    with suppress(OSError, RfgsError):
+        return read_record(file, _Note).of_usual
     return None
 
 

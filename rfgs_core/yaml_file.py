@@ -12,6 +12,10 @@ from yaml.composer import ComposerError
 from yaml.constructor import ConstructorError
 
 from rfgs_core.errors import RfgsError, RfgsFormatError
+from rfgs_core.links import refuse_link
+
+#: Largest file that is read [bytes]; people write a few kB.
+_LARGEST_BYTES = 2**22
 
 
 class _Loader(yaml.SafeLoader):
@@ -66,7 +70,10 @@ def read_yaml(path: Path) -> Any:
         RfgsError: There is no such file, or it cannot be read.
         RfgsFormatError: The file is no YAML; the message names the line.
     """
+    refuse_link(path)
     try:
+        if path.stat().st_size > _LARGEST_BYTES:
+            raise RfgsFormatError(f"{path}: larger than any YAML file of ours")
         return yaml.load(path.read_text("utf-8"), Loader=_Loader)
     except FileNotFoundError as error:
         raise RfgsError(f"{path}: no such file") from error
@@ -80,5 +87,7 @@ def read_yaml(path: Path) -> Any:
         reason = getattr(error, "problem", None) or "not text"
         remedy = "; put names that begin with * in quotes" if "alias" in str(error) else ""
         raise RfgsFormatError(f"{path}: no valid YAML{line}: {reason}{remedy}") from error
+    except RfgsFormatError:
+        raise
     except (ValueError, RecursionError) as error:
         raise RfgsFormatError(f"{path}: no valid YAML ({error})") from error

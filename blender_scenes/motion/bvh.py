@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,11 @@ from blender_scenes.motion.rotations import about_x, about_y, about_z
 
 _ABOUT = {"Xrotation": about_x, "Yrotation": about_y, "Zrotation": about_z}
 _ALONG = {"Xposition": 0, "Yposition": 1, "Zposition": 2}
+#: Largest file [bytes], most joints, most rotations of all frames, and longest time from frame to
+#: frame [s]: beyond them it is no recording of a person, or one to be cut.
+_MOST_BYTES, _MOST_JOINTS, _MOST_TURNS, _LONGEST_S = 2**27, 1000, 5_000_000, 10.0
+#: Longest word that a message shows.
+_SHOWN = 40
 
 
 @dataclass(frozen=True)
@@ -47,6 +53,8 @@ def read_bvh(path: Path) -> Bvh:
     Raises:
         ValueError: The file is no BVH, or is damaged; the message says where.
     """
+    if path.stat().st_size > _MOST_BYTES:
+        raise ValueError(f"{path}: larger than {_MOST_BYTES >> 20} MiB; cut the recording")
     try:
         text = path.read_text("utf-8")
     except UnicodeDecodeError as error:
@@ -55,7 +63,9 @@ def read_bvh(path: Path) -> Bvh:
     if not head.strip().startswith("HIERARCHY") or not found:
         raise ValueError(f"{path}: expected HIERARCHY and MOTION, as BVH files have")
     names, parents, offsets, channels = _hierarchy(path, iter(head.split()[1:]))
-    values, frame_s = _motion(path, body, sum(len(row) for row in channels))
+    if len(names) > _MOST_JOINTS:
+        raise ValueError(f"{path}: {len(names)} joints; expected at most {_MOST_JOINTS}")
+    values, frame_s = _motion(path, body, sum(len(row) for row in channels), len(names))
     turns = np.broadcast_to(np.eye(3), (len(values), len(names), 3, 3)).copy()
     root = np.broadcast_to(offsets[0], (len(values), 3)).copy()
     column = 0
@@ -90,7 +100,7 @@ def _hierarchy(
                 next(words)
                 line.append(None)
             elif word == "OFFSET":
-                offset = [float(next(words)) for _ in range(3)]
+                offset = [_number(path, next(words)) for _ in range(3)]
                 # The end of a limb has an offset too, but is no joint.
                 offsets += [offset] if line[-1] is not None else []
             elif word == "CHANNELS":
@@ -98,7 +108,7 @@ def _hierarchy(
             elif word == "}":
                 line.pop()
             elif word != "{":
-                raise ValueError(f"{path}: unexpected {word!r} in the hierarchy")
+                raise ValueError(f"{path}: unexpected {word[:_SHOWN]!r} in the hierarchy")
     except (StopIteration, IndexError) as error:
         raise ValueError(f"{path}: the hierarchy ends within a joint") from error
     if not names or line or not len(names) == len(offsets) == len(channels):
@@ -112,25 +122,40 @@ def _last_joint(line: list[int | None]) -> int:
 
 
 def _channels(path: Path, words: Iterator[str]) -> list[str]:
-    row = [next(words) for _ in range(int(next(words)))]
+    row = [next(words) for _ in range(int(_number(path, next(words))))]
     unknown = [name for name in row if name not in _ABOUT and name not in _ALONG]
     if unknown:
-        raise ValueError(f"{path}: unknown channels {', '.join(unknown)}")
+        raise ValueError(f"{path}: unknown channel {unknown[0][:_SHOWN]!r}")
     return row
 
 
-def _motion(path: Path, body: str, columns: int) -> tuple[np.ndarray, float]:
+def _number(path: Path, word: str) -> float:
+    """A finite number."""
+    try:
+        value = float(word)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise ValueError(f"{path}: expected a number, found {word[:_SHOWN]!r}")
+    return value
+
+
+def _motion(path: Path, body: str, columns: int, joints: int) -> tuple[np.ndarray, float]:
     """Channel values [F, C] and the time from frame to frame [s]."""
     words = body.split()
     try:
         if words[0] != "Frames:" or words[2:4] != ["Frame", "Time:"]:
             raise ValueError(f"{path}: expected `Frames:` and `Frame Time:` after MOTION")
-        count, frame_s = int(words[1]), float(words[4])
-        values = np.array(words[5:], dtype=np.float64)
+        count, frame_s = int(_number(path, words[1])), _number(path, words[4])
+        values = np.array([_number(path, word) for word in words[5:]])
     except IndexError as error:
         raise ValueError(f"{path}: the motion has no frames") from error
-    if count < 1 or frame_s <= 0 or len(values) != count * columns:
+    if count < 1 or len(values) != count * columns:
         raise ValueError(
             f"{path}: expected {count} frames of {columns} channels, got {len(values)} numbers"
         )
+    if count * joints > _MOST_TURNS:
+        raise ValueError(f"{path}: {count} frames of {joints} joints are too many; cut it")
+    if not 0.0 < frame_s <= _LONGEST_S:
+        raise ValueError(f"{path}: {frame_s:g} s from frame to frame; expected up to {_LONGEST_S}")
     return values.reshape(count, columns), frame_s

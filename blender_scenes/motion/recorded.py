@@ -85,7 +85,7 @@ def match_joints(bvh: Bvh) -> dict[str, int]:
     missing = [bone for bone in _NEEDED if bone not in found]
     if missing:
         raise ValueError(
-            f"expected joints of a person; none of {', '.join(bvh.joints)} is "
+            f"expected joints of a person; none of {', '.join(bvh.joints)[:400]} is "
             f"{' or '.join(missing)}"
         )
     return found

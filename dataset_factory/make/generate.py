@@ -24,6 +24,7 @@ from dataset_factory.scene.bundle import Bundle, read_bundle
 from dataset_factory.scene.devices import check_scene, choose_devices
 from dataset_factory.scene.radios import SCENE_RADIO, scene_radio
 from dataset_factory.scene.report import table
+from dataset_factory.scene.report_rows import read_report
 from dataset_factory.schedule.channels import trace
 from dataset_factory.schedule.workers import count_workers
 from rfgs_core.dataset import Sequence
@@ -70,7 +71,7 @@ def generate(job: Job) -> bool:
         info = DatasetInfo(versions(), asdict(job.plan), job.plan.seed, _contents(job), [job.name])
         with job.stage("export"):
             bundle = _export(job)
-        logger.info("%s", table(read_json(bundle.path / "check.json")))
+        logger.info("%s", table(read_report(bundle.path / "check.json")))
         if SCENE_RADIO in job.plan.radios:
             job = replace(job, plan=job.plan.with_radio(scene_radio(bundle)))
         _tell_depth(job)
@@ -178,7 +179,7 @@ def _refuse_large_scene(job: Job) -> None:
     file = job.work / "check.json"
     asked = ["--frames", job.plan.frames] if job.plan.frames else []
     job.run_blender("check", "--out", str(file), *asked)
-    bounds_m = read_json(file)["scene"]["bounds_m"]
+    bounds_m = read_report(file)["scene"]["bounds_m"]
     if bounds_m is None:
         # Nothing moves, or the like: the export says so.
         return

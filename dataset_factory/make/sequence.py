@@ -10,12 +10,12 @@ import numpy as np
 
 from dataset_factory.plan.contents import Plan
 from dataset_factory.scene.bundle import Bundle
+from dataset_factory.scene.report_rows import read_guesses
 from rfgs_core.dataset.mesh_ply import write_mesh
 from rfgs_core.dataset.names import SequenceFiles
 from rfgs_core.dataset.schema import PERSON_SURFACE_M2, SequenceInfo
 from rfgs_core.dataset.splits import image_split, radio_split
 from rfgs_core.dataset.writer import write_arrays
-from rfgs_core.files import read_json
 from rfgs_core.radio import DevicePose, layout
 
 
@@ -52,7 +52,7 @@ def describe_sequence(
         materials=bundle.materials,
         instances=[instance_row(row) for row in bundle.instances],
         objects=bundle.path_objects,
-        guesses=[*(read_json(file) if file.is_file() else []), *guesses],
+        guesses=[*read_guesses(file), *guesses],
         trace_depth=plan.depth,
         shadow=plan.shadow,
         tracer=plan.tracer,

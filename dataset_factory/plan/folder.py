@@ -12,6 +12,7 @@ from dataset_factory.plan.contents import refuse_other_plan
 from dataset_factory.plan.job import Job
 from rfgs_core.dataset.schema import read_dataset_info
 from rfgs_core.errors import RfgsError
+from rfgs_core.links import described, strange_entries
 from rfgs_core.locks import alone_in
 
 
@@ -22,9 +23,10 @@ def open_folder(job: Job) -> bool:
         RfgsError: The folder holds something else, or a dataset with other settings.
     """
     file = job.out / "dataset.json"
-    links = [entry for entry in (file, job.work, job.out / "log") if entry.is_symlink()]
-    if links:
-        raise RfgsError(f"{links[0]}: a symbolic link; expected a file or folder of the dataset")
+    for place in (file, job.work, job.out / "log"):
+        odd = place if place.is_symlink() else _odd_within(place)
+        if odd is not None:
+            raise RfgsError(f"{odd}: {described(odd)}; expected a file or folder of the dataset")
     if file.is_file():
         stored = read_dataset_info(file)
         made_with = {} if stored.manifest_sha256 else stored.versions
@@ -41,6 +43,11 @@ def open_folder(job: Job) -> bool:
     elif job.out.exists() and not job.out.is_dir():
         raise RfgsError(f"{job.out}: a file of that name exists; choose another --out")
     return True
+
+
+def _odd_within(place: Path) -> Path | None:
+    """The first link, pipe or the like below a folder; None without any."""
+    return next(strange_entries(place), None) if place.is_dir() else None
 
 
 @contextmanager

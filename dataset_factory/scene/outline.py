@@ -12,8 +12,8 @@ from typing import Any
 from dataset_factory.scene.blender import Blender
 from dataset_factory.scene.overrides import overrides_file
 from dataset_factory.scene.radios import SCENE_RADIO
-from rfgs_core.files import read_json
 from rfgs_core.radio import PRESETS, Radio
+from rfgs_core.records import read_record
 
 #: Radio of devices that take part in any.
 ANY_RADIO = "any"
@@ -56,8 +56,7 @@ def read_outline(
     with TemporaryDirectory(prefix="rfgs-") as name, overrides_file(said, label) as more:
         file = Path(name) / "outline.json"
         blender.run("outline", "--out", str(file), *asked, *more)
-        found = read_json(file)
-    return Outline(**found)
+        return read_record(file, Outline)
 
 
 def usual_radios(devices: Iterable[dict[str, Any]]) -> tuple[str, ...]:

@@ -15,8 +15,8 @@ from dataset_factory.scene.devices import choose_devices, scene_problems
 from dataset_factory.scene.outline import left_out, usual_radios
 from dataset_factory.scene.overrides import overrides_file
 from dataset_factory.scene.radios import SCENE_RADIO, chosen_radios, scene_radio
+from dataset_factory.scene.report_rows import read_report
 from rfgs_core.errors import RfgsError
-from rfgs_core.files import read_json
 from rfgs_core.radio import Radio
 
 #: Findings about the radios of the scene's devices, not about those that were asked for.
@@ -50,7 +50,7 @@ def check_file(
     with TemporaryDirectory(prefix="rfgs-") as name, overrides_file(said, label) as more:
         folder = Path(name)
         blender.run("check", "--out", str(folder / "check.json"), *asked, *more)
-        report = read_json(folder / "check.json")
+        report = read_report(folder / "check.json")
         radios = radios or list(chosen_radios(usual_radios(report["devices"])).values())
         report["findings"] = [row for row in report["findings"] if row["kind"] not in _OF_PANEL]
         if radios:

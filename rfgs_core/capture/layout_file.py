@@ -3,19 +3,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-import numpy as np
+from msgspec import Meta, Struct
 
-from rfgs_core.dataset.schema import check_name, device_pose
+from rfgs_core.dataset.rows import DeviceRow, Positive, Triple
+from rfgs_core.dataset.schema import check_name
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.radio import DevicePose
+from rfgs_core.records import record
 from rfgs_core.yaml_file import read_yaml
 
-#: Fields of a device beside its pose.
-_DEVICE_FIELDS = ("name", "position_m", "quat_wxyz", "role", "file", "offset_s")
+#: Files of as many receivers are no capture.
+_MOST_DEVICES = 1024
+_Length = Annotated[float, Meta(ge=0.0, le=1e6)]
+#: Fields of a layout that are those of the file.
+_SAME = ("name", "radio", "centre_hz", "fps", "rate_hz", "bounds_m", "rx_spacing_m", "tx_spacing_m")
 
 EXAMPLE = (
     "devices: [{name: tx, role: TRANSMITTER, position_m: [0, 0, 1]}, "
@@ -58,8 +63,26 @@ class CaptureLayout:
         return [i for i, device in enumerate(self.devices) if device.role != "TRANSMITTER"]
 
 
-_NUMBERS = ("centre_hz", "fps", "rate_hz", "rx_spacing_m", "tx_spacing_m")
-_OPEN = ("rx_spacing_m", "tx_spacing_m")
+class _Device(DeviceRow, kw_only=True, forbid_unknown_fields=True):
+    """A device of the file."""
+
+    quat_wxyz: tuple[float, float, float, float] | None = None  # type: ignore[assignment]
+    file: str | None = None
+    offset_s: Annotated[float, Meta(ge=-1e9, le=1e9)] = 0.0
+
+
+class _File(Struct, forbid_unknown_fields=True):
+    """What the file holds."""
+
+    devices: Annotated[list[_Device], Meta(min_length=1, max_length=_MOST_DEVICES)]
+    name: str = "capture"
+    radio: str = "radio"
+    centre_hz: Positive | None = None
+    fps: Positive = 10.0
+    rate_hz: Positive | None = None
+    bounds_m: tuple[Triple, Triple] | None = None
+    rx_spacing_m: _Length = 0.0
+    tx_spacing_m: _Length = 0.0
 
 
 def read_layout(path: Path) -> CaptureLayout:
@@ -69,31 +92,20 @@ def read_layout(path: Path) -> CaptureLayout:
         RfgsError: There is no such file.
         RfgsFormatError: A field is unknown, missing or impossible; the message shows an example.
     """
-    values = read_yaml(path)
-    if not isinstance(values, dict) or not isinstance(values.get("devices"), list):
-        raise RfgsFormatError(f"{path}: expected a list of devices, for example {EXAMPLE}")
-    known = {spec.name for spec in fields(CaptureLayout)} - {"files", "offsets_s", "guesses"}
-    unknown = sorted(set(values) - known)
-    if unknown:
-        raise RfgsFormatError(
-            f"{path}: unknown field {unknown[0]!r}; expected some of {', '.join(sorted(known))}"
-        )
-    rows = [_device(path, row) for row in values.pop("devices")]
-    names = [pose.name for pose, _, _, _ in rows]
+    said: _File = record(path, read_yaml(path), _File, f"for example {EXAMPLE}")
+    names = [row.name for row in said.devices]
+    for name in (said.name, said.radio, *names):
+        check_name(path, name)
     if len(set(names)) < len(names):
         raise RfgsFormatError(f"{path}: two devices are called {_twice(names)!r}")
-    numbers = {key: _number(path, key, values.pop(key)) for key in _NUMBERS if key in values}
-    bounds = _bounds(path, values.pop("bounds_m")) if "bounds_m" in values else None
-    for key in values:
-        check_name(path, values[key])
+    if said.bounds_m and any(low >= high for low, high in zip(*said.bounds_m, strict=True)):
+        raise RfgsFormatError(f"{path}: bounds_m: expected [[min x, y, z], [max x, y, z]]")
     layout = CaptureLayout(
-        devices=tuple(row[0] for row in rows),
-        files=tuple(row[1] for row in rows),
-        offsets_s=tuple(row[2] for row in rows),
-        bounds_m=bounds,
-        guesses=tuple(row[3] for row in rows if row[3]),
-        **numbers,
-        **values,
+        devices=tuple(_pose(path, row) for row in said.devices),
+        files=tuple(row.file for row in said.devices),
+        offsets_s=tuple(row.offset_s for row in said.devices),
+        guesses=tuple(_guess(row) for row in said.devices if row.quat_wxyz is None),
+        **{name: getattr(said, name) for name in _SAME},
     )
     heard, sent = layout.receivers, [d for d in layout.devices if d.role != "RECEIVER"]
     if not heard or not sent:
@@ -135,48 +147,20 @@ def assign(layout: CaptureLayout, files: list[Path]) -> dict[int, Path]:
     return dict(sorted(found.items()))
 
 
-def _device(path: Path, row: Any) -> tuple[DevicePose, str | None, float, dict[str, Any] | None]:
-    if not isinstance(row, dict) or set(row) - set(_DEVICE_FIELDS):
-        odd = sorted(set(row) - set(_DEVICE_FIELDS))[0] if isinstance(row, dict) else row
-        raise RfgsFormatError(
-            f"{path}: devices: {odd!r}: expected some of {', '.join(_DEVICE_FIELDS)}"
-        )
-    guess = None
-    if "quat_wxyz" not in row:
-        row = {**row, "quat_wxyz": (1.0, 0.0, 0.0, 0.0)}
-        guess = {
-            **{"object": str(row.get("name")), "what": "orientation", "value": "along x"},
-            "reason": "the layout gives no quat_wxyz",
-        }
-    try:
-        pose = device_pose(row)
-    except RfgsFormatError as error:
-        raise RfgsFormatError(f"{path}: {error}") from error
-    check_name(path, pose.name)
-    file = row.get("file")
-    if file is not None and not isinstance(file, str):
-        raise RfgsFormatError(f"{path}: {pose.name}: file: expected a name, got {file!r}")
-    offset_s = row.get("offset_s", 0.0)
-    if type(offset_s) not in (int, float) or not np.isfinite(offset_s):
-        raise RfgsFormatError(f"{path}: {pose.name}: offset_s: expected seconds, got {offset_s!r}")
-    return pose, file, float(offset_s), guess
+def _pose(path: Path, row: _Device) -> DevicePose:
+    quat_wxyz = (1.0, 0.0, 0.0, 0.0) if row.quat_wxyz is None else row.quat_wxyz
+    if not any(quat_wxyz):
+        raise RfgsFormatError(f"{path}: {row.name}: quat_wxyz: expected a rotation, found zeros")
+    return DevicePose(row.name, row.position_m, quat_wxyz, row.role)
 
 
-def _number(path: Path, key: str, value: Any) -> float:
-    fits = type(value) in (int, float) and np.isfinite(value) and value >= 0
-    if not fits or (value == 0 and key not in _OPEN):
-        raise RfgsFormatError(f"{path}: {key}: expected a number above 0, got {value!r}")
-    return float(value)
-
-
-def _bounds(path: Path, value: Any) -> tuple[tuple[float, ...], ...]:
-    try:
-        low, high = np.asarray(value, np.float64).reshape(2, 3)
-    except (TypeError, ValueError):
-        low = high = np.zeros(3)
-    if not np.isfinite([low, high]).all() or (low >= high).any():
-        raise RfgsFormatError(f"{path}: bounds_m: expected [[min x, y, z], [max x, y, z]]")
-    return tuple(map(float, low)), tuple(map(float, high))
+def _guess(row: _Device) -> dict[str, Any]:
+    return {
+        "object": row.name,
+        "what": "orientation",
+        "value": "along x",
+        "reason": "the layout gives no quat_wxyz",
+    }
 
 
 def _twice(names: list[str]) -> str:

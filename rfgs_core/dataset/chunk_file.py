@@ -24,17 +24,22 @@ _BLOCK, _SHORTER = 2**17, 2**10
 _RUN = 1
 
 
-def refuse_chunk(file: Path, size: int) -> None:
+def refuse_chunk(file: Path | str, size: int) -> None:
     """Refuses a chunk that would unpack to another size than its array says.
 
     Args:
-        file: The chunk, which exists.
+        file: The chunk.
         size: Bytes of the values of a whole chunk.
 
     Raises:
+        FileNotFoundError: There is no such file.
         RfgsFormatError: It is no single zstd frame of that size, or packed beyond all measure.
     """
-    taken = os.stat(file).st_size
+    with open(file, "rb") as stream:
+        _refuse(file, stream, os.fstat(stream.fileno()).st_size, size)
+
+
+def _refuse(file: Path | str, stream: BinaryIO, taken: int, size: int) -> None:
     # What cannot be packed takes a three-byte head per block.
     if taken > size + size // 256 + 1024:
         raise RfgsFormatError(
@@ -44,11 +49,10 @@ def refuse_chunk(file: Path, size: int) -> None:
         raise RfgsFormatError(
             f"{file}: {size} bytes packed into {taken}; expected up to {MOST_PACKED} times as many"
         )
-    with open(file, "rb") as stream:
-        try:
-            found = _content(stream, taken, size // _SHORTER + 16)
-        except (IndexError, struct.error, ValueError) as error:
-            raise RfgsFormatError(f"{file}: truncated or damaged CSI chunk ({error})") from error
+    try:
+        found = _content(stream, taken, size // _SHORTER + 16)
+    except (IndexError, struct.error, ValueError) as error:
+        raise RfgsFormatError(f"{file}: truncated or damaged CSI chunk ({error})") from error
     if found != size:
         raise RfgsFormatError(
             f"{file}: truncated or damaged CSI chunk (it says {found} bytes, its array {size})"

@@ -15,12 +15,15 @@ from rfgs_core.radio.layout import Role
 #: Numbers of rows, pixels and the like beyond which something else was meant.
 MOST_FRAMES = 10_000_000
 MOST_PIXELS = 65_536
+#: Distances [m] and rates beyond which squares and products of them are no numbers any more.
+_FAR_M, _FAST_HZ, _SLOW_HZ = 1e9, 1e9, 1e-9
 
 _Count = Annotated[int, Meta(ge=0)]
 _Pixels = Annotated[int, Meta(ge=1, le=MOST_PIXELS)]
 Positive = Annotated[float, Meta(gt=0.0)]
-Triple = tuple[float, float, float]
-_Quadruple = tuple[float, float, float, float]
+_Coordinate = Annotated[float, Meta(ge=-_FAR_M, le=_FAR_M)]
+Triple = tuple[_Coordinate, _Coordinate, _Coordinate]
+_Quadruple = tuple[_Coordinate, _Coordinate, _Coordinate, _Coordinate]
 Frame = Annotated[int, Meta(ge=-MOST_FRAMES, le=MOST_FRAMES)]
 
 
@@ -96,7 +99,8 @@ class SequenceRows(Struct):
     """Parts of `sequence.json` that are checked more closely than their types say."""
 
     frames: Annotated[list[Frame], Meta(min_length=1)]
-    fps: Positive
+    frame_start: Frame
+    fps: Annotated[float, Meta(ge=_SLOW_HZ, le=_FAST_HZ)]
     bounds_m: tuple[Triple, Triple]
     cameras: list[CameraRow]
     devices: dict[str, list[DeviceRow]]
@@ -104,3 +108,4 @@ class SequenceRows(Struct):
     splits: Splits
     instances: list[InstanceRow] = []
     objects: list[ObjectRow] = []
+    trace_depth: Annotated[int, Meta(ge=0, le=100)] = 1

@@ -11,6 +11,7 @@ import itertools
 import math
 import os
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -254,8 +255,9 @@ def _check_chunks(path: Path, array: Array) -> None:
             f"{path / 'zarr.json'}: expected up to {_MOST_CHUNKS} chunks, found {array.shape} in "
             f"chunks of {array.chunk}"
         )
+    size = chunk_bytes(array)
     for place in itertools.product(*map(range, grid)):
-        file = path.joinpath("c", *map(str, place))
-        # What was never written reads as the fill value.
-        if file.is_file():
-            refuse_chunk(file, chunk_bytes(array))
+        # What was never written reads as the fill value. Names are joined as text: a store has
+        # many, and they are looked at whenever it is opened.
+        with suppress(FileNotFoundError):
+            refuse_chunk("/".join((str(path), "c", *map(str, place))), size)

@@ -21,8 +21,8 @@ GAUSSIAN_SHAPES: dict[str, Shape] = {
     name: ("M", *value.shape[1:]) for name, value in Gaussians.none().items()
 }
 
-_STATE = ("exp_avg", "exp_avg_sq")
-_KEPT = (*_STATE, "step")
+MOMENTS = ("exp_avg", "exp_avg_sq")
+_KEPT = (*MOMENTS, "step")
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ class TrainableGaussians:
                     "step": old[name]["step"],
                     **{
                         key: torch.cat([old[name][key][keep] * kept, torch.zeros_like(added[name])])
-                        for key in _STATE
+                        for key in MOMENTS
                     },
                 }
 
@@ -145,9 +145,11 @@ class TrainableGaussians:
                 if f"{name}.step" in arrays:
                     kept = {key: torch.from_numpy(arrays[f"{name}.{key}"].copy()) for key in _KEPT}
                     # Adam counts steps on the CPU.
-                    moments = {key: kept[key].to(device) for key in _STATE}
+                    moments = {key: kept[key].to(device) for key in MOMENTS}
                     result.optimiser.state[leaf] = {**moments, "step": kept["step"]}
-                    if any(result.optimiser.state[leaf][key].shape != leaf.shape for key in _STATE):
+                    if any(
+                        result.optimiser.state[leaf][key].shape != leaf.shape for key in MOMENTS
+                    ):
                         raise RfgsFormatError(
                             f"checkpoint whose moments of {name} have another shape than "
                             f"{tuple(leaf.shape)}; delete it to start over"

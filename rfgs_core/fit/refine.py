@@ -13,10 +13,10 @@ import torch
 from jaxtyping import Float, Int64
 from torch import Tensor
 
-from rfgs_core.arrays import load_arrays, save_arrays
+from rfgs_core.arrays import Shape, load_arrays, save_arrays
 from rfgs_core.device import Device, on_device
 from rfgs_core.encode import MATCHED_FILTER, Encoder
-from rfgs_core.errors import RfgsError
+from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.fit.density import (
     DensityControl,
     DensityRule,
@@ -30,7 +30,12 @@ from rfgs_core.fit.density import (
 from rfgs_core.fit.frame import FrameState
 from rfgs_core.fit.last_finite import LastFinite
 from rfgs_core.fit.losses import SamplePoints, channel_loss, paper_loss
-from rfgs_core.fit.parameters import GAUSSIAN_SHAPES, LearningRates, TrainableGaussians
+from rfgs_core.fit.parameters import (
+    GAUSSIAN_SHAPES,
+    MOMENTS,
+    LearningRates,
+    TrainableGaussians,
+)
 from rfgs_core.fit.sampling import sample_points
 from rfgs_core.fit.temporal import Continuity
 from rfgs_core.gaussians import Gaussians
@@ -47,6 +52,14 @@ CHANNEL_RATES = LearningRates(
 )
 #: Adam steps between checkpoints within a frame.
 CHECKPOINT_EVERY = 1000
+#: What a checkpoint may hold beside the Gaussians: Adam's moments, and what densities remember.
+_MEMORY: dict[str, Shape] = {
+    **{f"{name}.{key}": shape for name, shape in GAUSSIAN_SHAPES.items() for key in MOMENTS},
+    **{f"{name}.step": () for name in GAUSSIAN_SHAPES},
+    **dict.fromkeys(("density.error_sum", "density.error_count"), ("window",)),
+    "density.gradient_sum": ("gradients",),
+    "density.gradient_steps": (),
+}
 
 
 @dataclass(frozen=True)
@@ -243,17 +256,28 @@ def _resume(
         checkpoint,
         "delete it to start this frame over",
         {**GAUSSIAN_SHAPES, "edited": (), "origin": ("M",), "finished_steps": ()},
-        types={**dict.fromkeys(GAUSSIAN_SHAPES, "f4"), "origin": "i8", "finished_steps": "i8"},
-        others=True,
+        types={
+            **dict.fromkeys((*GAUSSIAN_SHAPES, *_MEMORY), "f4"),
+            **dict.fromkeys(("origin", "finished_steps", "density.gradient_steps"), "i8"),
+            "edited": "?",
+        },
+        optional=_MEMORY,
     )
+    origin, steps = arrays["origin"], int(arrays["finished_steps"])
+    if steps < 0 or ((origin < -1) | (origin >= len(start))).any():
+        raise RfgsFormatError(
+            f"{checkpoint}: of other Gaussians than this frame's; delete it to start it over"
+        )
     prefix, device = "density.", start.means.device
     memory = {
         name.removeprefix(prefix): torch.from_numpy(value.copy()).to(device)
         for name, value in arrays.items()
         if name.startswith(prefix)
     }
-    trained = TrainableGaussians.restore(arrays, rates, device)
-    return trained, int(arrays["finished_steps"]), memory
+    try:
+        return TrainableGaussians.restore(arrays, rates, device), steps, memory
+    except RfgsFormatError as error:
+        raise RfgsFormatError(f"{checkpoint}: {error}") from error
 
 
 def _with_gaussians(

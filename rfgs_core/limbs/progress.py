@@ -7,15 +7,16 @@ from pathlib import Path
 from typing import NamedTuple
 
 import torch
-from safetensors import SafetensorError
-from safetensors.torch import load_file, save
+from safetensors.torch import save
 
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.files import write_bytes
 from rfgs_core.limbs.network import LimbNetwork
+from rfgs_core.limbs.tensor_file import read_tensors, refuse_misfit
 
 #: What AdamW keeps of every parameter.
 _MOMENTS = ("step", "exp_avg", "exp_avg_sq")
+_REMEDY = "delete it to begin anew"
 
 
 class Progress(NamedTuple):
@@ -46,13 +47,17 @@ def resume(path: Path, network: LimbNetwork, optimiser: torch.optim.Optimizer) -
     Raises:
         RfgsFormatError: The file is damaged, or of another network.
     """
-    try:
-        state = load_file(path)
-        network.load_state_dict({name: state[f"weight.{name}"] for name in network.state_dict()})
-        for name, parameter in network.named_parameters():
-            optimiser.state[parameter] = {moment: state[f"{moment}.{name}"] for moment in _MOMENTS}
-        return Progress(int(state["frames"]), float(state["spent_s"]))
-    except (SafetensorError, KeyError, RuntimeError) as error:
-        raise RfgsFormatError(
-            f"{path}: damaged, or of another network; delete it to begin anew"
-        ) from error
+    state, _ = read_tensors(path, _REMEDY)
+    told = {name: state.pop(name, torch.tensor(())) for name in ("frames", "spent_s")}
+    if any(value.numel() != 1 or float(value) < 0.0 for value in told.values()):
+        raise RfgsFormatError(f"{path}: expected how far it had come and how long; {_REMEDY}")
+    weights, parameters = network.state_dict(), dict(network.named_parameters())
+    wanted = {f"weight.{name}": value for name, value in weights.items()}
+    for name, parameter in parameters.items():
+        wanted |= {f"{moment}.{name}": parameter for moment in _MOMENTS}
+        wanted[f"step.{name}"] = torch.tensor(0.0)
+    refuse_misfit(path, state, wanted, _REMEDY)
+    network.load_state_dict({name: state[f"weight.{name}"] for name in weights})
+    for name, parameter in parameters.items():
+        optimiser.state[parameter] = {moment: state[f"{moment}.{name}"] for moment in _MOMENTS}
+    return Progress(int(told["frames"]), float(told["spent_s"]))

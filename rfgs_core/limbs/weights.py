@@ -5,17 +5,19 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
+import msgspec
 import numpy as np
 import torch
-from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.files import write_bytes
 from rfgs_core.limbs.network import LimbNetwork
+from rfgs_core.limbs.tensor_file import read_tensors, refuse_misfit
 from rfgs_core.radio import Radio
+from rfgs_core.records import record
 
 #: Schema of the file.
 SCHEMA = "rfgs-limbs/1"
@@ -23,8 +25,17 @@ SCHEMA = "rfgs-limbs/1"
 OWN = Path(__file__).parent / "networks"
 #: A network serves radios whose centre and bandwidth differ from its own by no more than this.
 _SAME_CENTRE, _SAME_BANDWIDTH = 0.05, 0.3
-#: Largest file that is read; ours have 2 MB.
-_MOST_BYTES = 64 * 2**20
+_REMEDY = "make it with `rfgs limbs`"
+_Hertz = Annotated[float, msgspec.Meta(gt=0.0, le=1e12)]
+
+
+class _Card(msgspec.Struct):
+    """What a card must say; it may say more."""
+
+    radio: str
+    centre_hz: _Hertz
+    bandwidth_hz: _Hertz
+    ranges: Annotated[int, msgspec.Meta(ge=1, le=4096)]
 
 
 class Trained(NamedTuple):
@@ -59,28 +70,22 @@ def load_network(path: Path) -> Trained:
     """
     if not path.is_file():
         raise RfgsError(f"{path}: no such file; expected one made by `rfgs limbs`")
-    if path.stat().st_size > _MOST_BYTES:
-        raise RfgsFormatError(f"{path}: larger than any network of ours; make it with `rfgs limbs`")
+    weights, texts = read_tensors(path, _REMEDY)
     try:
-        with safe_open(path, framework="pt") as file:
-            card = json.loads((file.metadata() or {}).get("card", "{}"))
-            weights = {name: file.get_tensor(name).float() for name in file.keys()}
-        if card.get("schema") != SCHEMA:
-            raise RfgsFormatError(
-                f"{path}: expected schema {SCHEMA}, found {card.get('schema')}; make it with "
-                "`rfgs limbs`"
-            )
-        network = LimbNetwork(int(card["ranges"]))
-        network.load_state_dict(weights)
-    except (SafetensorError, KeyError, TypeError, ValueError, RuntimeError) as error:
-        if isinstance(error, RfgsFormatError):
-            raise
-        raise RfgsFormatError(
-            f"{path}: damaged, or not a network of `rfgs limbs` ({type(error).__name__}); make it "
-            "again"
-        ) from error
-    if not all(bool(torch.isfinite(value).all()) for value in weights.values()):
-        raise RfgsFormatError(f"{path}: holds NaN or infinity; make it again with `rfgs limbs`")
+        value = msgspec.json.decode(texts.get("card", "{}"))
+    except (msgspec.DecodeError, UnicodeEncodeError, RecursionError) as error:
+        raise RfgsFormatError(f"{path}: card: expected JSON ({error}); {_REMEDY}") from error
+    card: dict[str, Any] = record(f"{path}: card", value, dict[str, Any], _REMEDY)
+    if card.get("schema") != SCHEMA:
+        found = str(card.get("schema"))[:60]
+        raise RfgsFormatError(f"{path}: expected schema {SCHEMA}, found {found}; {_REMEDY}")
+    known: _Card = record(f"{path}: card", card, _Card, _REMEDY)
+    # Shapes first: a network is only made once there is a file of its size.
+    with torch.device("meta"):
+        wanted = LimbNetwork(known.ranges).state_dict()
+    refuse_misfit(path, weights, wanted, _REMEDY)
+    network = LimbNetwork(known.ranges)
+    network.load_state_dict({name: value.float() for name, value in weights.items()})
     network.eval()
     return Trained(network, card)
 

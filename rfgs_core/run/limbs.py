@@ -17,6 +17,7 @@ from rfgs_core.articulated import BONES
 from rfgs_core.bodies.localise import pair_maps
 from rfgs_core.bodies.separation import each_alone
 from rfgs_core.bodies.tracks import Tracks
+from rfgs_core.errors import RfgsFormatError
 from rfgs_core.fit.frame import OnSkins, followed
 from rfgs_core.limbs.evidence.tell import long_enough, looks, tell
 from rfgs_core.limbs.propose import SMOOTH_S, Joints, propose, smoothed
@@ -118,6 +119,10 @@ def find_limbs(
     """
     kept = read_limbs(run.path)
     if kept is not None:
+        if not set(run.frames) <= set(kept.frames):
+            raise RfgsFormatError(
+                f"{run.path / LIMBS_FILE}: frames of the run are missing; {_REMEDY}"
+            )
         return kept
     frames = frames_read(run)
     tracks: list[Tracks] = []
@@ -242,6 +247,11 @@ def read_limbs(run: Path) -> Limbs | None:
     if not path.exists():
         return None
     stored = load_arrays(path, _REMEDY, _SHAPES, ("velocity_xy",), types=_TYPES)
+    frames = [int(frame) for frame in stored["frames"]]
+    if not frames or sorted(set(frames)) != frames or not (stored["sigma_m"] > 0.0).all():
+        raise RfgsFormatError(
+            f"{path}: expected ascending frames and deviations above zero; {_REMEDY}"
+        )
     standing: Float64[np.ndarray, "body"] = np.full(stored["axes_xy"].shape[1], np.nan)
     tracks = [
         Tracks(axes, velocity, float(at), standing)
@@ -250,7 +260,7 @@ def read_limbs(run: Path) -> Limbs | None:
         )
     ]
     return Limbs(
-        [int(frame) for frame in stored["frames"]],
+        frames,
         tracks,
         Joints(stored["joints"], stored["sigma_m"]),
         PosedPeople(stored["coefficients"], stored["root"], stored["turns"]),

@@ -8,15 +8,16 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from msgspec import Meta
 from tqdm import tqdm
 
 from rfgs_core.background.learned import learned_background
 from rfgs_core.bodies.count import FEWEST_PAIRS, count_bodies
 from rfgs_core.dataset import Sequence
-from rfgs_core.errors import RfgsError
+from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.files import write_json
 from rfgs_core.measure.observations import observe
 from rfgs_core.records import read_record
@@ -35,6 +36,8 @@ PEOPLE_FILE = "people.json"
 VOTES = 5
 #: Visible device pairs without which people are not sensed unasked: three radars count too many.
 AUTO_PAIRS = 4
+#: Nobody counts more.
+_Count = Annotated[int, Meta(ge=0, le=1000)]
 _LOG = logging.getLogger(__name__)
 _REMEDY = "delete the run and train again"
 
@@ -43,11 +46,11 @@ _REMEDY = "delete the run and train again"
 class HeadCount:
     """How many people there are in a sequence."""
 
-    count: int
+    count: _Count
     """People."""
     source: Literal["sensed", "told", "asked"]
     """From the radio alone, from the dataset's instances, or by the option."""
-    votes: dict[str, int] = field(default_factory=dict)
+    votes: dict[str, _Count] = field(default_factory=dict)
     """What single frames said, by their numbers; empty unless sensed."""
 
     def __str__(self) -> str:
@@ -69,7 +72,12 @@ class HeadCount:
             RfgsFormatError: The file is damaged.
         """
         path = run / PEOPLE_FILE
-        return read_record(path, HeadCount, _REMEDY) if path.exists() else None
+        if not path.exists():
+            return None
+        kept = read_record(path, HeadCount, _REMEDY)
+        if kept.votes and kept.count != voted(list(kept.votes.values())):
+            raise RfgsFormatError(f"{path}: {kept.count} is not what most votes say; {_REMEDY}")
+        return kept
 
 
 def told(sequence: Sequence) -> int:

@@ -70,7 +70,15 @@ def complaint(raw: bytes | str, controls: Mapping[str, Any]) -> str:
         return f"expected a message of the page ({error})"
     if isinstance(message, GuiUpdateMessage):
         return _misuse(message, controls)
+    if isinstance(message, ViewerCameraMessage) and not _looks(message):
+        return "expected a camera that looks somewhere, found one without direction"
     return ""
+
+
+def _looks(camera: ViewerCameraMessage) -> bool:
+    """Whether a camera has a direction, and an up."""
+    there = camera.position != camera.look_at
+    return there and any(camera.wxyz) and any(camera.up_direction)
 
 
 def _misuse(message: GuiUpdateMessage, controls: Mapping[str, Any]) -> str:

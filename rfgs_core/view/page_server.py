@@ -7,6 +7,7 @@ import asyncio
 import contextlib
 import logging
 from collections.abc import Awaitable, Callable, Iterator, Mapping
+from concurrent.futures import Future
 from typing import Any
 
 import websockets.asyncio.server
@@ -35,6 +36,8 @@ class PageServer(ViserServer):
         gate = _Gate(self._guard, faults)
         with _serving_through(gate):
             super().__init__(host=host, port=port, verbose=False)
+        pool = self._thread_executor
+        pool.submit = gate.telling(pool.submit)
         # Controls have no public register; until it is known no message is heard.
         gate.controls = self.gui._gui_input_handle_from_uuid
 
@@ -84,6 +87,18 @@ class _Gate:
             await handler(connection)
 
         return handle
+
+    def telling(self, submit: Callable[..., Future[Any]]) -> Callable[..., Future[Any]]:
+        """A pool's `submit` for callbacks whose faults are told in a line, not as a traceback."""
+
+        def run(call: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+            try:
+                return call(*arguments, **options)
+            except Exception as error:
+                self._faults.tell(f"the viewer goes on after a fault: {_said(error)}")
+                return None
+
+        return lambda call, *arguments, **options: submit(run, call, *arguments, **options)
 
     def _on_fault(self, _loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
         self._faults.tell(f"the viewer goes on after a fault: {_said(context.get('exception'))}")

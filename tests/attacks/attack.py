@@ -27,6 +27,7 @@ import rfgs_core  # noqa: E402, F401
 
 # isort: split
 from formats import Format, digest, make_all  # noqa: E402
+from people_formats import make_people  # noqa: E402
 
 from dataset_factory.check.validate import checksum_faults  # noqa: E402
 from rfgs_core.errors import RfgsError  # noqa: E402
@@ -96,7 +97,7 @@ def _hang(*_: Any) -> NoReturn:
 
 def _formats(folder: Path, names: list[str]) -> list[Format]:
     if names != ["add-on"]:
-        return make_all(folder)
+        return [*make_all(folder), *make_people(folder / "people")]
     from addon_formats import make_addon
 
     return make_addon(folder)

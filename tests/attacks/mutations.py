@@ -89,6 +89,26 @@ def _places(value: Any) -> Any:
             yield from _places(value[key])
 
 
+def tensors_of(data: bytes, state: random.Random) -> bytes:
+    """Damages a safetensors file: its bytes, its header, or the text within that."""
+    size = int.from_bytes(data[:8], "little")
+    head, body = data[8 : 8 + size], data[8 + size :]
+    kind = state.randrange(4)
+    if kind == 0:
+        return bytes_of(data, state)
+    if kind == 1:
+        return data[: 8 + size] + bytes_of(body, state)
+    card = json.loads(head).get("__metadata__", {}).get("card")
+    if kind == 2 and card:
+        value = json.loads(head)
+        damaged = json_of(card.encode(), state).decode("utf-8", "replace")
+        value["__metadata__"]["card"] = damaged
+        changed = json.dumps(value).encode()
+    else:
+        changed = json_of(head, state)
+    return len(changed).to_bytes(8, "little") + changed + body
+
+
 def text_of(data: bytes, state: random.Random) -> bytes:
     """Damages a line of a text file, or its bytes."""
     if state.random() < 0.4:

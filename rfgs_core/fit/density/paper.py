@@ -156,5 +156,5 @@ class PaperDensity:
 
     def resume(self, memory: Mapping[str, Tensor]) -> None:
         """See `DensityControl`."""
-        if "error_sum" in memory:
+        if "error_sum" in memory and "error_count" in memory:
             self.error_sum, self.error_count = memory["error_sum"], memory["error_count"]

@@ -156,6 +156,6 @@ class StandardDensity:
 
     def resume(self, memory: Mapping[str, Tensor]) -> None:
         """See `DensityControl`."""
-        if "gradient_sum" in memory:
+        if "gradient_sum" in memory and "gradient_steps" in memory:
             self.gradient_sum = memory["gradient_sum"]
             self.steps = int(memory["gradient_steps"])

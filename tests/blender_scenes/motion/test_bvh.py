@@ -182,7 +182,7 @@ def test_names_of_other_rigs_are_understood() -> None:
         (("HIERARCHY", "NOTHING"), "expected HIERARCHY"),
         (("Frames:", "Pictures:"), "Frames:"),
         (("Frames: ", "Frames: 1"), "channels, got"),
-        (("Zrotation", "Wrotation"), "unknown channels Wrotation"),
+        (("Zrotation", "Wrotation"), "unknown channel 'Wrotation'"),
         (("OFFSET", "SHIFT"), "unexpected"),
     ],
 )

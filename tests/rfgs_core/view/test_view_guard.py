@@ -19,6 +19,7 @@ from websockets.exceptions import InvalidStatus
 
 from rfgs_core.run import Run
 from rfgs_core.view.guard import Faults
+from rfgs_core.view.messages import complaint
 from rfgs_core.view.server import address, running_server
 from rfgs_core.view.viewer import Viewer
 
@@ -170,6 +171,48 @@ def test_a_thousand_junk_messages_and_it_still_answers(
     # One line per kind, and not more than a screen of them.
     assert 1 <= len(caplog.records) <= 25
     assert all(record.exc_info is None for record in caplog.records)
+    assert "Traceback" not in "".join(capfd.readouterr())
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"look_at": (0.0, 0.0, 3.0)},
+        {"up_direction": (0.0, 0.0, 0.0)},
+        {"wxyz": (0.0, 0.0, 0.0, 0.0)},
+    ],
+)
+def test_a_camera_without_direction_is_dropped(
+    fresh: Viewer, caplog: pytest.LogCaptureFixture, wrong: dict[str, tuple[float, ...]]
+) -> None:
+    camera = {
+        "type": "ViewerCameraMessage",
+        "wxyz": (1.0, 0.0, 0.0, 0.0), "position": (0.0, 0.0, 3.0), "fov": 1.0, "near": 0.1,
+        "far": 100.0, "image_height": 480, "image_width": 640, "look_at": (0.0, 0.0, 0.0),
+        "up_direction": (0.0, 1.0, 0.0),
+    }  # fmt: skip
+    controls = fresh.server.gui._gui_input_handle_from_uuid
+    assert complaint(msgspec.msgpack.encode(camera), controls) == ""
+    with opened(address(fresh.server)) as socket:
+        socket.send(msgspec.msgpack.encode({**camera, **wrong}))
+        answers(fresh)
+    assert "expected a camera that looks somewhere" in caplog.text
+
+
+def test_a_fault_of_a_callback_is_one_line(
+    fresh: Viewer, caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def broken(_event: object) -> None:
+        raise ValueError("no such place")
+
+    control = fresh.server.gui.add_checkbox("Broken", False)
+    control.on_update(broken)
+    with connected(fresh.server) as client:
+        client.read(lambda: "Broken" in client.controls)
+        for value in (True, False, True):
+            client.choose("Broken", value)
+        answers(fresh)
+    assert caplog.text.count("the viewer goes on after a fault: no such place") == 1
     assert "Traceback" not in "".join(capfd.readouterr())
 
 

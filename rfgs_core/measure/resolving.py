@@ -75,7 +75,7 @@ class Resolving:
     def lines(self) -> list[str]:
         """All of it, in lines for people."""
         rows = [
-            f"{self.radio}: paths are told apart by {self.path_m:.3g} m (out and back: ranges by "
+            f"{self.radio}: paths are resolved by {self.path_m:.3g} m (out and back: ranges by "
             f"{self.path_m / 2.0:.3g} m), delays repeat after {self.repeats_m:.4g} m of path"
         ]
         for row in self.across:

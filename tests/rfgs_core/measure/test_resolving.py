@@ -51,5 +51,5 @@ def test_inspect_says_it_of_a_dataset(
 ) -> None:
     assert main(["inspect", str(tiny_dataset)]) == 0
     out = capsys.readouterr().out
-    assert "wifi: paths are told apart by 1.87 m (out and back: ranges by 0.937 m)" in out
+    assert "wifi: paths are resolved by 1.87 m (out and back: ranges by 0.937 m)" in out
     assert out.count(": across, at ") == 4

@@ -87,8 +87,12 @@ def place_radio(
     digits = len(str(len(places) - 1))
     return [
         empties.add_device(
-            *(scene, f"{radio}_{index:0{digits}d}", "ACCESS_POINT", radio),
-            *(spot.pose(), RADIO_FIELDS[radio]),
+            scene,
+            name=f"{radio}_{index:0{digits}d}",
+            role="ACCESS_POINT",
+            radio=radio,
+            pose=spot.pose(),
+            fields=RADIO_FIELDS[radio],
         )
         for index, spot in enumerate(places)
     ]

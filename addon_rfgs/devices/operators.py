@@ -142,8 +142,12 @@ class RFGS_OT_add_device(RadioFields, Undoable, bpy.types.Operator):
         fields = dict(empties.alike(context.scene) or {})
         fields.update(self._said())
         item = empties.add_device(
-            *(context.scene, self.device or self.role.lower(), self.role, self.radio),
-            *(np.array(place @ turn.to_matrix().to_4x4()), fields),
+            context.scene,
+            name=self.device or self.role.lower(),
+            role=self.role,
+            radio=self.radio,
+            pose=np.array(place @ turn.to_matrix().to_4x4()),
+            fields=fields,
         )
         empties.select(context, [item])
         return f"Added {item.name}"

@@ -207,17 +207,24 @@ def _first_look(
 ) -> Surface:
     source = evaluated.original
     with evaluated_mesh(evaluated) as mesh:
-        local = _local(mesh)
-        faces, slots = _triangles(mesh)
-        corners = _corners(mesh)
+        (faces, slots), local, corners = _triangles(mesh), _local(mesh), _corners(mesh)
         materials = _materials(evaluated, mesh)
     if np.linalg.det(matrix[:3, :3]) < 0:
         faces = faces[:, ::-1].copy()
     vertices = _world(local, matrix, unit_scale(bpy.context.scene))
     box = np.stack([vertices.min(axis=0), vertices.max(axis=0)])
     return Surface(
-        *(key, source, root, faces, slots, materials, corners, local, matrix, vertices),
-        armature_of(source),
+        key=key,
+        source=source,
+        root=root,
+        faces=faces,
+        slots=slots,
+        materials=materials,
+        corners=corners,
+        local=local,
+        matrix=matrix,
+        vertices=vertices,
+        armature=armature_of(source),
         low=box[0],
         high=box[1],
         boxes=[box],

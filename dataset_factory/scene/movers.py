@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What moves, told apart by how it is traced: vehicles as metal, everything else as points."""
+"""What moves, separated by how it is traced: vehicles as metal, everything else as points."""
 
 from __future__ import annotations
 

@@ -11,6 +11,7 @@ import drjit as dr
 
 from dataset_factory.scene.bundle import Bundle
 from dataset_factory.scene.radios import refuse_trace
+from dataset_factory.scene.surroundings import room_of
 from dataset_factory.trace.people.bodies import Bodies
 from rfgs_core.radio import Radio
 from rfgs_core.radio.layout import DevicePose
@@ -54,8 +55,10 @@ class BaseTracer:
         self._bundle, self._radio, self._devices = bundle, radio, devices
         self._shadow: Shadow = shadow
         self._rays = sub_seed(seed, "environment")
-        self._nodes = node_frequencies(radio)
-        self._grid = fine_grid(self._nodes)
+        # Frequencies of people's paths, which pass a slab on either leg, and of shadows.
+        slab_s = room_of(bundle).slab_delay_s(radio.centre_hz)
+        self._nodes = node_frequencies(radio, (depth - 1) * slab_s)
+        self._grid = fine_grid(node_frequencies(radio, slab_s))
         self._bodies = Bodies(bundle, radio, sub_seed(seed, "points"))
         self._frames_done = 0
         self.timings: dict[str, float] = dict.fromkeys(

@@ -10,6 +10,7 @@ import numpy as np
 import sionna.rt as rt
 
 from dataset_factory.scene.bundle import Bundle
+from dataset_factory.scene.surroundings import room_of
 from dataset_factory.trace.rays.fields import Fields, SceneMeshes
 from dataset_factory.trace.rays.paths import path_set
 from dataset_factory.trace.rays.scene import (
@@ -74,6 +75,7 @@ class Environment:
         self._radio, self._layout, self._seed = radio, layout, seed
         self._devices, self._groups = devices, groups(layout)
         self._vehicles, self._faces = vehicles, faces
+        self._nodes = node_frequencies(radio, room_of(bundle).slab_delay_s(radio.centre_hz))
         self._scatters = any(row["scattering_coefficient"] > 0.0 for row in bundle.materials)
         self._scene = environment_scene(bundle, radio, vehicles)
         self.meshes = SceneMeshes(bundle, vehicles)
@@ -144,12 +146,12 @@ class Environment:
 
     def _at_nodes(self, traced: Callable[[float], rt.Paths], group: Group) -> PathSet:
         """Paths between the sites of a group with one amplitude for each node frequency."""
-        nodes = node_frequencies(self._radio)
+        nodes = self._nodes
         return joined([self._read(traced(float(f)), group, float(f)) for f in nodes])
 
     def _at_centre(self, traced: Callable[[float], rt.Paths], group: Group) -> PathSet:
         """The same of rays, with the amplitudes of a narrow band's centre throughout."""
-        nodes, centre_hz = node_frequencies(self._radio), self._radio.centre_hz
+        nodes, centre_hz = self._nodes, self._radio.centre_hz
         if self._radio.bandwidth_hz / centre_hz > WIDE_BAND:
             return self._at_nodes(traced, group)
         at_centre = self._read(traced(centre_hz), group, centre_hz)

@@ -12,6 +12,7 @@ from dataset_factory.scene.motion import read_motion, read_velocity
 from dataset_factory.trace.base import BaseTracer
 from dataset_factory.trace.bounces.follow import follow
 from dataset_factory.trace.bounces.solver import Bounces, with_facets
+from dataset_factory.trace.bounces.walls import Walls
 from dataset_factory.trace.environment import Environment
 from dataset_factory.trace.instant import Trace, mixed
 from dataset_factory.trace.people.sight import in_sight
@@ -71,6 +72,7 @@ class Tracer(BaseTracer):
         if bodies.scatter and depth > 1 and environment.reflects:
             rays, meshes = sub_seed(seed, "bounces"), environment.meshes
             self._bounces = Bounces(bodies.scene, meshes, self._layout, devices, depth, rays)
+        self._walls = Walls(bundle, bodies.scene, bodies.vehicles, self._layout, devices, radio)
 
     def static(self) -> np.ndarray:
         """Channel without anything that moves, complex64, shape (tx, rx, subcarrier)."""
@@ -104,7 +106,9 @@ class Tracer(BaseTracer):
         parts = [self._tables.environment(trace.paths, self._corners, trace.outlines, vehicles)]
         if trace.points is not None:
             corners = CornerObjects(self._bundle, bodies.scene, bodies.vehicles)
-            parts.append(self._tables.people(trace, bodies, corners, velocity, vehicles))
+            parts.append(
+                self._tables.people(trace, bodies, corners, self._walls, velocity, vehicles)
+            )
         return self._tables.joined(parts)
 
     def trace(self, frame: BundleFrame) -> Trace:
@@ -260,4 +264,5 @@ class Tracer(BaseTracer):
             paths = follow(paths, points.positions)
         gamma = self._bodies.gamma(self._nodes)
         paths = with_facets(paths, points, gamma, self._nodes, self._radio.centre_hz)
+        paths = self._walls.over_band(paths, self._nodes)
         return steer(paths, self._layout, self._radio.freq_hz, self._nodes)

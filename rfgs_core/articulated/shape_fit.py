@@ -17,7 +17,7 @@ _STIFF = (1, 2, 3, 4, 5, 6, 12, 13, 15, 16)
 _STEPS = 4
 
 
-def fit_shape(joints: np.ndarray, count: int = 3, space: ShapeSpace | None = None) -> np.ndarray:
+def fit_shape(joints: np.ndarray, count: int = 3) -> np.ndarray:
     """Coefficients of a body whose limbs are as long as those of joints over a sequence.
 
     Gauss-Newton on the mean lengths of thighs, shins, arms and between the hips, with a
@@ -26,7 +26,6 @@ def fit_shape(joints: np.ndarray, count: int = 3, space: ShapeSpace | None = Non
     Args:
         joints: Joints of one person [m], shape [T, 17, 3]; NaN where unknown.
         count: How many of the first components, those of height and lengths, to fit.
-        space: The shape space; by default the package's.
 
     Returns:
         Coefficients [K], zero after the first `count`.
@@ -36,7 +35,7 @@ def fit_shape(joints: np.ndarray, count: int = 3, space: ShapeSpace | None = Non
     """
     if joints.ndim != 3 or joints.shape[1:] != (17, 3):
         raise RfgsError(f"joints over time: expected [T, 17, 3], got {list(joints.shape)}")
-    space = space or people()
+    space = people()
     rows = np.array(_STIFF)
     lengths = np.linalg.norm(joints[:, rows] - joints[:, np.array(PARENTS)[rows]], axis=2)
     known = np.isfinite(lengths).any(axis=0)

@@ -140,8 +140,10 @@ def _capture(path: Path, packets: list[_Packet]) -> Capture:
     index = np.arange(bins) - bins // 2
     rows, times = _times(packets)
     shape = (
-        *(times, 1 + max(packet.core for packet in packets)),
-        *(1 + max(packet.stream for packet in packets), bins),
+        times,
+        1 + max(packet.core for packet in packets),
+        1 + max(packet.stream for packet in packets),
+        bins,
     )
     refuse_too_many(path, int(np.prod(shape)))
     used = np.isin(index, _used(bins))

@@ -7,12 +7,8 @@ channel; each list is in the order of frequency, as receivers report it.
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 from jaxtyping import Int64
-
-Format = Literal["non-HT", "HT", "VHT", "HE", "EHT"]
 
 #: Distance of subcarriers [Hz]: of HE and EHT a quarter of what it was before.
 SPACING_HZ: dict[str, float] = {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`rfgs inspect`: what a capture holds."""
+"""`rfgs inspect`: what a capture holds, or what the radios of a dataset can tell apart."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ class InspectArgs:
 
     Reads Intel 5300, FeitCSI, PicoScenes, Nexmon, ESP32, TI mmWave, Acconeer A121, DW1000, NeRF2
     folders, NeWRF tables and AFRL phase history; the file itself tells which. docs/captures.md
-    explains each.
+    explains each. Of a dataset it says what the band and the antennas of its radios can tell apart.
 
     Example: rfgs inspect walk.dat --sanitize --out pictures
     """
 
     file: tyro.conf.Positional[Path]
-    """A capture: a file, or a folder in NeRF2's layout."""
+    """A capture: a file, or a folder in NeRF2's layout; or a dataset."""
     out: Path | None = None
     """Folder for pictures; none are drawn when left out."""
     sanitize: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
@@ -39,6 +39,9 @@ def run(args: InspectArgs) -> int:
     """Prints a summary and draws what was asked for; exit code 0."""
     from rfgs_core.capture import read_capture
 
+    if (args.file / "dataset.json").is_file():
+        sys.stdout.write("".join(f"{line}\n" for line in _can_tell(args.file)))
+        return 0
     reading = read_capture(args.file, args.format)
     sys.stdout.write("".join(f"{line}\n" for line in summary(reading)))
     for number, capture in enumerate(reading.captures):
@@ -51,6 +54,21 @@ def run(args: InspectArgs) -> int:
         if args.sanitize:
             _sanitise(capture, None if args.out is None else args.out / f"{name}_sanitised.png")
     return 0
+
+
+def _can_tell(dataset: Path) -> list[str]:
+    """What the radios of a dataset can tell apart, in lines."""
+    from rfgs_core.dataset import open_dataset
+    from rfgs_core.measure.resolving import resolving
+    from rfgs_core.settings import TrainConfig
+
+    lines, opened = [], open_dataset(dataset)
+    for name in opened.sequences:
+        sequence = opened.sequence(name)
+        for radio in sequence.radios:
+            can = resolving(sequence, radio, TrainConfig().num_gaussians)
+            lines += [f"{name}: {line}" for line in can.lines()]
+    return lines
 
 
 def summary(reading: Reading) -> list[str]:

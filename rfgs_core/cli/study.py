@@ -17,8 +17,8 @@ class StudyArgs:
     """Trains and evaluates every scene, condition, radio and seed, and writes OUT/study.md.
 
     Scenes: living_room_walk, two_crossing, through_wall, office_sit_stand; four frames of each.
-    Conditions: clean (direct paths only), impaired (noise, 10 bits, phase noise), walls (wall
-    bounces; not for uwb). What is finished is kept: the same command continues where it stopped,
+    Conditions: clean (direct paths only), impaired (noise, 10 bits, phase noise), bounces (off
+    walls; not for uwb). What is finished is kept: the same command continues where it stopped,
     and with more seeds or scenes it adds them. Says before it begins what is left and how
     long that takes. A case that fails is named below the table, and the others go on: behind
     concrete nobody is heard at 60 GHz.

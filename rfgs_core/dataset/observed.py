@@ -17,25 +17,13 @@ if TYPE_CHECKING:
 Observed = Literal["clean", "impaired"]
 
 
-def observed_csi(
-    sequence: Sequence, radio: str, frame: int, channel: Observed
-) -> Complex64[np.ndarray, "tx rx subcarrier"]:
-    """Channel at a frame's own time as a method may see it, NaN where a packet was lost.
-
-    Receivers report the gain they chose, so it is taken out; noise, phases and steps stay.
-
-    Raises:
-        RfgsError: The radio's channels were never impaired.
-    """
-    if channel == "clean":
-        return sequence.csi(radio, frame)
-    return observed_packets(sequence, radio, frame, channel, 1)[0]
-
-
 def observed_packets(
     sequence: Sequence, radio: str, frame: int, channel: Observed, count: int | None = None
 ) -> Complex64[np.ndarray, "sample tx rx subcarrier"]:
-    """Channels of the first `count` packets of a frame, or of all, as `observed_csi` gives one.
+    """Channels of the first `count` packets of a frame, or of all, as a method may see them.
+
+    NaN where a packet was lost. Receivers report the gain they chose, so it is taken out; noise,
+    phases and steps stay.
 
     Raises:
         RfgsError: The radio's channels were never impaired.

@@ -33,12 +33,11 @@ HEIGHT_PERCENTILES = (2.5, 97.5)
 VOXELS_PER_FACE = 1.5
 
 
-def voxel_budget(instances: Sequence[dict[str, Any]], voxel_m: float = VOXEL_M) -> int:
+def voxel_budget(instances: Sequence[dict[str, Any]]) -> int:
     """K, the number of voxels a method may predict.
 
     Args:
         instances: Instance table of the sequence; those with a `nominal_surface_m2` count.
-        voxel_m: Edge of a voxel [m].
 
     Raises:
         RfgsError: No instance has a nominal surface.
@@ -54,7 +53,7 @@ def voxel_budget(instances: Sequence[dict[str, Any]], voxel_m: float = VOXEL_M) 
             "moves to compare with; make the dataset again with a class for what moves (--people "
             "NAME, --vehicles NAME) or with its Nominal surface set in Blender"
         )
-    return round(VOXELS_PER_FACE * surface / voxel_m**2)
+    return round(VOXELS_PER_FACE * surface / VOXEL_M**2)
 
 
 def spanned(

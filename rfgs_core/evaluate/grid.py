@@ -28,7 +28,7 @@ class Grid:
     """Edge of a voxel [m]."""
 
     @staticmethod
-    def over(bounds_m: Float[np.ndarray, "2 3"], voxel_m: float = VOXEL_M) -> Grid:
+    def over(bounds_m: Float[np.ndarray, "2 3"]) -> Grid:
         """The grid that covers `bounds_m`, rows minimum and maximum [m].
 
         Example:
@@ -36,11 +36,10 @@ class Grid:
             (25, 10, 3)
         """
         low, high = np.asarray(bounds_m, dtype=np.float64)
-        count = np.maximum(np.ceil((high - low) / voxel_m - 1e-9), 1).astype(int)
+        count = np.maximum(np.ceil((high - low) / VOXEL_M - 1e-9), 1).astype(int)
         return Grid(
             (float(low[0]), float(low[1]), float(low[2])),
             (int(count[0]), int(count[1]), int(count[2])),
-            voxel_m,
         )
 
     @property

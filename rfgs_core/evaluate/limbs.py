@@ -35,6 +35,8 @@ LIMBS = [
     JOINTS.index(f"{s}_{n}") for s in ("left", "right") for n in ("knee", "ankle", "elbow", "wrist")
 ]
 WRISTS = [JOINTS.index(f"{s}_wrist") for s in ("left", "right")]
+#: Seed of walks and of whose radio is swapped.
+_SEED = 0
 #: Walks whose mean pose is a row, and moments of each.
 _WALKS, _MOMENTS = 40, 10
 #: Points that stand for a posed surface, and the deviation around each [m].
@@ -90,7 +92,6 @@ def limb_table(
     radio: str,
     network: LimbNetwork | None,
     frames: list[int],
-    seed: int = 0,
     *,
     everything: bool = True,
     on_frame: Callable[[], Any] = lambda: None,
@@ -102,7 +103,6 @@ def limb_table(
         radio: Which radio.
         network: The network of that radio; None leaves its rows out.
         frames: Frames.
-        seed: Seed of walks and of whose radio is swapped.
         everything: Whether held-out entries are read as well.
         on_frame: Called as frames are located.
 
@@ -116,8 +116,8 @@ def limb_table(
     rows: dict[str, Float64[np.ndarray, "frame 17 3"]] = {}
     if network is not None:
         rows |= _by_network(network, person, other)
-    rows |= _by_evidence(person, other, seed)
-    mean, phases = _walking(person, seed)
+    rows |= _by_evidence(person, other, _SEED)
+    mean, phases = _walking(person, _SEED)
     own = people().body(np.zeros(0))
     rows |= {
         "standing, true heading": _placed(own.joints17(upright(own)), person),

@@ -57,7 +57,9 @@ def _draw_speeds(axis, motion: Motion, true: Float64[np.ndarray, "frame person"]
     for speeds, colour, label, style in [*curves, (motion.speed_m_s, METHOD, "track", "s--")]:
         for body in range(speeds.shape[1]):
             axis.plot(
-                *(motion.time_s, speeds[:, body], style),
+                motion.time_s,
+                speeds[:, body],
+                style,
                 color=colour,
                 ms=4,
                 lw=1.4,

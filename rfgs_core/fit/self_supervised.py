@@ -32,6 +32,7 @@ from rfgs_core.encode.spread import FeatureSpread
 from rfgs_core.errors import RfgsError
 from rfgs_core.fit.sampling import sample_points
 from rfgs_core.measure.observations import Observations
+from rfgs_core.radio.levels import decibels
 from rfgs_core.seeds import sub_seed
 from rfgs_core.threads import one_torch_thread
 
@@ -233,4 +234,4 @@ def _error_db(encoder: LearnedEncoder, prior: Prior, example: Example, seed: int
             )[0]
             for draw in range(_DRAWS)
         ]
-    return 10.0 * float(torch.log10(torch.stack(errors).mean()))
+    return decibels(float(torch.stack(errors).mean()))

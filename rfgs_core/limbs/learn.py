@@ -22,7 +22,15 @@ from torch.utils.data import DataLoader, IterableDataset, get_worker_info
 from rfgs_core.encode.body_maps import Ranges
 from rfgs_core.limbs.network import LimbNetwork
 from rfgs_core.limbs.progress import Progress, keep, resume
-from rfgs_core.limbs.tokens import Packed, Tokens, mirrored_joints, pack, power_of, rotate, tokens
+from rfgs_core.limbs.tokens import (
+    Packed,
+    Tokens,
+    mirrored_joints,
+    pack,
+    relative_power,
+    rotate,
+    tokens,
+)
 from rfgs_core.radio import Radio
 from rfgs_core.seeds import sub_seed
 from rfgs_core.worlds.heard import examples
@@ -238,7 +246,7 @@ def _drawn(packed: Packed, rng: np.random.Generator) -> tuple[Tokens, Bool[Tenso
     """Frames with other gains and noise, some of their devices silent, half of them mirrored."""
     count, pairs = packed.there.shape
     generator = torch.Generator().manual_seed(int(rng.integers(2**31)))
-    power = power_of(packed)
+    power = relative_power(packed)
     noise = torch.rand(count, pairs, 1, 1, 1, generator=generator) * _LOUDER + _QUIET
     power = power + _speckle(power.shape, rng) * 10.0**noise
     packed = packed._replace(
@@ -303,7 +311,7 @@ def judge(network: LimbNetwork, chunk: Chunk) -> float:
             there = torch.from_numpy(packed.there)
             reference = there.float().argmax(1)
             mirror = torch.zeros(len(there), dtype=torch.bool)
-            seen = tokens(packed, power_of(packed), there, reference, mirror)
+            seen = tokens(packed, relative_power(packed), there, reference, mirror)
             joints = rotate(torch.from_numpy(chunk.joints[rows]), -seen.yaw)
             errors.append((network(seen)[0] - joints).norm(dim=-1).mean(1))
     return float(torch.cat(errors).mean())

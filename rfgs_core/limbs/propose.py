@@ -16,7 +16,7 @@ from rfgs_core.limbs.tokens import (
     Packed,
     mirrored_joints,
     pack,
-    power_of,
+    relative_power,
     rotate,
     tokens,
 )
@@ -79,7 +79,7 @@ def _asked(
     mirror = torch.arange(len(references)) % 2 == 1
     network.eval()
     with torch.no_grad():
-        seen = tokens(many, power_of(many), there, torch.from_numpy(references), mirror)
+        seen = tokens(many, relative_power(many), there, torch.from_numpy(references), mirror)
         joints, log_sigma = network(seen)
         straight = mirrored_joints(joints, mirror)
         sigma = torch.where(mirror[:, None], log_sigma[:, MIRRORED], log_sigma).exp()

@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float, Float32, UInt8
 from torch import Tensor
 
 from rfgs_core.encode.body_maps import AZIMUTHS, ELEVATIONS, View
+from rfgs_core.radio.levels import decibels
 from rfgs_core.skeleton import JOINTS
 
 #: Step of a stored map [dB]: 255 is the peak of its pair.
@@ -57,7 +58,7 @@ def pack(
             peak = float(power[j].max())
             if not peak > 0.0:
                 continue
-            below_db = 10.0 * np.log10(np.maximum(power[j] / peak, 1e-9))
+            below_db = decibels(power[j] / peak, least=1e-9)
             maps[i, j] = np.clip(255.5 + below_db / _STEP_DB, 0, 255)
             level[i, j] = np.log10(peak)
             vectors[i, j, :2] = view.tx.centre - centre, view.rx.centre - centre
@@ -87,7 +88,7 @@ class Tokens(NamedTuple):
     """Direction that the frames' x axis was turned from [rad]."""
 
 
-def power_of(packed: Packed) -> Float[Tensor, "frame pair elevation azimuth range"]:
+def relative_power(packed: Packed) -> Float[Tensor, "frame pair elevation azimuth range"]:
     """Power over each pair's peak."""
     below = (torch.from_numpy(packed.maps).float() - 255.0) * (_STEP_DB / 10.0)
     return torch.pow(10.0, below)

@@ -45,13 +45,13 @@ class Reflectors:
 
 
 def band_subcarriers(
-    freq_hz: Float[np.ndarray, "subcarrier"], count: int = POWER_SUBCARRIERS
+    freq_hz: Float[np.ndarray, "subcarrier"],
 ) -> Subcarriers:
     """A few subcarriers spread over a band, its edges among them."""
     low, high = float(freq_hz[0]), float(freq_hz[-1])
-    if count == 1 or high == low:
+    if high == low:
         return Subcarriers(0.5 * (low + high), 0.0, 1)
-    return Subcarriers(low, (high - low) / (count - 1), count)
+    return Subcarriers(low, (high - low) / (POWER_SUBCARRIERS - 1), POWER_SUBCARRIERS)
 
 
 def echoes_at(

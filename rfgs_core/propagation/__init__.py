@@ -83,15 +83,24 @@ def scatter(
         >>> subcarriers = Subcarriers(f0=299_792_458.0, df=0.0, count=1)
         >>> csi = scatter(
         ...     torch.tensor([[1.0, 0.0, 0.0]]), torch.tensor([[1.0, 0.0, 0.0, 0.0]]),
-        ...     torch.full((1, 3), 1e-6), torch.ones(1, 1, dtype=torch.complex64), link,
-        subcarriers, ... )
+        ...     torch.full((1, 3), 1e-6), torch.ones(1, 1, dtype=torch.complex64),
+        ...     link, subcarriers,
+        ... )
         >>> round(csi.real.item() * (4 * torch.pi) ** 1.5, 4)
         1.0
     """
     _check_groups(links, visibility)
     links = on_device(links, means.device)
     return _twin(backend, means.device).scatter(
-        *(means, quats, scales_rf, gamma, links, subcarriers, normals, sharpness, visibility)
+        means,
+        quats,
+        scales_rf,
+        gamma,
+        links,
+        subcarriers,
+        normals=normals,
+        sharpness=sharpness,
+        visibility=visibility,
     )
 
 
@@ -193,8 +202,15 @@ def propagate(
     """
     g = gaussians
     total = scatter(
-        *(g.means, g.quats, g.scales_rf, g.gamma, links, subcarriers),
-        *(g.normals, g.sharpness, g.visibility),
+        g.means,
+        g.quats,
+        g.scales_rf,
+        g.gamma,
+        links,
+        subcarriers,
+        normals=g.normals,
+        sharpness=g.sharpness,
+        visibility=g.visibility,
         backend=backend,
     )
     if paths is None:

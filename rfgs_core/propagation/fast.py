@@ -102,8 +102,12 @@ class _Scatter(torch.autograd.Function):
         sharpness, plan, chunks = setting
         real = shape.dtype
         cloud = Cloud(
-            *(_rows(means, torch.float64), _rows(shape, real), _rows(gain, real)),
-            *(_rows(visibility, real), _rows(normals, real), sharpness),
+            means=_rows(means, torch.float64),
+            shape=_rows(shape, real),
+            gain=_rows(gain, real),
+            visibility=_rows(visibility, real),
+            normals=_rows(normals, real),
+            sharpness=sharpness,
         )
         size = (len(plan.ends), gain.shape[1], 2, chunks.padded)
         sums = np.zeros(size)
@@ -162,7 +166,10 @@ def scatter(
         normals, sharpness = torch.zeros(0, 3, dtype=real), 0.0
     ends = torch.cat([links.tx_xyz, links.rx_xyz], dim=1)
     plan = Plan(
-        *(_rows(ends, torch.float64), _rows(group, torch.int64), chunks.chunk, chunks.subcarrier)
+        ends=_rows(ends, torch.float64),
+        group=_rows(group, torch.int64),
+        chunk=chunks.chunk,
+        subcarrier=chunks.subcarrier,
     )
     total = _Scatter.apply(
         means.T,

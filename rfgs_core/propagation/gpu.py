@@ -91,9 +91,11 @@ class _Scatter(torch.autograd.Function):
         sums = means.new_zeros(splits, links, 2, chunks.columns, dtype=torch.float32)
         if links and total and parts:
             _launch(
-                *(scatter_forward, (links, parts, splits), flags),
-                *(*cloud, ends, group, chunks.table, chunks.cycles_per_m, sums),
-                *(total, chunks.columns, per_split, sharpness),
+                scatter_forward,
+                (links, parts, splits),
+                flags,
+                (*cloud, ends, group, chunks.table, chunks.cycles_per_m, sums),
+                (total, chunks.columns, per_split, sharpness),
             )
         ctx.state = (cloud, setting, flags)
         ctx.dtypes = tuple(x.dtype for x in (means, shape, gain, visibility, normals))
@@ -115,9 +117,11 @@ class _Scatter(torch.autograd.Function):
         out = means.new_zeros(splits, rows, total, dtype=torch.float32)
         if links and total and parts:
             _launch(
-                *(scatter_backward, (-(-total // ROWS), splits), flags),
-                *(*cloud, ends, group, chunks.table, chunks.cycles_per_m, seed, out),
-                *(total, links, parts, chunks.columns, rows, per_split, sharpness),
+                scatter_backward,
+                (-(-total // ROWS), splits),
+                flags,
+                (*cloud, ends, group, chunks.table, chunks.cycles_per_m, seed, out),
+                (total, links, parts, chunks.columns, rows, per_split, sharpness),
             )
         summed = out.sum(dim=0)
         result = (
@@ -130,9 +134,15 @@ class _Scatter(torch.autograd.Function):
         return (*(x.to(dtype) for x, dtype in zip(result, ctx.dtypes, strict=True)), None)
 
 
-def _launch(kernel: Any, grid: tuple[int, ...], flags: dict[str, bool], *args: Any) -> None:
-    """Runs a kernel: one program per place of the grid."""
-    kernel[grid](*args, **flags, ROWS=ROWS, SUBCARRIERS=SUBCARRIERS)
+def _launch(
+    kernel: Any,
+    grid: tuple[int, ...],
+    flags: dict[str, bool],
+    tensors: tuple[Tensor, ...],
+    numbers: tuple[float, ...],
+) -> None:
+    """Runs a kernel, which takes tensors first: one program per place of the grid."""
+    kernel[grid](*tensors, *numbers, **flags, ROWS=ROWS, SUBCARRIERS=SUBCARRIERS)
 
 
 def _splits(programs: int, count: int, least: int) -> int:
@@ -192,7 +202,12 @@ def shadow(
     rows = max(1, MOST_SHADOWS // max(1, len(means)))
     parts = [
         checkpoint(
-            *(reference.shadow, means, quats, scales, alpha, paths.rows(slice(at, at + rows))),
+            reference.shadow,
+            means,
+            quats,
+            scales,
+            alpha,
+            paths.rows(slice(at, at + rows)),
             use_reentrant=False,
             preserve_rng_state=False,
         )

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -91,6 +92,25 @@ def slab(
         factors.append((surface * (1.0 - once**2) / rest, (1.0 - surface**2) * once / rest))
     (reflected_te, passed_te), (reflected_tm, passed_tm) = factors
     return Slab(reflected_te, reflected_tm, passed_te, passed_tm)
+
+
+#: Slabs that leave less of an amplitude count as closed: −30 dB.
+_CLOSED = 0.03
+
+
+def slab_delay_s(slabs: Iterable[tuple[str, float]], freq_hz: float) -> float:
+    """Longest time d √ε′ / c that a wave takes through any slab that passes some of it [s].
+
+    Args:
+        slabs: Material, one of `materials.MATERIALS`, and thickness d [m] of each.
+        freq_hz: Frequency within the materials' validity [Hz].
+    """
+    at, longest_s = np.array([freq_hz]), 0.0
+    for name, thickness_m in slabs:
+        if abs(slab(name, thickness_m, at, np.ones(1)).passed_te[0, 0]) > _CLOSED:
+            index = float(np.sqrt(material_permittivity(name, at))[0].real)
+            longest_s = max(longest_s, thickness_m * index / SPEED_OF_LIGHT)
+    return longest_s
 
 
 def slab_reflection(

@@ -21,13 +21,15 @@ from rfgs_core.render.splat import (
     Splatted,
 )
 
+#: Pixels at a time: a few times so many doubles per Gaussian are in memory.
+_CHUNK_PX = 128
+
 
 def splat_plain(
     gaussians: Gaussians,
     rgb: Float[Tensor, "M 3"],
     camera: Camera,
     rows: tuple[int, int] | None = None,
-    chunk_px: int = 128,
 ) -> Splatted:
     """Renders Gaussians in double precision, pixel by Gaussian (see `splat.py` for the formula).
 
@@ -36,7 +38,6 @@ def splat_plain(
         rgb: Colours in [0, 1], shape [M, 3].
         camera: Where to look from.
         rows: First and one-past-last row of the picture to render; all of them if not given.
-        chunk_px: Pixels at a time; bounds the memory to a few times chunk_px × M doubles.
 
     Returns:
         The picture, in double precision.
@@ -49,7 +50,7 @@ def splat_plain(
     values = torch.cat([rgb.double()[order], depths[:, None]], dim=1)
     top, bottom = rows or (0, camera.height)
     blended, covers = [], []
-    for pixels in _pixel_centres(top, bottom, camera.width).split(chunk_px):
+    for pixels in _pixel_centres(top, bottom, camera.width).split(_CHUNK_PX):
         dx = pixels[:, :1] - centres[:, 0]
         dy = pixels[:, 1:] - centres[:, 1]
         power = (0.5 * inverses[:, 0, 0] * dx + inverses[:, 0, 1] * dy) * dx

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, Protocol
@@ -177,15 +177,13 @@ def training_views(run: TrainedRun) -> list[TrainingView]:
     return views
 
 
-def fit_run_shader(
-    run: TrainedRun, config: ShaderConfig, on_step: Callable[[float], None] | None = None
-) -> Shader:
+def fit_run_shader(run: TrainedRun, config: ShaderConfig) -> Shader:
     """Fits the shader to the run's training pictures and stores it in the run.
 
     Writes `shader.npz` and the colours in the run's PLY files; everything else in them keeps its
     bytes.
     """
-    shader = fit_shader(training_views(run), config, on_step)
+    shader = fit_shader(training_views(run), config)
     shader.save(run.path / SHADER_FILE)
     color_run_files(run, shader)
     return shader

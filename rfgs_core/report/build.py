@@ -50,20 +50,18 @@ BLENDER_PICTURES = {
 }
 
 
-def write_run_report(run: EvaluatedRun, timings: Mapping[str, float] | None = None) -> Path:
+def write_run_report(run: EvaluatedRun) -> Path:
     """Writes `report.html` into an evaluated run.
 
     Args:
         run: The run; `metrics.json` is there.
-        timings: Seconds per stage; training and evaluation by default.
 
     Raises:
         RfgsError: The run has not been evaluated.
     """
     metrics = read_metrics(run.path)
-    if timings is None:
-        known = {"training": metrics.get("train_s"), "evaluation": metrics.get("eval_s")}
-        timings = {name: float(value) for name, value in known.items() if value is not None}
+    known = {"training": metrics.get("train_s"), "evaluation": metrics.get("eval_s")}
+    timings = {name: float(value) for name, value in known.items() if value is not None}
     target = run.path / "report.html"
     _write(target, [(run, metrics)], timings, command=f"rfgs report {run.path.name}")
     return target
@@ -73,7 +71,6 @@ def write_demo_report(
     demo_dir: Path,
     runs: Sequence[EvaluatedRun],
     timings: Mapping[str, float],
-    command: str = "make demo",
 ) -> Path:
     """Writes the demo's `report.html`: one scene, several radios.
 
@@ -81,7 +78,6 @@ def write_demo_report(
         demo_dir: Folder of the demo; `inspect.png` in it is shown if present.
         runs: Evaluated runs on the same sequence.
         timings: Seconds per stage, in order.
-        command: What a reader types to get the same.
 
     Returns:
         The page.
@@ -96,7 +92,7 @@ def write_demo_report(
             blender.append(Shot(file_uri(data), caption))
     target = demo_dir / "report.html"
     evaluated = [(run, read_metrics(run.path)) for run in runs]
-    _write(target, evaluated, timings, command, blender)
+    _write(target, evaluated, timings, "make demo", blender)
     return target
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool, Complex, Float
 
-from rfgs_core.radio.levels import amplitude_of, decibels, power_of
+from rfgs_core.radio.levels import amplitude_of, power_of
 
 
 def undo_gain(
@@ -94,14 +94,6 @@ def normalise_power(
     scale = np.sqrt(np.mean(np.abs(values[train]) ** 2, axis=0))
     scale = np.where(scale > 0, scale, 1.0)
     return values / scale, scale
-
-
-def gain_steps_db(
-    values: Complex[np.ndarray, "time *link bin"],
-) -> Float[np.ndarray, "step"]:
-    """Change of the whole packet's level from one packet to the next [dB]: what gain brings."""
-    power = (np.abs(values) ** 2).reshape(len(values), -1).mean(axis=1)
-    return np.diff(decibels(power))
 
 
 def _by_time(values: np.ndarray, factor: Float[np.ndarray, "time"]) -> np.ndarray:

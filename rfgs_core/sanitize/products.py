@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Complex, Float
+from jaxtyping import Complex
 
 
 def reference_antenna(values: Complex[np.ndarray, "time rx *any"]) -> int:
@@ -75,15 +75,3 @@ def csi_ratio(
     weak = level <= floor * np.median(level)
     ratio = others / np.where(weak, 1.0, below)
     return np.where(np.broadcast_to(weak, ratio.shape), np.nan, ratio)
-
-
-def mirror_asymmetry(spectrum: Float[np.ndarray, "doppler *any"]) -> float:
-    """Mean |log₁₀| of the power at a Doppler shift over that at its mirror.
-
-    Args:
-        spectrum: Power, Doppler from negative to positive with 0 in the middle, odd in number.
-    """
-    half = spectrum.shape[0] // 2
-    above, below = spectrum[half + 1 :], spectrum[:half][::-1]
-    use = (above > 0) & (below > 0)
-    return float(np.abs(np.log10(above[use] / below[use])).mean()) if use.any() else 0.0

@@ -92,7 +92,7 @@ class FastTracer:
         self._people, self._vehicles = people, vehicles
         self._shadow: Shadow = shadow
         self._layout = layout(radio, devices)
-        self._nodes = node_frequencies(radio)
+        self._nodes = node_frequencies(radio, room.slab_delay_s(radio.centre_hz))
         self._grid = fine_grid(self._nodes)
         self._sight = Sight(*centres(self._layout))
         self.timings: dict[str, float] = dict.fromkeys(("environment", "shadow", "people"), 0.0)

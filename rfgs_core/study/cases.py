@@ -49,8 +49,11 @@ CONDITIONS: dict[str, Condition] = {
         1,
         "impaired",
     ),
-    "walls": Condition("clean, up to two wall bounces", 3, "clean"),
+    "bounces": Condition("clean, up to two wall bounces", 3, "clean"),
 }
+
+#: What names of earlier studies are called now.
+_RENAMED = {"walls": "bounces"}
 
 #: Radios of the study. Those that are not traced deep enough have no case of a condition or scene.
 RADIOS = ("wifi", "mmwave", "uwb")
@@ -135,7 +138,8 @@ def cases(
     ):
         for name in asked:
             if name not in known:
-                raise RfgsError(f"{kind} {name!r}: expected some of {', '.join(known)}")
+                now = f" (it is called {_RENAMED[name]} now)" if name in _RENAMED else ""
+                raise RfgsError(f"{kind} {name!r}{now}: expected some of {', '.join(known)}")
     if seeds < 1:
         raise RfgsError(f"--seeds {seeds}: expected at least 1")
     chosen = [

@@ -102,8 +102,16 @@ def _row(scene: str, condition: str, radio: str, rows: list[Mapping[str, Any]]) 
     f10 = [row["geometry"]["f10"] for row in rows if row["geometry"].get("f10") is not None]
     spread = max(f10) - min(f10) if f10 else 0.0
     return Row(
-        *(scene, condition, radio, len(rows), values, spread),
-        *(best_rival, best_gain, best_corr, _targets(radio, values)),
+        scene=scene,
+        condition=condition,
+        radio=radio,
+        seeds=len(rows),
+        values=values,
+        spread_f10=spread,
+        best_rival=best_rival,
+        best_gain=best_gain,
+        best_profile=best_corr,
+        targets=_targets(radio, values),
     )
 
 

@@ -73,7 +73,11 @@ def open_page(url: str, width_px: int, height_px: int) -> Iterator[Page]:
         raise RfgsError(f"Chromium: {error.message.splitlines()[0]}") from error
 
 
-def settled_picture(page: Page, limit_s: float, still_s: float = 3.0) -> bytes:
+#: A page that has looked the same for so long has come to rest [s].
+_STILL_S = 3.0
+
+
+def settled_picture(page: Page, limit_s: float) -> bytes:
     """A page once it has looked the same for a while, PNG.
 
     Raises:
@@ -86,6 +90,6 @@ def settled_picture(page: Page, limit_s: float, still_s: float = 3.0) -> bytes:
         now = page.screenshot()
         if now != before:
             before, since = now, time.monotonic()
-        elif time.monotonic() - since >= still_s:
+        elif time.monotonic() - since >= _STILL_S:
             return now
     raise RfgsError(f"the page did not come to rest within {limit_s:.0f} s")

@@ -55,7 +55,7 @@ class Offer:
 
 
 class Panel:
-    """Controls on a page; `choice` reads them all at once."""
+    """Controls on a page; `selection` reads them all at once."""
 
     def __init__(
         self, server: ViserServer, offer: Offer, start: Selection, *, play: bool = False

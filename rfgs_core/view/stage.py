@@ -47,7 +47,7 @@ class Stage:
             server: Where to draw.
             seen_m: Lowest and highest corner of what a page looks at first [m].
         """
-        self._server, self._scene = server, server.scene
+        self._scene = server.scene
         self._groups: dict[str, list[Any]] = {}
         self._scene.set_up_direction("+z")
         self._scene.set_background_image(np.full((2, 2, 3), _BACKGROUND, np.uint8))

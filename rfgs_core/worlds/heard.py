@@ -56,16 +56,15 @@ class Example(NamedTuple):
     """Family of the motion."""
 
 
-def examples(radio: Radio, seed: int, families: tuple[str, ...] = FAMILIES) -> Iterator[Example]:
+def examples(radio: Radio, seed: int) -> Iterator[Example]:
     """Worlds without end, the same for the same seed.
 
     Args:
         radio: Radio of the devices.
         seed: Seed of everything.
-        families: Families of motion to draw from.
     """
     rng = np.random.default_rng(sub_seed(seed, radio.name, "worlds"))
-    shares = np.array([_SHARES.get(family, _OTHERWISE) for family in families])
+    shares = np.array([_SHARES.get(family, _OTHERWISE) for family in FAMILIES])
     wavelength_m = SPEED_OF_LIGHT / float(radio.freq_hz.max())
     motions = 0
     cast: list[Figure] = []
@@ -75,7 +74,7 @@ def examples(radio: Radio, seed: int, families: tuple[str, ...] = FAMILIES) -> I
             cast = [Figure.of(body, wavelength_m) for body in drawn]
         motions += 1
         figure = cast[int(rng.integers(len(cast)))]
-        family = str(rng.choice(families, p=shares / shares.sum()))
+        family = str(rng.choice(FAMILIES, p=shares / shares.sum()))
         yield from _moments(rng, radio, figure, family)
 
 

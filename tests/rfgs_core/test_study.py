@@ -66,8 +66,10 @@ def test_every_case_once_and_seeds_share_a_dataset() -> None:
 def test_unknown_names_and_empty_choices_are_refused() -> None:
     with pytest.raises(RfgsError, match="scene 'kitchen': expected some of living_room_walk"):
         cases(["kitchen"], ["clean"], ["wifi"], 1)
+    with pytest.raises(RfgsError, match=r"'walls' \(it is called bounces now\): expected some of"):
+        cases(["living_room_walk"], ["walls"], ["wifi"], 1)
     with pytest.raises(RfgsError, match="no case: uwb is not traced as deep as living_room_walk"):
-        cases(["living_room_walk"], ["walls"], ["uwb"], 1)
+        cases(["living_room_walk"], ["bounces"], ["uwb"], 1)
     with pytest.raises(RfgsError, match="expected at least 1"):
         cases(["living_room_walk"], ["clean"], ["wifi"], 0)
 
@@ -96,7 +98,7 @@ def test_targets_follow_from_means_over_seeds() -> None:
 
 
 def test_targets_differ_by_radio_and_a_lower_ceiling_counts() -> None:
-    case = Case("two_crossing", "walls", "mmwave", 0)
+    case = Case("two_crossing", "bounces", "mmwave", 0)
     (row,) = summarise(
         [(case, metrics(0.73, centroid_m=0.12, found=0.9, identity_kept=0.75, f05=0.4))]
     )

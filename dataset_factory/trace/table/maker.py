@@ -8,6 +8,7 @@ from dataclasses import fields, replace
 import numpy as np
 
 from dataset_factory.trace.bounces.solver import with_facets
+from dataset_factory.trace.bounces.walls import Walls
 from dataset_factory.trace.instant import Trace
 from dataset_factory.trace.people.bodies import Bodies
 from dataset_factory.trace.table.corners import CornerObjects, doppler_hz
@@ -26,7 +27,11 @@ from rfgs_core.radio.path_table import PathTable, ends_rad
 from rfgs_core.radio.sites import centres, owners
 from rfgs_core.simulate.paths.path_set import PathSet, empty, merged
 from rfgs_core.simulate.paths.steering import resampled
-from rfgs_core.simulate.shadow.environment import WIDE_BAND_NODES, node_frequencies
+from rfgs_core.simulate.shadow.environment import (
+    WIDE_BAND_NODES,
+    node_frequencies,
+    path_frequencies,
+)
 from rfgs_core.simulate.shadow.kirchhoff import Shadow, transmission
 from rfgs_core.simulate.shadow.outline import Outline
 
@@ -90,7 +95,7 @@ class TableMaker:
         """
         if not len(paths):
             return self._table(paths, np.zeros((0, 0), np.int32), np.zeros(0))
-        paths = resampled(paths, node_frequencies(self._radio), self._nodes)
+        paths = resampled(paths, path_frequencies(paths, self._radio), self._nodes)
         amplitude = paths.amplitude * (self._radio.centre_hz / self._nodes)
         if outlines:
             passed = transmission(paths, self._centres, outlines, self._nodes, self._shadow)
@@ -106,6 +111,7 @@ class TableMaker:
         trace: Trace,
         bodies: Bodies,
         corners: CornerObjects,
+        walls: Walls,
         velocity: np.ndarray,
         vehicles: tuple[np.ndarray, np.ndarray] | None,
     ) -> PathTable:
@@ -115,6 +121,7 @@ class TableMaker:
             trace: What rays have told, at a frame.
             bodies: What moves.
             corners: What the paths by way of walls met.
+            walls: How that answers over the band.
             velocity: Velocity of the bundle's vertices [m/s], shape (V, 3).
             vehicles: As `environment` takes it.
         """
@@ -125,6 +132,7 @@ class TableMaker:
         parts = [direct] if bounced is None else [direct, bounced]
         paths = merged(parts)
         paths = with_facets(paths, posed, gamma, self._nodes, self._radio.centre_hz)
+        paths = walls.over_band(paths, self._nodes)
         if not len(paths):
             return self._table(empty(0, len(self._nodes)), np.zeros((0, 0), np.int32), np.zeros(0))
         instance = people.instance[surface.triangle]

@@ -12,7 +12,6 @@ from rfgs_core.capture.widar.tables import BAD_FILES, RECEIVERS, USERS, gesture_
 from rfgs_core.errors import RfgsError, RfgsFormatError
 
 _CSI = re.compile(r"user(\d+)-(\d+)-(\d+)-(\d+)-(\d+)-r([1-6])\.dat")
-_BVP = re.compile(r"user(\d+)-(\d+)-(\d+)-(\d+)-(\d+)-(.+)\.mat")
 _DATE = re.compile(r"(?:CSI_)?(20\d{6})")
 
 
@@ -74,21 +73,6 @@ def parse_name(path: Path) -> tuple[Take, int]:
     take = Take(_date(path), user, gesture, torso, orientation, repetition)
     _check(path, take)
     return take, receiver
-
-
-def parse_bvp_name(path: Path) -> tuple[Take, str]:
-    """Take and solver settings of a velocity profile `…/DATE-…/userU-…-SETTINGS.mat`.
-
-    Raises:
-        RfgsFormatError: The name or the folders above it are none of Widar 3.0's.
-    """
-    match = _BVP.fullmatch(path.name)
-    if match is None:
-        raise RfgsFormatError(f"{path}: expected userU-…-repetition-SETTINGS.mat")
-    numbers = [int(part) for part in match.groups()[:5]]
-    take = Take(_date(path), *numbers)
-    _check(path, take)
-    return take, match[6]
 
 
 def scan(root: Path) -> Release:

@@ -8,8 +8,6 @@ transcriptions, which agree.
 
 from __future__ import annotations
 
-import math
-
 from rfgs_core.errors import RfgsFormatError
 
 #: Channel 165 [Hz] and packets per second.
@@ -19,7 +17,7 @@ RECEIVERS = (1, 2, 3, 4, 5, 6)
 #: People in the data set, by number.
 USERS = tuple(range(1, 18))
 
-ROOMS = {1: "classroom", 2: "hall", 3: "office"}
+#: Room of each day: 1 a classroom, 2 a hall, 3 an office.
 ROOM_OF_DATE = {
     **dict.fromkeys((20181109, 20181112, 20181115, 20181116, 20181121, 20181130), 1),
     **dict.fromkeys((20181117, 20181118, 20181127, 20181128), 2),
@@ -33,13 +31,6 @@ RECEIVERS_M = {
     **{1: (0.455, -0.455), 2: (1.365, -0.455), 3: (2.0, 0.0)},
     **{4: (-0.455, 0.455), 5: (-0.455, 1.365), 6: (0.0, 2.0)},
 }
-TORSOS_M = {
-    **{1: (1.365, 0.455), 2: (0.455, 0.455), 3: (0.455, 1.365), 4: (1.365, 1.365)},
-    **{5: (0.91, 0.91), 6: (2.275, 1.365), 7: (2.275, 2.275), 8: (1.365, 2.275)},
-}
-#: Way a person faces [rad], by number.
-ORIENTATIONS_RAD = {number: math.radians(45.0 * (number - 3)) for number in range(1, 6)}
-
 _LINES = ("Push&Pull", "Sweep", "Clap")
 _VERTICAL = ("Draw-O(Vertical)", "Draw-Zigzag(Vertical)", "Draw-N(Vertical)")
 _HORIZONTAL = ("Draw-O(Horizontal)", "Draw-Zigzag(Horizontal)", "Draw-N(Horizontal)")

@@ -64,9 +64,14 @@ class Blocks:
         """Some of the device pairs."""
         rows = torch.from_numpy(pairs)
         return Blocks(
-            *(self.csi[rows], self.visible[rows], self.tx[pairs], self.rx[pairs]),
-            *(self.tx_xyz[rows], self.rx_xyz[rows], self.freq_hz),
-            None if self.packets is None else self.packets[rows],
+            csi=self.csi[rows],
+            visible=self.visible[rows],
+            tx=self.tx[pairs],
+            rx=self.rx[pairs],
+            tx_xyz=self.tx_xyz[rows],
+            rx_xyz=self.rx_xyz[rows],
+            freq_hz=self.freq_hz,
+            packets=None if self.packets is None else self.packets[rows],
         )
 
     def hide(self, mask: Bool[Tensor, "pair tx rx subcarrier"]) -> Blocks:

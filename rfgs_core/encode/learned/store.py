@@ -79,7 +79,10 @@ def load_encoder(path: Path) -> LearnedEncoder:
         {name.removeprefix("weights."): torch.from_numpy(arrays[name]) for name in expected}
     )
     radio = RadioSignature(
-        *(arrays["freq_hz"], arrays["tx_offset_m"], arrays["rx_offset_m"]),
-        *(int(arrays["packets"]), float(arrays["packet_interval_s"])),
+        freq_hz=arrays["freq_hz"],
+        tx_offset_m=arrays["tx_offset_m"],
+        rx_offset_m=arrays["rx_offset_m"],
+        packets=int(arrays["packets"]),
+        packet_interval_s=float(arrays["packet_interval_s"]),
     )
     return LearnedEncoder(kind, model, radio, str(path))

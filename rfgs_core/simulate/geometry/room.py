@@ -11,6 +11,7 @@ import numpy as np
 
 from rfgs_core.errors import RfgsError
 from rfgs_core.radio.materials import MATERIALS
+from rfgs_core.radio.reflection import slab_delay_s
 from rfgs_core.simulate.geometry.faces import Faces, faces_of
 
 
@@ -53,6 +54,10 @@ class Room:
     def faces(self) -> Faces:
         """The triangles gathered into plane faces."""
         return faces_of(self.triangles, self.mesh)
+
+    def slab_delay_s(self, freq_hz: float) -> float:
+        """Longest time that a wave takes through any slab it passes at a frequency [Hz], [s]."""
+        return slab_delay_s((self.materials[i] for i in np.unique(self.material)), freq_hz)
 
 
 def empty_room(source: str = "nothing around") -> Room:

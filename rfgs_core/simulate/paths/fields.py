@@ -58,11 +58,11 @@ def with_fields(
     amplitude = np.zeros((len(k), len(ports(layout)), len(nodes_hz)), dtype=np.complex128)
     slants = radio.slants_deg
     for pair, (i, j) in enumerate(ports(layout)):
-        wave = _of_sites(radio, slants[i], k[:, 0], tx_owner[found.tx], devices)
+        wave = of_sites(radio, slants[i], k[:, 0], tx_owner[found.tx], devices)
         wave = np.repeat(wave[:, None].astype(np.complex128), len(nodes_hz), axis=1)
         for corner in range(found.kinds.shape[1]):
             handed_on(wave, found, corner, k, room, nodes_hz)
-        heard = _of_sites(radio, slants[j], -last, rx_owner[found.rx], devices)
+        heard = of_sites(radio, slants[j], -last, rx_owner[found.rx], devices)
         amplitude[:, pair] = np.einsum("pnx,px->pn", wave, heard)
     amplitude *= (SPEED_OF_LIGHT / (4.0 * np.pi * radio.centre_hz) / length)[:, None, None]
     straight = (count == 0) & (tx_owner[found.tx] == rx_owner[found.rx])
@@ -141,7 +141,7 @@ def past_slab(
     return te[:, :, None] * across[:, None] + tm[:, :, None] * np.cross(across, out)[:, None]
 
 
-def _of_sites(
+def of_sites(
     radio: Radio,
     slant_deg: float,
     directions: np.ndarray,

@@ -53,8 +53,14 @@ class DelayGrid(NamedTuple):
         return self.node_k * (SPEED_OF_LIGHT / (2.0 * np.pi))
 
 
-def delay_grid(radio: Radio, layout: Layout) -> DelayGrid:
-    """Grid and nodes for the subcarriers of a radio and the sizes of its arrays."""
+def delay_grid(radio: Radio, layout: Layout, slab_s: float = 0.0) -> DelayGrid:
+    """Grid and nodes for the subcarriers of a radio.
+
+    Args:
+        radio: The radio.
+        layout: Its elements; the sizes of arrays count.
+        slab_s: Time that its waves spend in slabs, at most [s].
+    """
     k = 2.0 * np.pi * radio.freq_hz / SPEED_OF_LIGHT
     count = len(k)
     middle = count // 2
@@ -64,7 +70,8 @@ def delay_grid(radio: Radio, layout: Layout) -> DelayGrid:
     reach_m = array_reach(layout.tx_xyz, layout.tx_site) + array_reach(
         layout.rx_xyz, layout.rx_site
     )
-    nodes = _enough(half * reach_m, half / k.mean()) if count > 1 else 1
+    turn = half * (reach_m + SPEED_OF_LIGHT * slab_s)
+    nodes = _enough(turn, half / k.mean()) if count > 1 else 1
     node_k = np.linspace(k[0], k[-1], nodes) if nodes > 1 else k[middle : middle + 1]
     share = _lagrange(node_k, k)
     offset = np.arange(count) - middle

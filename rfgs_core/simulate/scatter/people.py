@@ -52,7 +52,8 @@ class PeopleChannel:
             radio: Gives subcarriers, pattern and polarisation.
             depth: Interactions of a path, the facet's included: 1, 2 or 3.
         """
-        self._layout, self._grid = layout, delay_grid(radio, layout)
+        slab_s = (depth - 1) * room.slab_delay_s(radio.centre_hz)
+        self._layout, self._grid = layout, delay_grid(radio, layout, slab_s)
         self._pairs = measured_pairs(layout)
         self._tx, self._rx = look_around(room, around, layout, devices, radio, depth)
         size_m = array_reach(layout.tx_xyz, layout.tx_site)

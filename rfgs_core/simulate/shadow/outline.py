@@ -54,21 +54,18 @@ class Outline:
     """Which segments of the paths it may shade, bool, shape (path, segment)."""
 
 
-def coarse_mesh(
-    vertices: np.ndarray, faces: np.ndarray, detail_m: float = DETAIL_M
-) -> tuple[np.ndarray, ShadowMesh]:
+def coarse_mesh(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, ShadowMesh]:
     """Thins out a mesh for its silhouette by joining vertices within cells.
 
     Args:
         vertices: Rest pose [m], shape (V, 3).
         faces: Triangles, shape (T, 3).
-        detail_m: Size of the cells [m].
 
     Returns:
         Indices of the vertices that are kept and triangles over them.
     """
     used = np.unique(faces)
-    cells = np.floor(vertices[used].astype(np.float64) / detail_m).astype(np.int64)
+    cells = np.floor(vertices[used].astype(np.float64) / DETAIL_M).astype(np.int64)
     _, cell = np.unique(cells, axis=0, return_inverse=True)
     cell = cell.ravel()
     size = np.bincount(cell)

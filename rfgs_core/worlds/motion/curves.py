@@ -67,13 +67,15 @@ def about(axis: np.ndarray, angles: np.ndarray | float) -> np.ndarray:
     return turned(np.asarray(angles)[:, None] * axis)
 
 
-def noise(
-    rng: np.random.Generator, times: np.ndarray, fastest_hz: float, waves: int = 4
-) -> np.ndarray:
+#: Waves of a slow wander.
+_WAVES = 4
+
+
+def noise(rng: np.random.Generator, times: np.ndarray, fastest_hz: float) -> np.ndarray:
     """A slow wander of about unit size [T]: a few waves of random frequency and phase."""
-    hz = rng.uniform(0.05, fastest_hz, waves)
-    phase = rng.uniform(0.0, 2.0 * np.pi, waves)
-    size = rng.uniform(0.3, 1.0, waves)
+    hz = rng.uniform(0.05, fastest_hz, _WAVES)
+    phase = rng.uniform(0.0, 2.0 * np.pi, _WAVES)
+    size = rng.uniform(0.3, 1.0, _WAVES)
     size /= np.linalg.norm(size)
     return np.sin(2.0 * np.pi * hz * times[:, None] + phase) @ size
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -47,6 +48,41 @@ def capsule(subdivisions: int = 4) -> Mesh:
     return vertices.astype(np.float32), ball.faces.astype(np.int32)
 
 
+def _description(files: list[str], material: str, scattering: float) -> dict[str, Any]:
+    """What `bundle.json` says of a room, somebody who moves and a car."""
+    row = {"id": 1, "name": "room", "class": "static", "instance": 0, "moving": False}
+    moving = {"id": 2, "name": "mover", "class": "person", "instance": 1, "moving": True}
+    driven = {"id": 3, "name": "car", "class": "vehicle", "instance": 2, "moving": True}
+    wall = {"name": "wall", "radio_material": material, "thickness_m": 0.0125}
+    skin = {"name": "skin", "radio_material": "skin", "thickness_m": 0.3}
+    steel = {"name": "steel", "radio_material": "metal", "thickness_m": 0.002}
+    common = {"color": [0.5, 0.5, 0.5], "guessed": False}
+    return {
+        "schema": "rfgs-bundle/1",
+        "blend_name": "test",
+        "blend_sha256": "0" * 64,
+        "blender_version": "4.5.0",
+        "addon_version": "0.1.0",
+        "fps": 10,
+        "frame_start": 1,
+        "frame_end": 2,
+        "frames": [1, 2],
+        "bounds_m": [[0.0, 0.0, 0.0], list(ROOM_M)],
+        "devices": [],
+        "cameras": [],
+        "materials": [
+            {**wall, **common, "scattering_coefficient": scattering},
+            {**skin, **common, "scattering_coefficient": 0.0},
+            {**steel, **common, "scattering_coefficient": 0.0},
+        ],
+        "objects": [{**row, "files": files}, {**moving, "files": []}, {**driven, "files": []}],
+        "instances": [
+            {"id": 1, "name": "mover", "class": "person", "person": True},
+            {"id": 2, "name": "car", "class": "vehicle", "person": False},
+        ],
+    }
+
+
 def write_bundle(
     folder: Path,
     static: list[Mesh],
@@ -86,38 +122,7 @@ def write_bundle(
             person_instance=np.array([1], np.int32),
             action=np.array(["walk"]),
         )
-    row = {"id": 1, "name": "room", "class": "static", "instance": 0, "moving": False}
-    moving = {"id": 2, "name": "mover", "class": "person", "instance": 1, "moving": True}
-    driven = {"id": 3, "name": "car", "class": "vehicle", "instance": 2, "moving": True}
-    wall = {"name": "wall", "radio_material": material, "thickness_m": 0.0125}
-    skin = {"name": "skin", "radio_material": "skin", "thickness_m": 0.3}
-    steel = {"name": "steel", "radio_material": "metal", "thickness_m": 0.002}
-    common = {"color": [0.5, 0.5, 0.5], "guessed": False}
-    info = {
-        "schema": "rfgs-bundle/1",
-        "blend_name": "test",
-        "blend_sha256": "0" * 64,
-        "blender_version": "4.5.0",
-        "addon_version": "0.1.0",
-        "fps": 10,
-        "frame_start": 1,
-        "frame_end": 2,
-        "frames": [1, 2],
-        "bounds_m": [[0.0, 0.0, 0.0], list(ROOM_M)],
-        "devices": [],
-        "cameras": [],
-        "materials": [
-            {**wall, **common, "scattering_coefficient": scattering},
-            {**skin, **common, "scattering_coefficient": 0.0},
-            {**steel, **common, "scattering_coefficient": 0.0},
-        ],
-        "objects": [{**row, "files": files}, {**moving, "files": []}, {**driven, "files": []}],
-        "instances": [
-            {"id": 1, "name": "mover", "class": "person", "person": True},
-            {"id": 2, "name": "car", "class": "vehicle", "person": False},
-        ],
-    }
-    write_json(folder / "bundle.json", info)
+    write_json(folder / "bundle.json", _description(files, material, scattering))
     return read_bundle(folder)
 
 

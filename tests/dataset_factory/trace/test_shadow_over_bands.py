@@ -107,7 +107,7 @@ def test_what_nothing_is_near_to_is_not_computed() -> None:
         assert len(transmission(paths, elements, [outline], grid, "kirchhoff").path) == 0
     here = Outline(vertices, faces, everywhere)
     assert transmission(paths, elements, [here], grid, "kirchhoff").path.tolist() == [0]
-    hidden = replace(here, beside=np.zeros((1, 1), bool))
+    hidden = replace(here, in_view=np.zeros((1, 1), bool))
     assert len(transmission(paths, elements, [hidden], grid, "kirchhoff").path) == 0
 
 

@@ -117,6 +117,7 @@ def test_bounces_match_those_of_many_rays(
     paths = follow(paths, points.positions)
     gamma = tracer._bodies.gamma(nodes)
     paths = with_facets(paths, points, gamma, nodes, small_radio.centre_hz)
+    paths = tracer._walls.over_band(paths, nodes)
     theirs = steer(paths, elements, small_radio.freq_hz, nodes)
     assert len(paths) > 500
     assert error_db(ours, theirs) < -80.0

@@ -9,7 +9,7 @@ import torch
 
 from rfgs_core.encode.body_maps import ArrayEnd, View
 from rfgs_core.limbs.network import LimbNetwork
-from rfgs_core.limbs.tokens import Packed, Tokens, mirrored_joints, pack, power_of, tokens
+from rfgs_core.limbs.tokens import Packed, Tokens, mirrored_joints, pack, relative_power, tokens
 from rfgs_core.skeleton import JOINTS
 
 CENTRE = np.array([0.3, -0.2, 0.95])
@@ -63,7 +63,7 @@ def mirrored(world: tuple) -> tuple:
 def seen(packed: Packed, reference: int = 0, mirror: bool = False) -> Tokens:
     there = torch.from_numpy(packed.there)
     return tokens(
-        packed, power_of(packed), there, torch.tensor([reference]), torch.tensor([mirror])
+        packed, relative_power(packed), there, torch.tensor([reference]), torch.tensor([mirror])
     )
 
 
@@ -115,5 +115,5 @@ def test_a_silent_pair_is_no_pair() -> None:
 def test_maps_keep_their_power_to_a_tenth_of_a_decibel() -> None:
     _, maps, _ = world()
     packed = pack([world()], 3)
-    power = power_of(packed).numpy()[0] * 10.0 ** packed.level[0][:, None, None, None]
+    power = relative_power(packed).numpy()[0] * 10.0 ** packed.level[0][:, None, None, None]
     np.testing.assert_allclose(10 * np.log10(power / maps), 0.0, atol=0.101)

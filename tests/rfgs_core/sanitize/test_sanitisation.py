@@ -12,7 +12,6 @@ from rfgs_core.capture import read_capture
 from rfgs_core.capture.wifi_grid import INTEL_5300, occupied
 from rfgs_core.radio.levels import amplitude_of
 from rfgs_core.sanitize.phase import rotations
-from rfgs_core.sanitize.products import mirror_asymmetry
 
 INDEX = np.array(INTEL_5300[20])
 
@@ -175,6 +174,14 @@ def moving(rate_hz: float, doppler_hz: float) -> np.ndarray:
     )
     random = np.exp(1j * generator.uniform(0, 2 * np.pi, (len(time_s), 1)))
     return ((still + echo) * random)[:, :, None]
+
+
+def mirror_asymmetry(spectrum: np.ndarray) -> float:
+    """Mean |log₁₀| of the power at a Doppler shift over that at its mirror, 0 in the middle."""
+    half = spectrum.shape[0] // 2
+    above, below = spectrum[half + 1 :], spectrum[:half][::-1]
+    use = (above > 0) & (below > 0)
+    return float(np.abs(np.log10(above[use] / below[use])).mean()) if use.any() else 0.0
 
 
 @pytest.mark.parametrize("doppler_hz", [25.0, -25.0])

@@ -17,7 +17,7 @@ import numpy as np
 from rfgs_core.errors import RfgsError
 from rfgs_core.fit.frame import FrameState
 from rfgs_core.live.cloud import live_config, warm_up
-from rfgs_core.live.session import LiveOptions, Session
+from rfgs_core.live.session import LiveOptions, Session, Tally
 from rfgs_core.live.stream import Stream, StreamOptions
 from rfgs_core.live.synthetic import TURN_S, place_m, send, stand
 from rfgs_core.settings import TrainConfig
@@ -85,9 +85,20 @@ def bench_live(
             elapsed_s, used_s = time.monotonic() - before[0], time.process_time() - before[1]
         finally:
             session.close()
-    tally, total = session.tally, session.tally.total
     return {
         "packets sent": sent,
+        **_outcome(session.tally),
+        "place error median m": float(np.median(truth.error_m)) if truth.error_m else float("nan"),
+        "place error of the room's middle m": _guess_m(),
+        "gaussians": config.num_gaussians,
+        "cpu s per s": used_s / max(elapsed_s, 1e-9),
+    }
+
+
+def _outcome(tally: Tally) -> dict[str, Any]:
+    """What became of the packets, and how soon, beside what is wanted."""
+    total = tally.total
+    return {
         "packets received": total.received,
         "packets used": total.used,
         "what became of them": str(total),
@@ -99,10 +110,6 @@ def bench_live(
         "updates per s": tally.updates_per_s,
         "updates per s target": UPDATES_PER_S,
         "whole fits": tally.whole_fits,
-        "place error median m": float(np.median(truth.error_m)) if truth.error_m else float("nan"),
-        "place error of the room's middle m": _guess_m(),
-        "gaussians": config.num_gaussians,
-        "cpu s per s": used_s / max(elapsed_s, 1e-9),
     }
 
 

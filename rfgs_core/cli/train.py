@@ -67,7 +67,6 @@ def run(args: TrainArgs) -> int:
     from rfgs_core.errors import RfgsError
     from rfgs_core.frames import chosen_frames
     from rfgs_core.measure.observations import packets_to_read
-    from rfgs_core.measure.resolving import resolving
     from rfgs_core.render.shader import ShaderConfig
     from rfgs_core.render.view import fit_run_shader
     from rfgs_core.run.calibration import calibration_text
@@ -89,8 +88,6 @@ def run(args: TrainArgs) -> int:
         )
     config = replace(config, packets=packets_to_read(args.packets, sequence, args.radio, config))
     frames = chosen_frames(args.frames, sequence.frames)
-    can = resolving(sequence, args.radio, config.num_gaussians, config.observe)
-    sys.stderr.write("".join(f"{line}\n" for line in can.lines()))
     shader = args.shader and _can_color(dataset, sequence, frames)
     with watched(args.out) if args.view else contextlib.nullcontext():
         trained = train_sequence(

@@ -30,6 +30,7 @@ from rfgs_core.limbs.weights import Trained
 from rfgs_core.links import refuse_link
 from rfgs_core.locks import alone_in
 from rfgs_core.measure.offsets import Offsets
+from rfgs_core.measure.resolving import resolving
 from rfgs_core.past import Speed, note_speed
 from rfgs_core.run.calibration import (
     calibration_path,
@@ -182,7 +183,8 @@ def _fit_frames(run: Run, config: TrainConfig, log: bool) -> float:
     begin = time.perf_counter()
     trained = limbs_network(run) if limbs_wanted(run, config) else None
     looks = looks_at(run) if trained or _evidence(run, config) else 0
-    sys.stderr.write(f"{price_line(run, looks)}\n")
+    can = resolving(run.sequence, run.config.radio, config.num_gaussians, config.observe)
+    sys.stderr.write("".join(f"{line}\n" for line in [*can.lines(), price_line(run, looks)]))
     limbs = _limbs(run, config, trained, looks) if looks else None
     spent += time.perf_counter() - begin
     with (

@@ -268,6 +268,7 @@ def test_blender_is_taken_from_the_environment(
 WRITING: dict[str, tuple[str, ...]] = {
     "ablate": ("data", "--radio", "wifi"),
     "addon": ("build",),
+    "bench": ("table1",),
     "compare": ("run", "run"),
     "csi": ("run",),
     "demo": (),

@@ -55,7 +55,9 @@ def test_fields_are_dense_where_something_scatters(
     settings = replace(SMALL, kind=kind, objective=objective)
     fitted = fit_field(observations, settings, TrainConfig(grid_side=12), sampled(observations))
     assert np.mean(fitted.losses[-10:]) < np.mean(fitted.losses[:10])
-    grid = Grid.over(observations.bounds_m, 0.1)
+    (x, y, z), high = observations.bounds_m.tolist()
+    nx, ny, nz = (math.ceil((b - a) / 0.1) for a, b in zip((x, y, z), high, strict=True))
+    grid = Grid((x, y, z), (nx, ny, nz), 0.1)
     score = fitted.score(grid.centres(), grid.voxel_m)
     best = grid.centres(np.argsort(-score)[:50])
     assert np.linalg.norm(np.median(best, axis=0) - PLACE_M) < 0.4

@@ -160,8 +160,9 @@ class Session:
             limit_s: Gives up after so long [s].
         """
         end_s = time.monotonic() + limit_s
-        while time.monotonic() < end_s and self.step(time.monotonic()):
-            pass
+        more = True
+        while more and time.monotonic() < end_s:
+            more = self.step(time.monotonic())
         self._windows.close(float("inf"))
 
     def close(self) -> None:

@@ -107,6 +107,17 @@ def test_validate_names_every_link(data: Path, tmp_path: Path) -> None:
     assert sorted(strange_entries(data)) == sorted(links)
 
 
+def read_every_kind(data: Path) -> None:
+    """Reads one file of each kind of a dataset."""
+    sequence = open_dataset(data).sequence()
+    sequence.csi("wifi", 1)
+    sequence.coordinates("wifi")
+    sequence.image("cam00", 1)
+    sequence.depth("cam00", 1)
+    sequence.moving_mesh(1)
+    sequence.static_mesh()
+
+
 @pytest.mark.parametrize(
     "name",
     [
@@ -124,22 +135,13 @@ def test_nothing_is_read_through_a_link_that_leads_out(
     place.rename(moved)
     place.symlink_to(moved)
 
-    def read() -> None:
-        sequence = open_dataset(data).sequence()
-        sequence.csi("wifi", 1)
-        sequence.coordinates("wifi")
-        sequence.image("cam00", 1)
-        sequence.depth("cam00", 1)
-        sequence.moving_mesh(1)
-        sequence.static_mesh()
-
     with pytest.raises(RfgsFormatError, match="a symbolic link leads out of"):
-        read()
+        read_every_kind(data)
     # The same files within the dataset: that is a matter of the owner.
     place.unlink()
     own = moved.rename(data / "tiny" / "kept")
     place.symlink_to(own)
-    read()
+    read_every_kind(data)
 
 
 @pytest.mark.parametrize("schema", ["rfgs-dataset\\/1", "\\u0072fgs-dataset/1"])
@@ -167,17 +169,8 @@ def test_nobody_waits_for_a_pipe(data: Path, name: str) -> None:
     place.unlink()
     os.mkfifo(place)
 
-    def read() -> None:
-        sequence = open_dataset(data).sequence()
-        sequence.csi("wifi", 1)
-        sequence.coordinates("wifi")
-        sequence.image("cam00", 1)
-        sequence.depth("cam00", 1)
-        sequence.moving_mesh(1)
-        sequence.static_mesh()
-
     with pytest.raises(RfgsFormatError, match="expected a file or a folder, found a pipe"):
-        read()
+        read_every_kind(data)
     assert f"{place}: a pipe; expected files and folders" in validate(data)
 
 

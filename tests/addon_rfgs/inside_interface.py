@@ -65,14 +65,8 @@ OF_THE_WINDOW |= {"gaussians.compare_with", "gaussians.legend"}
 LEAVE_THE_FILE = {
     *("evaluate_run", "export_bundle", "export_gaussians", "forget_job", "generate_dataset"),
     *("check_scene", "guess_materials"),
-    *(
-        "render_groundtruth",
-        "resume_job",
-        "stop_job",
-        "stop_live",
-        "test_environment",
-        "train_gaussians",
-    ),
+    *("render_groundtruth", "resume_job", "stop_job", "stop_live", "test_environment"),
+    "train_gaussians",
 }
 
 

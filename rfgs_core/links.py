@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Collection, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import msgspec
@@ -27,12 +27,34 @@ _MARKS = (
 _LARGEST_MARK = 2**25
 
 
+#: Where programs that this one starts learn which folders are `filled`, as a list in JSON.
+_FILLED = "RFGS_FILLED_FOLDERS"
+
+
 class _Mark(msgspec.Struct):
     schema: str
 
 
+@contextmanager
+def filled(folder: Path) -> Iterator[None]:
+    """While a command fills a folder, no link leads out of that, here or in programs it starts.
+
+    Args:
+        folder: Where the command writes; it need not be there yet.
+    """
+    before = os.environ.get(_FILLED, "[]")
+    folders = [*msgspec.json.decode(before), os.path.abspath(folder)]
+    os.environ[_FILLED] = msgspec.json.encode(folders).decode()
+    try:
+        yield
+    finally:
+        os.environ[_FILLED] = before
+
+
 def refuse_link(path: Path | str) -> None:
-    """Refuses a path that leaves the dataset or run that it lies in through a symbolic link.
+    """Refuses a path that leaves the folder that it lies in through a symbolic link.
+
+    Such folders are datasets, runs, scene bundles, and what a command fills (`filled`).
 
     Datasets and runs may themselves be reached through links, and may hold links to their own
     files. Whether `path` exists does not matter.
@@ -50,7 +72,9 @@ def refuse_link(path: Path | str) -> None:
     folder = os.path.dirname(spelt)
     while folder != os.path.dirname(folder):
         home = os.path.realpath(folder)
-        if os.path.commonpath([home, real]) != home and _is_marked(folder):
+        if os.path.commonpath([home, real]) != home and (
+            folder in msgspec.json.decode(os.environ.get(_FILLED, "[]")) or _is_marked(folder)
+        ):
             raise RfgsFormatError(
                 f"{path}: a symbolic link leads out of {folder}, to {real}; expected files and "
                 "folders of its own, replace the link by what it points to"

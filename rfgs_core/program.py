@@ -6,12 +6,14 @@ from __future__ import annotations
 import importlib
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from rfgs_core.files import refuse_place
+from rfgs_core.links import filled
 from rfgs_core.outcome import run_cli
 
 #: Arguments of commands that name what they write.
@@ -29,7 +31,7 @@ class Program:
 
     A command's module holds its arguments, a frozen dataclass that says in its docstring what
     the command does, and `run`, which takes them and returns the exit code. Paths of arguments
-    called `out` or `json` are known to be writable then.
+    called `out` or `json` are known to be writable then, and no link leads out of a folder there.
     """
 
     name: str
@@ -79,11 +81,14 @@ class Program:
         module, kind = self._command(name)
         run: Callable[[Any], int | None] = module.run
         parsed = tyro.cli(kind, args=list(arguments), prog=f"{self.name} {name}")
-        for output in _OUTPUTS:
-            place = getattr(parsed, output, None)
-            if isinstance(place, Path) and str(place) != "-":
-                refuse_place(place)
-        return run(parsed)
+        with ExitStack() as stack:
+            for output in _OUTPUTS:
+                place = getattr(parsed, output, None)
+                if isinstance(place, Path) and str(place) != "-":
+                    refuse_place(place)
+                    if place.is_dir():
+                        stack.enter_context(filled(place))
+            return run(parsed)
 
     def _command(self, name: str) -> tuple[Any, type]:
         file, kind = self.commands[name]

@@ -169,12 +169,12 @@ def learn(
     torch.manual_seed(config.seed)
     rng = np.random.default_rng(sub_seed(config.seed, radio.name, "draws"))
     network = LimbNetwork(Ranges.of(radio.bandwidth_hz).count)
-    judged = next_chunk(examples(radio, sub_seed(config.seed, "judged")), JUDGED, pairs_of(radio))
     optimiser = torch.optim.AdamW(network.parameters(), config.rate, weight_decay=0.02)
     kept = Kept(config.kept, radio)
     progress = Progress(0, 0.0)
     if checkpoint is not None and checkpoint.exists():
         progress = resume(checkpoint, network, optimiser)
+    judged = next_chunk(examples(radio, sub_seed(config.seed, "judged")), JUDGED, pairs_of(radio))
     # Whoever goes on sees other worlds than before.
     loader = DataLoader(
         Worlds(radio, sub_seed(config.seed, "from", progress.frames)), batch_size=None,

@@ -14,6 +14,7 @@ from rfgs_core.evaluate.metrics import METHOD, evaluate_method, evaluate_run
 from rfgs_core.evaluate.provenance import hardware, now, versions
 from rfgs_core.evaluate.residual import GAUSSIANS_ALONE
 from rfgs_core.files import read_json, write_json
+from rfgs_core.links import refuse_link
 from rfgs_core.measure.observations import observe
 from rfgs_core.neural.settings import FieldSettings
 from rfgs_core.records import record
@@ -126,9 +127,10 @@ def stored(cell: Cell, out: Path, size: Size) -> dict[str, Any] | None:
     """What a cell's file says, if it was made by the same settings.
 
     Raises:
-        RfgsFormatError: The file is damaged.
+        RfgsFormatError: The file is damaged, or would lie elsewhere, where a link leads.
     """
     path = out / "cells" / f"{cell.name}.json"
+    refuse_link(path)
     if not path.exists():
         return None
     found = record(path, read_json(path), dict[str, Any], "delete it to make it again")

@@ -14,10 +14,11 @@ from .check import aging
 from .devices import overlay
 from .gaussians import file_menu, legend, opening
 from .jobs import following
+from .live import following as live_following
 
 _MODULES = (
     *(registration, properties, overlay, command, following, waiting, aging, file_menu),
-    *(legend, opening),
+    *(legend, opening, live_following),
 )
 
 

@@ -11,6 +11,7 @@ from .devices.settings import RFGS_PG_devices
 from .export.settings import RFGS_PG_export
 from .gaussians.settings import RFGS_PG_gaussians
 from .jobs.settings import RFGS_PG_jobs
+from .live.settings import RFGS_PG_live
 from .materials.coloring import restore
 from .materials.properties import RFGS_PG_guesses, RFGS_PG_material, RFGS_PG_materials
 from .paths.settings import RFGS_PG_paths
@@ -73,6 +74,7 @@ class RFGS_PG_scene(bpy.types.PropertyGroup):
     gaussians: bpy.props.PointerProperty(type=RFGS_PG_gaussians)
     channels: bpy.props.PointerProperty(type=RFGS_PG_channels)
     jobs: bpy.props.PointerProperty(type=RFGS_PG_jobs)
+    live: bpy.props.PointerProperty(type=RFGS_PG_live)
     paths: bpy.props.PointerProperty(type=RFGS_PG_paths)
     materials: bpy.props.PointerProperty(type=RFGS_PG_materials)
 

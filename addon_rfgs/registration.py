@@ -11,12 +11,13 @@ from .removal.stored import prune_properties
 #: Modules that hold classes for Blender; panels appear in this order.
 _MODULES = (
     *("channels.settings", "check.settings", "devices.properties", "devices.settings"),
-    *("export.settings", "gaussians.settings", "jobs.settings", "materials.properties"),
-    *("paths.settings", "properties"),
+    *("export.settings", "gaussians.settings", "jobs.settings", "live.settings"),
+    *("materials.properties", "paths.settings", "properties"),
     *("devices.operators", "devices.chosen_operators", "devices.recorded", "devices.panel"),
     *("check.operators", "check.panel", "materials.operators", "materials.panel"),
     *("jobs.preferences", "jobs.operators", "jobs.panel", "export.operators", "export.panel"),
     *("gaussians.operators", "gaussians.file_menu", "gaussians.view_operators", "gaussians.panel"),
+    *("live.operators", "live.panel"),
     *("channels.operators", "channels.panel", "paths.operators", "paths.panel"),
     *("removal.operators", "removal.panel"),
 )

@@ -14,9 +14,9 @@ Objective = Literal["paper", "csi", "both"]
 Recipe = Literal["rfgs", "paper"]
 EncoderKind = Literal["matched_filter", "cnn", "paths"]
 #: complex: the channel itself; power: |csi|² per link and subcarrier; delay_power: the power of
-# each
-#: link's delay profile.
-Observe = Literal["complex", "power", "delay_power"]
+#: each link's delay profile; csi_ratio, conjugate: what the links of one packet between two devices
+#: say relative to each other, which knows no phase or timing that they share.
+Observe = Literal["complex", "power", "delay_power", "csi_ratio", "conjugate"]
 #: all: every packet of a frame helps to tell its change from noise; first: the one at its own time.
 Packets = Literal["all", "first"]
 #: told: the likelier of standing and sitting, per frame; standing: everybody stands.
@@ -46,7 +46,10 @@ class TrainOptions:
     stays clean, since its capture can be averaged."""
     observe: Observe = "complex"
     """What the radio reports, and all that any stage sees: complex, the channel itself; power,
-    |CSI|^2 per link and subcarrier; delay_power, the power of each link's delay profile."""
+    |CSI|^2 per link and subcarrier; delay_power, the power of each link's delay profile; csi_ratio,
+    ratios of the links of one packet between two devices; conjugate, products of one with the
+    conjugate of another, at an unknown level. The last two share no phase between packets or
+    devices, as commodity cards."""
     background: Background = "empty_room"
     """What the moving part is told from: empty_room, its capture; learned, the median over all
     frames of the sequence, where nobody recorded the empty room."""

@@ -5,7 +5,7 @@ What moves passes through an entry of the channel in some frames only, so that t
 the frames, of real and imaginary part or of the amplitude that is reported, is that of the room
 once it has moved on. A body that stands still for half of the sequence stays in the background,
 and phases that turn from frame to frame (carrier offsets) leave nothing of a complex median:
-use `--observe power` there.
+use `--observe power`, `csi_ratio` or `conjugate` there.
 
 `without_movers` goes on from there, in turn: Gaussians of what moves are fitted to each frame
 against the background so far, and the median is taken of what they leave.
@@ -24,7 +24,7 @@ from rfgs_core.dataset.aperture import whole_layout
 from rfgs_core.dataset.observed import Observed
 from rfgs_core.errors import RfgsError
 from rfgs_core.fit.frame import explained_change, solved_frame
-from rfgs_core.measure.kinds import KINDS, Reported
+from rfgs_core.measure.kinds import KINDS, Reported, Visible
 from rfgs_core.measure.observations import observe, visible_channel
 from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import Observe, Packets, TrainConfig
@@ -82,19 +82,23 @@ def learned_background(
     measured = sequence.coordinates(radio)["measured"].values
     if spec.antennas_move:
         measured = whole_layout(sequence, radio).measured
+    freq_hz = np.array(sequence.coordinates(radio)["freq_hz"].values, dtype=np.float64)
     ever, rows, shape = np.zeros_like(measured), [], ()
     for frame in sequence.frames:
-        _, links, subcarriers, csi = visible_channel(sequence, radio, frame, channel, packets)
+        elements, links, subcarriers, csi = visible_channel(
+            sequence, radio, frame, channel, packets
+        )
         mean = csi[0] if len(csi) == 1 else _mean(np.where(subcarriers, csi, 0))
-        values = KINDS[kind].report(np.where(subcarriers, mean, 0), subcarriers)
+        seen = Visible(links, subcarriers, elements, freq_hz)
+        values = KINDS[kind].report(np.where(subcarriers, mean, 0), seen)
         rows.append(np.where(links[..., None], values, np.nan)[measured])
         ever |= links
         shape = values.shape
     stack = np.stack(rows)[:, ever[measured]]
     median = np.nanmedian(stack.real, axis=0)
-    if kind == "complex":
+    if np.iscomplexobj(stack):
         median = median + 1j * np.nanmedian(stack.imag, axis=0)
-    background = np.zeros(shape, dtype=np.complex64 if kind == "complex" else np.float32)
+    background = np.zeros(shape, np.complex64 if np.iscomplexobj(stack) else np.float32)
     background[ever] = median
     return background
 

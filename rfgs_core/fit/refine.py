@@ -109,7 +109,14 @@ def _batch(task: Task, config: TrainConfig, seed: int, step: int) -> tuple[np.nd
     rng = np.random.default_rng(sub_seed(seed, "batch", step))
     count = len(task.channel.links)
     wanted = max(1, config.batch_entries // task.channel.subcarriers.num_selected)
-    links = np.sort(rng.choice(count, min(wanted, count), replace=False))
+    together = task.comparison.together
+    if together is None or not count:
+        links = np.sort(rng.choice(count, min(wanted, count), replace=False))
+    else:
+        # Groups in random order until there are enough links, and one group at least.
+        order = rng.permutation(int(together.max()) + 1)
+        filled = np.cumsum(np.bincount(together)[order]) - 1
+        links = np.flatnonzero(np.isin(together, order[: 1 + np.searchsorted(filled, wanted)]))
     size = 0 if task.points is None else len(task.points.xyz)
     points = rng.choice(size, min(config.batch_points, size), replace=False) if size else []
     return links, torch.as_tensor(np.asarray(points, dtype=np.int64))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What radios report of a channel: itself, power per subcarrier, or power per delay."""
+"""What radios report of a channel: itself, powers, or what links of a packet say of each other."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from rfgs_core.measure.phase_free import (
     direct_wave,
     hologram,
 )
+from rfgs_core.measure.relative import Relative, on_direct_paths, relative_change
 from rfgs_core.radio import Layout
 from rfgs_core.settings import Observe
 
@@ -52,14 +53,10 @@ class Change(NamedTuple):
 class Kind(Protocol):
     """One kind of report."""
 
-    def report(
-        self,
-        csi: Complex64[np.ndarray, "*link subcarrier"],
-        subcarriers: Bool[np.ndarray, "subcarrier"],
-    ) -> Reported:
+    def report(self, csi: Complex64[np.ndarray, "tx rx subcarrier"], seen: Visible) -> Reported:
         """What the radio reports of a channel.
 
-        Hidden subcarriers do not enter the delay profile; NaN of a lost packet stays NaN.
+        What is hidden enters no delay profile and no phase; NaN of a lost packet stays NaN.
         """
         ...
 
@@ -77,7 +74,7 @@ class Kind(Protocol):
 
 
 class _Complex:
-    def report(self, csi: np.ndarray, subcarriers: np.ndarray) -> Reported:
+    def report(self, csi: np.ndarray, seen: Visible) -> Reported:
         return csi
 
     def change(self, csi: np.ndarray, empty: Reported, seen: Visible) -> Change:
@@ -88,23 +85,23 @@ class _Complex:
 
 
 class _Power:
-    def report(self, csi: np.ndarray, subcarriers: np.ndarray) -> Reported:
+    def report(self, csi: np.ndarray, seen: Visible) -> Reported:
         return np.abs(csi)
 
     def change(self, csi: np.ndarray, empty: Reported, seen: Visible) -> Change:
         wave = direct_wave(seen.layout, seen.freq_hz)
         # Hidden links must not set the scale of the others.
-        now = np.where(seen.entries, self.report(csi[0], seen.subcarriers), 0)
+        now = np.where(seen.entries, self.report(csi[0], seen), 0)
         empty = np.where(seen.entries, empty, 0)
         return Change(hologram(now, empty, seen.subcarriers, wave), empty * wave)
 
 
 class _DelayPower:
-    def report(self, csi: np.ndarray, subcarriers: np.ndarray) -> Reported:
-        return delay_amplitude(csi, subcarriers)
+    def report(self, csi: np.ndarray, seen: Visible) -> Reported:
+        return delay_amplitude(csi, seen.subcarriers)
 
     def change(self, csi: np.ndarray, empty: Reported, seen: Visible) -> Change:
-        change = np.abs(self.report(csi[0], seen.subcarriers) - empty)
+        change = np.abs(self.report(csi[0], seen) - empty)
         change = np.where(seen.links[..., None], change, 0).astype(np.float32)
         spacing_hz = float(seen.freq_hz[1] - seen.freq_hz[0])
         direct = direct_amplitude(empty, seen.layout, spacing_hz)
@@ -112,9 +109,25 @@ class _DelayPower:
         return Change(np.zeros_like(static), static, delay_change=change)
 
 
+class _Relative:
+    """CSI ratios or conjugate products; the empty room is a packet on its direct paths."""
+
+    def __init__(self, kind: Relative) -> None:
+        self._kind: Relative = kind
+
+    def report(self, csi: np.ndarray, seen: Visible) -> Reported:
+        return on_direct_paths(csi, seen.links, seen.subcarriers, seen.layout, seen.freq_hz)
+
+    def change(self, csi: np.ndarray, empty: Reported, seen: Visible) -> Change:
+        args = seen.links, seen.subcarriers, seen.layout
+        return Change(relative_change(self._kind, csi[0], empty, *args), empty)
+
+
 #: Every kind by its name in the settings.
 KINDS: dict[Observe, Kind] = {
     "complex": _Complex(),
     "power": _Power(),
     "delay_power": _DelayPower(),
+    "csi_ratio": _Relative("csi_ratio"),
+    "conjugate": _Relative("conjugate"),
 }

@@ -31,7 +31,7 @@ class Observations:
 
     delta: Complex64[np.ndarray, "tx rx subcarrier"]
     """csi − csi_static where visible, zero elsewhere; of powers per subcarrier the hologram of
-    `phase_free`, of powers per delay nothing."""
+    `phase_free`, of powers per delay nothing, else δ of `relative`."""
     static: Complex64[np.ndarray, "tx rx subcarrier"]
     """csi_static where visible, zero elsewhere; without phases its amplitude (of powers per
     delay: that of the direct path) on the phase of the direct path."""
@@ -201,19 +201,19 @@ def observe(
     )
     if kept is not None:
         links, subcarriers = links & kept[0], subcarriers & kept[1]
+    freq_hz = np.array(sequence.coordinates(radio)["freq_hz"].values, dtype=np.float64)
+    seen = Visible(links, subcarriers, elements, freq_hz)
     if empty is None:
         static = whole_static(sequence, radio)
         _need_finite(
             static, links, subcarriers, f"csi_static of frame {frame} ({sequence.name}, {radio})"
         )
-        empty = KINDS[kind].report(static, subcarriers)
-    elif empty.shape != (own := KINDS[kind].report(csi[0], subcarriers).shape):
+        empty = KINDS[kind].report(static, seen)
+    elif empty.shape != (own := KINDS[kind].report(csi[0], seen).shape):
         raise RfgsError(
             f"the background of {sequence.name}, {radio}: expected shape {own}, as each packet "
             f"has, got {empty.shape}; train again into a new folder"
         )
-    freq_hz = np.array(sequence.coordinates(radio)["freq_hz"].values, dtype=np.float64)
-    seen = Visible(links, subcarriers, elements, freq_hz)
     change, interval_s = KINDS[kind].change(csi, empty, seen), 0.0
     if change.packets is not None:
         interval_s = float(np.diff(sequence.sample_times_s(radio, frame)[:2])[0])

@@ -21,8 +21,15 @@ from rfgs_core.radio import Layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.settings import Observe
 
-#: Numbers per entry of the channel: real and imaginary part, or a power.
-_PARTS: dict[Observe, int] = {"complex": 2, "power": 1, "delay_power": 1}
+#: Numbers per entry of the channel: real and imaginary part, or a power; and how many of them a
+#: device pair loses with the phase, or phase and level, that its links share.
+_PARTS: dict[Observe, tuple[int, int]] = {
+    "complex": (2, 0),
+    "power": (1, 0),
+    "delay_power": (1, 0),
+    "csi_ratio": (2, 2),
+    "conjugate": (2, 1),
+}
 #: A Gaussian's unknowns beside its reflectivity: its place.
 _PLACE = 3
 
@@ -55,6 +62,8 @@ class Resolving:
     """Each device."""
     links: int
     """Links that training sees."""
+    pairs: int
+    """Device pairs that they connect."""
     subcarriers: int
     """Subcarriers that training sees."""
     observe: Observe
@@ -65,7 +74,8 @@ class Resolving:
     @property
     def numbers(self) -> int:
         """Real numbers that are reported of a frame."""
-        return self.links * self.subcarriers * _PARTS[self.observe]
+        each, lost = _PARTS[self.observe]
+        return (each * self.links - lost * self.pairs) * self.subcarriers
 
     @property
     def unknowns(self) -> int:
@@ -121,6 +131,7 @@ def resolving(
         repeats_m=SPEED_OF_LIGHT / spacing_hz,
         across=[_across(names[d], elements, d, middle, wavelength_m) for d in used],
         links=int(split.links.sum()),
+        pairs=len(elements.pairs_of(split.links)[1]),
         subcarriers=int(split.subcarriers.sum()),
         observe=observe,
         gaussians=gaussians,

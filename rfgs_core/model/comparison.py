@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The terms in which a predicted channel change is held against the reported one.
 
-A radio reports the channel, powers per subcarrier or powers per delay; the model predicts a complex
-change Δ. Each comparison turns Δ into what that radio would have reported.
+A radio reports the channel, powers per subcarrier or per delay, ratios or products; the model
+predicts a complex change Δ. Each comparison turns Δ into what that radio would have reported.
 """
 
 from __future__ import annotations
@@ -17,11 +17,17 @@ from torch import Tensor
 
 from rfgs_core.measure.observations import Observations
 from rfgs_core.measure.phase_free import direct_wave, reference_level
+from rfgs_core.measure.relative import RULES, Relative
 from rfgs_core.radio.delay import band_window
 
 
 class Comparison(Protocol):
     """Measured entries of the visible links, in row-major order, and predicted ones."""
+
+    @property
+    def together(self) -> Int64[np.ndarray, "link"] | None:
+        """Group of each link, of which a prediction needs all; None: each link by itself."""
+        ...
 
     def measured(self) -> Tensor:
         """What the radio reports of the change, (link, entry)."""
@@ -44,8 +50,17 @@ class Comparison(Protocol):
         ...
 
 
+class EachLink:
+    """Links that can be compared one by one."""
+
+    @property
+    def together(self) -> None:
+        """No groups."""
+        return None
+
+
 @dataclass(frozen=True)
-class ComplexComparison:
+class ComplexComparison(EachLink):
     """The channel itself."""
 
     target: Complex[Tensor, "link subcarrier"]
@@ -75,7 +90,7 @@ class ComplexComparison:
 
 
 @dataclass(frozen=True)
-class PowerComparison:
+class PowerComparison(EachLink):
     """Change of power per subcarrier, in units of the reference's level."""
 
     target: Float[Tensor, "link subcarrier"]
@@ -126,7 +141,7 @@ class PowerComparison:
 
 
 @dataclass(frozen=True)
-class DelayComparison:
+class DelayComparison(EachLink):
     """Amplitude of each link's delay profile."""
 
     target: Float32[Tensor, "link delay"]
@@ -173,11 +188,64 @@ class DelayComparison:
         return replace(observations, delay_change=delay_change)
 
 
+@dataclass(frozen=True)
+class RelativeComparison:
+    """CSI ratios or conjugate products, as δ of `measure.relative`."""
+
+    target: Complex[Tensor, "link subcarrier"]
+    """δ."""
+    empty: Complex[Tensor, "link subcarrier"]
+    """The empty room on its direct paths."""
+    pair: Int64[Tensor, "link"]
+    """Device pair of each link."""
+    kind: Relative
+    """Which of both."""
+
+    @staticmethod
+    def of(observations: Observations, kind: Relative) -> RelativeComparison:
+        """From δ and the empty room of the observations."""
+        links, subcarriers = observations.links, observations.subcarriers
+        rows = (x[links][:, subcarriers].copy() for x in (observations.delta, observations.static))
+        pair = torch.from_numpy(observations.pairs[0][links])
+        return RelativeComparison(*(torch.from_numpy(x) for x in rows), pair=pair, kind=kind)
+
+    @property
+    def together(self) -> Int64[np.ndarray, "link"]:
+        """Links of one device pair: each is held against all of them."""
+        return self.pair.cpu().numpy()
+
+    def measured(self) -> Complex[Tensor, "link subcarrier"]:
+        """δ of the frame."""
+        return self.target
+
+    def predicted(
+        self, change: Complex[Tensor, "batch subcarrier"], links: Int64[np.ndarray, "batch"]
+    ) -> Complex[Tensor, "batch subcarrier"]:
+        """δ of e + Δ; `links` hold whole device pairs."""
+        empty = self.empty[links]
+        return RULES[self.kind][0](empty + change, empty, self.pair[links])
+
+    def linear(
+        self, change: Complex[Tensor, "link subcarrier"]
+    ) -> Complex[Tensor, "link subcarrier"]:
+        """The linear part of δ."""
+        return RULES[self.kind][1](change, self.empty, self.pair)
+
+    def residual(
+        self, observations: Observations, change: Complex[Tensor, "link subcarrier"]
+    ) -> Observations:
+        """The δ that the change does not explain."""
+        left = self.target - self.predicted(change, np.arange(len(self.target)))
+        return observations.with_entries(left.cpu().numpy())
+
+
 def comparison_of(observations: Observations) -> Comparison:
     """The comparison that suits what the radio reports."""
     if observations.kind == "power":
         return PowerComparison.of(observations)
     if observations.kind == "delay_power":
         return DelayComparison.of(observations)
+    if observations.kind in ("csi_ratio", "conjugate"):
+        return RelativeComparison.of(observations, observations.kind)
     links, subcarriers = observations.links, observations.subcarriers
     return ComplexComparison(torch.from_numpy(observations.delta[links][:, subcarriers].copy()))

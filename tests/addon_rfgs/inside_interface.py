@@ -30,6 +30,7 @@ COMMANDS = {
     "evaluate_run": "evaluate",
     "export_bundle": "export",
     "export_gaussians": "export-gaussians",
+    "follow_live": "live",
     "forget_job": "forget",
     "generate_dataset": "generate",
     "guess_materials": "materials guess",
@@ -49,6 +50,7 @@ COMMANDS = {
     "show_csi": "csi",
     "show_paths": "paths",
     "stop_job": "stop",
+    "stop_live": "live",
     "test_environment": "environment",
     "train_gaussians": "train",
     "update_display": "import",
@@ -63,7 +65,8 @@ OF_THE_WINDOW |= {"gaussians.compare_with", "gaussians.legend"}
 LEAVE_THE_FILE = {
     *("evaluate_run", "export_bundle", "export_gaussians", "forget_job", "generate_dataset"),
     *("check_scene", "guess_materials"),
-    *("render_groundtruth", "resume_job", "stop_job", "test_environment", "train_gaussians"),
+    *("render_groundtruth", "resume_job", "stop_job", "stop_live", "test_environment"),
+    "train_gaussians",
 }
 
 
@@ -232,7 +235,7 @@ WITHOUT_UNIT = {
     *("jobs.iterations", "jobs.gaussians", "export.cameras", "export.samples"),
     *("gaussians.size", "gaussians.range_low", "gaussians.range_high", "gaussians.frame_offset"),
     *("paths.count", "paths.tx_device", "paths.rx_device", "channels.tx_device"),
-    *("channels.rx_device", "devices.active", "material.scattering_coefficient"),
+    *("channels.rx_device", "live.port", "devices.active", "material.scattering_coefficient"),
     *("radio.num_subcarriers", "radio.tx_rows", "radio.tx_cols", "radio.rx_rows", "radio.rx_cols"),
 }
 _UNITS = re.compile(r"\[(GHz|dB|dBm|m|m²|λ|s|px|°)\]")

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-#: `test_inside_channels.py` gives that one a run to draw.
+#: `test_inside_channels.py` gives one a run to draw, `test_inside_live.py` one a dataset to replay.
 NAMES = sorted(
     path.stem.removeprefix("inside_")
     for path in Path(__file__).parent.glob("inside_*.py")
-    if path.stem != "inside_channels"
+    if path.stem not in ("inside_channels", "inside_live")
 )
 
 

@@ -12,7 +12,10 @@ from __future__ import annotations
 import importlib
 import json
 import os
+import socket
+import struct
 import sys
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -132,6 +135,24 @@ def plain(value: Any) -> Any:
     return value if isinstance(value, (int, float, str, bool)) else str(value)
 
 
+def follow_live(scene: bpy.types.Scene) -> None:
+    """Shows one Gaussian that a socket of this machine sends."""
+    columns = "x y z scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3 opacity rf_power_db".split()
+    head = {"rfgs": 1, "time_s": 0, "count": 1, "columns": columns, "bytes": 48}
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def send() -> None:
+            reader, _ = server.accept()
+            with reader:
+                reader.sendall(json.dumps(head).encode() + b"\n" + struct.pack("<12f", *[0.5] * 12))
+
+        thread = threading.Thread(target=send)
+        thread.start()
+        scene.rfgs.live.port = server.getsockname()[1]
+        bpy.ops.rfgs.follow_live(updates=1)
+        thread.join()
+
+
 def use(folder: Path) -> None:
     """Everything that leaves something in the file."""
     scene, ops = bpy.context.scene, bpy.ops.rfgs
@@ -151,6 +172,7 @@ def use(folder: Path) -> None:
     ops.update_display()
     scene.rfgs.paths.dataset = str(folder / "dataset")
     ops.show_paths()
+    follow_live(scene)
     scene.frame_set(5)
     scene.frame_set(1)
 

@@ -15,7 +15,7 @@ from rfgs_core.dataset import Sequence, open_dataset
 from rfgs_core.errors import RfgsError
 from rfgs_core.evaluate.scene import Scene
 from rfgs_core.files import read_json
-from rfgs_core.measure.kinds import KINDS
+from rfgs_core.measure.kinds import KINDS, Visible
 from rfgs_core.measure.observations import observe
 from rfgs_core.run import open_run
 from tests import tiny_dataset as tiny
@@ -46,7 +46,7 @@ def no_capture(monkeypatch) -> None:
     monkeypatch.setattr(Sequence, "csi_static", missing)
 
 
-@pytest.mark.parametrize("kind", ["complex", "power", "delay_power"])
+@pytest.mark.parametrize("kind", ["complex", "power", "delay_power", "csi_ratio", "conjugate"])
 def test_the_median_is_closer_to_the_room_than_any_frame(walk: Path, kind) -> None:
     sequence = open_dataset(walk).sequence()
     background = learned_background(sequence, "wifi", "clean", kind)
@@ -54,9 +54,8 @@ def test_the_median_is_closer_to_the_room_than_any_frame(walk: Path, kind) -> No
     keep = seen.links[..., None] & (seen.subcarriers if kind != "delay_power" else True)
 
     def visible(csi: np.ndarray) -> np.ndarray:
-        return np.where(
-            keep, KINDS[kind].report(np.where(seen.subcarriers, csi, 0), seen.subcarriers), 0
-        )
+        may = Visible(seen.links, seen.subcarriers, seen.layout, seen.freq_hz)
+        return np.where(keep, KINDS[kind].report(np.where(seen.subcarriers, csi, 0), may), 0)
 
     room = visible(sequence.csi_static("wifi"))
     error = np.sum(np.abs(background - room) ** 2)

@@ -55,13 +55,22 @@ class RFGS_OT_import_devices(Undoable, bpy.types.Operator):
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
         """Adds an Empty for each device."""
         folder, info = read_sequence(chosen_path(self.directory), FORM)
-        rows = recorded_devices(folder, info, self.radio)
-        names = [
-            empties.add_device(context.scene, name, role, radio, pose, fields).name
-            for name, role, radio, pose, fields in rows
-        ]
-        radios = ", ".join(dict.fromkeys(row[2] for row in rows))
-        return f"Added {len(names)} devices of {radios}"
+        count, radios = add_recorded(context.scene, folder, info, self.radio)
+        return f"Added {count} devices of {', '.join(radios)}"
+
+
+def add_recorded(
+    scene: bpy.types.Scene, folder: Path, info: dict[str, Any], radio: str
+) -> tuple[int, list[str]]:
+    """Adds an Empty for each device of a sequence; see `recorded_devices`.
+
+    Returns:
+        How many there are, and of which radios.
+    """
+    rows = recorded_devices(folder, info, radio)
+    for name, role, label, pose, fields in rows:
+        empties.add_device(scene, name, role, label, pose, fields)
+    return len(rows), list(dict.fromkeys(row[2] for row in rows))
 
 
 def recorded_devices(

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.lib import format as npy
 
 from .errors import AddonError
+from .files import refuse_pipe
 
 #: What zipfile, zlib and NumPy say of damaged files.
 _DAMAGE = (
@@ -64,6 +65,7 @@ def array_file(path: Path) -> Iterator[ArrayFile]:
     Raises:
         AddonError: It is damaged; also for what goes wrong while the block reads.
     """
+    refuse_pipe(path)
     try:
         with zipfile.ZipFile(path) as archive:
             yield ArrayFile(path, archive)

@@ -23,7 +23,7 @@ from .materials.commands import LIST as LIST_MATERIALS
 from .registration import CLASSES
 
 _GROUPS = {
-    "devices": "list, import, add, place, copy, mirror and remove radio devices",
+    "devices": "list, import, capture, add, place, copy, mirror and remove radio devices",
     "materials": "list, guess, set and show radio materials",
 }
 

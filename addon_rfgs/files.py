@@ -55,6 +55,16 @@ def replacing_folder(path: Path, marker: str) -> Iterator[Path]:
         shutil.rmtree(old, ignore_errors=True)
 
 
+def refuse_pipe(path: Path) -> None:
+    """Refuses what is there and is no file: a pipe keeps its reader waiting for ever.
+
+    Raises:
+        AddonError: It is a pipe, a socket, a device or a folder.
+    """
+    if path.exists() and not path.is_file():
+        raise AddonError(f"{path}: expected a file, found something else")
+
+
 def write_json(path: Path, value: Any) -> None:
     """Writes `value` as indented JSON with sorted keys."""
     text = json.dumps(value, indent=1, sort_keys=True, allow_nan=False) + "\n"

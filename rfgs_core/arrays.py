@@ -11,7 +11,7 @@ import zipfile
 import zlib
 from collections.abc import Collection, Mapping
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, cast
 
 import numpy as np
 
@@ -95,6 +95,57 @@ def load_arrays(
     return arrays
 
 
+def load_array(path: Path, remedy: str, axes: int, most_bytes: int = _MOST_BYTES) -> np.ndarray:
+    """Reads the one array of a .npy file; nothing is unpickled.
+
+    Args:
+        path: The file.
+        remedy: What to do about a missing or damaged file, for the message.
+        axes: How many axes it has.
+        most_bytes: Larger arrays are refused before they are read [bytes].
+
+    Raises:
+        RfgsError: There is no such file.
+        RfgsFormatError: It is damaged, holds objects that would have to be unpickled, or something
+            else than numbers along so many axes.
+    """
+    refuse_link(path)
+    try:
+        with path.open("rb") as stream:
+            size = stream.seek(0, 2)
+            stream.seek(0)
+            shape, dtype = _header(stream)
+            length = math.prod(shape) * dtype.itemsize
+            if dtype.kind not in "biufc" or len(shape) != axes:
+                what = "objects, which are pickled" if dtype.hasobject else f"{dtype} {shape}"
+                raise ValueError(f"expected numbers along {axes} axes, found {what}")
+            if length > most_bytes or stream.tell() + length > size:
+                raise ValueError(f"{length} bytes of {dtype} {shape} do not fit it")
+            stream.seek(0)
+            return np.lib.format.read_array(stream, allow_pickle=False)
+    except FileNotFoundError as error:
+        raise RfgsError(f"{path}: no such file; {remedy}") from error
+    except _DAMAGE as error:
+        raise RfgsFormatError(f"{path}: damaged or of another kind ({error}); {remedy}") from error
+
+
+def _header(stream: BinaryIO) -> tuple[tuple[int, ...], np.dtype]:
+    """Shape and type that the header of an array says.
+
+    Raises:
+        ValueError: It says what no array can have.
+    """
+    version = np.lib.format.read_magic(stream)
+    header = {
+        (1, 0): np.lib.format.read_array_header_1_0,
+        (2, 0): np.lib.format.read_array_header_2_0,
+    }
+    shape, _, dtype = header[version](stream)
+    if any(length < 0 for length in shape):
+        raise ValueError(f"expected lengths of axes, found {shape}")
+    return shape, dtype
+
+
 def _read(stream: BinaryIO, wanted: Collection[str] | None) -> dict[str, np.ndarray]:
     """Arrays of an archive by name; those of `wanted`, or all.
 
@@ -120,13 +171,8 @@ def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> np.ndarray:
     if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
         raise ValueError(f"{info.filename}: packed in another way than NumPy does")
     with archive.open(info) as member:
-        version = np.lib.format.read_magic(member)
-        header = {
-            (1, 0): np.lib.format.read_array_header_1_0,
-            (2, 0): np.lib.format.read_array_header_2_0,
-        }
-        shape, _, dtype = header[version](member)
-        if any(length < 0 for length in shape) or dtype.hasobject:
+        shape, dtype = _header(cast(BinaryIO, member))
+        if dtype.hasobject:
             raise ValueError(f"{info.filename}: expected numbers or text, found {dtype} {shape}")
         if member.tell() + math.prod(shape) * dtype.itemsize != info.file_size:
             raise ValueError(f"{info.filename}: {dtype} {shape} does not fit its size")

@@ -72,7 +72,9 @@ class RFGS_PT_devices(Tab, bpy.types.Panel):
             row.operator("rfgs.add_device", text=text, icon=_ICONS[role]).role = role
         row = layout.row(align=True)
         row.operator_menu_enum("rfgs.place_radio", "radio", text="Place Preset", icon="ADD")
+        row = layout.row(align=True)
         row.operator("rfgs.import_devices", text="Of a Dataset", icon="IMPORT")
+        row.operator("rfgs.import_capture", text="Of a Capture", icon="FILE_NEW")
         row = layout.row()
         row.template_list(*("RFGS_UL_devices", "", bpy.data, "objects", settings, "active"), rows=4)
         side = row.column(align=True)

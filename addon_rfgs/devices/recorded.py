@@ -12,6 +12,7 @@ import numpy as np
 
 from ..command import Command
 from ..errors import AddonError
+from ..json_file import Fields
 from ..path_options import path_setting
 from ..paths.dataset import read_sequence
 from ..reporting import Progress, Undoable, chosen_path
@@ -20,7 +21,12 @@ from . import empties
 
 #: Devices beyond which a dataset is taken for damaged.
 _MOST_DEVICES = 2000
+#: Devices farther out than this are taken for damaged [m].
+_FARTHEST_M = 1e6
 _ROLES = ("ACCESS_POINT", "TRANSMITTER", "RECEIVER")
+#: What devices need of `sequence.json`.
+_POSED = Fields({"name": str, "position_m": [float], "quat_wxyz": [float]}, {"role": str})
+FORM = Fields({"radios": {str: {str: object}}, "devices": {str: [_POSED]}})
 
 
 class RFGS_OT_import_devices(Undoable, bpy.types.Operator):
@@ -48,14 +54,23 @@ class RFGS_OT_import_devices(Undoable, bpy.types.Operator):
 
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
         """Adds an Empty for each device."""
-        folder, info = read_sequence(chosen_path(self.directory))
-        rows = recorded_devices(folder, info, self.radio)
-        names = [
-            empties.add_device(context.scene, name, role, radio, pose, fields).name
-            for name, role, radio, pose, fields in rows
-        ]
-        radios = ", ".join(dict.fromkeys(row[2] for row in rows))
-        return f"Added {len(names)} devices of {radios}"
+        folder, info = read_sequence(chosen_path(self.directory), FORM)
+        count, radios = add_recorded(context.scene, folder, info, self.radio)
+        return f"Added {count} devices of {', '.join(radios)}"
+
+
+def add_recorded(
+    scene: bpy.types.Scene, folder: Path, info: dict[str, Any], radio: str
+) -> tuple[int, list[str]]:
+    """Adds an Empty for each device of a sequence; see `recorded_devices`.
+
+    Returns:
+        How many there are, and of which radios.
+    """
+    rows = recorded_devices(folder, info, radio)
+    for name, role, label, pose, fields in rows:
+        empties.add_device(scene, name, role, label, pose, fields)
+    return len(rows), list(dict.fromkeys(row[2] for row in rows))
 
 
 def recorded_devices(
@@ -69,13 +84,9 @@ def recorded_devices(
         radio: Which radio; empty takes all.
 
     Raises:
-        AddonError: There is no such radio, or a device is damaged.
+        AddonError: There is no such radio, or a device's pose or role makes no sense.
     """
-    try:
-        radios = {str(name): dict(fields) for name, fields in info["radios"].items()}
-        devices = {str(name): list(rows) for name, rows in info["devices"].items()}
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise AddonError(f"{folder}: sequence.json is damaged; make the dataset anew") from error
+    radios, devices = info["radios"], info["devices"]
     if radio and radio not in devices:
         raise AddonError(f"{folder}: no radio {radio!r}; it has {', '.join(devices)}")
     chosen = {name: rows for name, rows in devices.items() if radio in ("", name)}
@@ -93,11 +104,11 @@ def recorded_devices(
     ]
 
 
-def _device(folder: Path, row: Any) -> tuple[str, str]:
+def _device(folder: Path, row: dict[str, Any]) -> tuple[str, str]:
     """Name and role."""
-    role = row.get("role", _ROLES[0]) if isinstance(row, dict) else None
-    if role not in _ROLES or not isinstance(row.get("name"), str):
-        raise AddonError(f"{folder}: a device is damaged; make the dataset anew")
+    role = row.get("role", _ROLES[0])
+    if role not in _ROLES:
+        raise AddonError(f"{folder}: role: expected {' or '.join(_ROLES)}, found {role[:60]!r}")
     return row["name"][:60], role
 
 
@@ -114,14 +125,11 @@ def _placed(
     folder: Path, row: dict[str, Any], radios: dict[str, dict[str, Any]], name: str
 ) -> tuple[np.ndarray, dict[str, Any]]:
     """Pose [4, 4] in metres, and the fields that Empties can hold."""
-    try:
-        place = np.array([float(value) for value in row["position_m"]])
-        turn = np.array([float(value) for value in row["quat_wxyz"]])
-    except (KeyError, TypeError, ValueError) as error:
-        raise AddonError(f"{folder}: device {row['name']!r}: damaged pose") from error
-    sound = place.shape == (3,) and turn.shape == (4,) and np.isfinite([*place, *turn]).all()
-    if not sound or not turn.any():
-        raise AddonError(f"{folder}: device {row['name']!r}: damaged pose")
+    place, turn = np.array(row["position_m"], float), np.array(row["quat_wxyz"], float)
+    if place.shape != (3,) or turn.shape != (4,) or max(np.abs([*place, *turn])) > _FARTHEST_M:
+        raise AddonError(f"{folder}: device {row['name'][:60]!r}: damaged pose")
+    if not turn.any():
+        raise AddonError(f"{folder}: device {row['name'][:60]!r}: a turn of zeros")
     pose = np.eye(4)
     pose[:3, :3] = np.array(mathutils.Quaternion(turn).normalized().to_matrix())
     pose[:3, 3] = place
@@ -139,8 +147,16 @@ def _fits(key: str, value: Any) -> bool:
     if key in RADIO_CHOICES:
         return value in RADIO_CHOICES[key]
     if isinstance(default, (list, tuple)):
-        return isinstance(value, list) and len(value) == len(default)
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
+        fits = isinstance(value, list) and len(value) == len(default)
+        return fits and all(map(_is_number, value))
+    return _is_number(value)
+
+
+def _is_number(value: Any) -> bool:
+    """Whether it is a number that Blender can hold; it has whole ones of 32 bits."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return False
+    return isinstance(value, float) or abs(value) < 2**31
 
 
 def _plain(value: Any) -> Any:

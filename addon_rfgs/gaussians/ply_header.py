@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import AddonError
+from ..files import refuse_pipe
 
 #: Names of scalar types in PLY files, old and new, to NumPy's (without byte order).
 TYPES = {
@@ -61,6 +62,7 @@ def read_header(path: Path) -> Header:
         AddonError: The file is missing, is no PLY, or its vertices cannot be read.
     """
     try:
+        refuse_pipe(path)
         with path.open("rb") as stream:
             start = stream.read(MAX_HEADER)
     except FileNotFoundError as error:

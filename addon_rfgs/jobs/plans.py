@@ -8,12 +8,12 @@ Python, is the one of the user's preferences whenever a job starts.
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
 from ..errors import AddonError
+from ..json_file import Fields, read_json
 
 #: Largest JSON file that is read [bytes].
 _LARGEST_JSON = 4_000_000
@@ -66,7 +66,12 @@ class GeneratePlan:
 
     def complete(self) -> bool:
         """Whether the dataset is finished: its checksums are written last."""
-        return bool(_read_json(Path(self.out) / "dataset.json").get("manifest_sha256"))
+        form = Fields({"manifest_sha256": str})
+        try:
+            info = read_json(Path(self.out) / "dataset.json", form, "make it anew", _LARGEST_JSON)
+        except AddonError:
+            return False
+        return bool(info["manifest_sha256"])
 
 
 @dataclass(frozen=True)
@@ -170,14 +175,3 @@ def plan_of_json(value: Any, file: Path) -> Plan:
     if not all(path.is_absolute() for path in paths):
         raise AddonError(f"{file}: expected absolute paths; delete it and start the job anew")
     return plan
-
-
-def _read_json(file: Path) -> dict[str, Any]:
-    """A JSON object; empty where there is none that can be read."""
-    try:
-        if file.stat().st_size > _LARGEST_JSON:
-            return {}
-        value = json.loads(file.read_text("utf-8"))
-    except (OSError, ValueError, RecursionError):
-        return {}
-    return value if isinstance(value, dict) else {}

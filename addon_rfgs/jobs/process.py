@@ -84,7 +84,7 @@ class Process:
         if not self.running():
             return
         # Between the look and the signal it may end by itself, which is what was asked for.
-        with suppress(ProcessLookupError):
+        with suppress(ProcessLookupError, PermissionError):
             # Children that must not outlive the program watch over that themselves.
             if number == signal.SIGKILL:
                 os.killpg(self.pid, number)
@@ -93,17 +93,22 @@ class Process:
 
 
 def birth(pid: int) -> str:
-    """When a process began, to tell it from a later one of the same number; empty if gone."""
+    """When a process began, to tell it from a later one of the same number; empty if gone.
+
+    On Linux with the number that the system drew when it was started, which only programs that run
+    here know: a job's record from elsewhere cannot name one of this machine's processes.
+    """
     if not SUPPORTED:
         return ""
     if sys.platform == "linux":
         try:
+            here = Path("/proc/sys/kernel/random/boot_id").read_text("utf-8").strip()
             # After the program's name in brackets: state, and 19 fields on the start (proc(5)).
             fields = Path(f"/proc/{pid}/stat").read_text("utf-8", "replace").rpartition(")")[2]
         except OSError:
             return ""
         state, *rest = fields.split()
-        return "" if state in "ZX" else rest[18]
+        return "" if state in "ZX" else f"{rest[18]} {here}"
     answer = subprocess.run(
         ["ps", "-o", "lstart=", "-p", str(pid)], capture_output=True, text=True, check=False
     )

@@ -7,6 +7,9 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..errors import AddonError
+from ..files import refuse_pipe
+
 #: How much of a log's end is read [bytes].
 _TAIL = 16_384
 _LINE = re.compile(r"progress ([\d.]+) ([\d.]+) (\d+) ?(.*)")
@@ -45,11 +48,12 @@ def read_log(file: Path, count: int = 8) -> tuple[Progress | None, list[str]]:
         count: How many lines.
     """
     try:
+        refuse_pipe(file)
         with file.open("rb") as stream:
             stream.seek(0, 2)
             stream.seek(max(0, stream.tell() - _TAIL))
             text = stream.read(_TAIL).decode("utf-8", "replace")
-    except OSError:
+    except (AddonError, OSError):
         return None, []
     progress, lines = split_output(text)
     return progress, lines[-count:]

@@ -3,18 +3,19 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from ..errors import AddonError
-from ..files import write_json
+from ..files import refuse_pipe, write_json
+from ..json_file import Fields, read_json
 from .plans import Plan, plan_of_json, plan_to_json
 
 SCHEMA = "rfgs-job-1"
 #: Largest file that is read [bytes].
 _LARGEST = 100_000
+_FORM = Fields({"schema": str, "pid": int, "born": str, "kind": str, "settings": {str: object}})
+_REMEDY = "delete it and start the job anew"
 #: How many unfinished jobs are remembered.
 _MOST = 50
 
@@ -61,15 +62,15 @@ def read_record(file: Path) -> Record:
     Raises:
         AddonError: There is none, or it is damaged.
     """
-    row = _read(file)
-    if not isinstance(row, dict) or row.get("schema") != SCHEMA:
-        raise AddonError(f"{file}: no job of this add-on; delete it and start the job anew")
-    pid, born = row.get("pid"), row.get("born")
-    if type(pid) is not int or type(born) is not str or not 0 <= pid < 1 << 31:
-        raise AddonError(f"{file}: damaged; delete it and start the job anew")
+    row = read_json(file, _FORM, _REMEDY, _LARGEST)
+    pid, born = row["pid"], row["born"]
+    if row["schema"] != SCHEMA or not 0 <= pid < 1 << 31:
+        raise AddonError(f"{file}: no job of this add-on; {_REMEDY}")
     plan = plan_of_json(row, file)
     if record_file(plan).resolve() != file.resolve():
-        raise AddonError(f"{file}: tells of {plan.out}; that folder was moved, start the job anew")
+        raise AddonError(
+            f"{file}: tells of {plan.out!r:.200}; that folder was moved, start the job anew"
+        )
     return Record(plan, pid, born)
 
 
@@ -86,11 +87,10 @@ def remembered(listed: Path) -> list[Path]:
     if not listed.is_file():
         return []
     try:
-        rows = _read(listed)
+        rows = read_json(listed, [str], "delete it", _LARGEST)
     except AddonError:
         return []
-    rows = rows if isinstance(rows, list) else []
-    files = [Path(row) for row in rows[:_MOST] if isinstance(row, str) and "\0" not in row]
+    files = [Path(row) for row in rows[:_MOST] if "\0" not in row]
     return [file for file in files if file.is_absolute() and file.is_file()]
 
 
@@ -98,17 +98,10 @@ def _refuse_link(file: Path) -> None:
     """Refuses a log folder, record or log that is a link: it would be written where that leads.
 
     Raises:
-        AddonError: It is one.
+        AddonError: It is one, or a pipe, which keeps its writer waiting.
     """
     for place in (file.parent, file, file.with_suffix(".log")):
         if place.is_symlink():
             raise AddonError(f"{place}: a symbolic link; replace it by a folder or file of its own")
-
-
-def _read(file: Path) -> Any:
-    try:
-        if file.stat().st_size > _LARGEST:
-            raise AddonError(f"{file}: larger than a job's record; delete it")
-        return json.loads(file.read_text("utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise AddonError(f"{file}: cannot be read; start the job anew") from error
+    for place in (file, file.with_suffix(".log")):
+        refuse_pipe(place)

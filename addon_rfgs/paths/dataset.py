@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-import json
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,12 +12,20 @@ import numpy as np
 
 from ..array_file import array_file
 from ..errors import AddonError
+from ..json_file import Fields, read_json
 
 #: What happens at a corner: code → name, those of Sionna RT and of `rfgs_core.radio.images`.
 INTERACTIONS = {1: "specular", 2: "diffuse", 4: "refraction", 8: "diffraction", 16: "scattering"}
 
 #: Largest `sequence.json` that is read [bytes].
 _LARGEST_JSON = 64_000_000
+_LAST_FRAME = 1_048_574
+_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,199}")
+#: What paths need of `sequence.json`.
+_FORM = Fields(
+    {"frames": [int], "devices": {str: [Fields({"name": str})]}},
+    {"objects": [Fields({"id": int, "name": str})]},
+)
 #: Axis → its greatest length; a table within them takes less than 2 GB.
 _MOST = {"path": 2_000_000, "port": 16, "node": 512, "bounce": 14, "corner": 16, "xyz": 3}
 _MOST_BYTES = 2_000_000_000
@@ -92,30 +100,27 @@ def open_path_dataset(folder: Path) -> PathDataset:
     Raises:
         AddonError: There is none, or it is damaged.
     """
-    found, info = read_sequence(folder)
+    found, info = read_sequence(folder, _FORM)
     file = found / "sequence.json"
-    try:
-        return PathDataset(
-            found,
-            [int(frame) for frame in info["frames"]],
-            {
-                str(radio): [str(row["name"]) for row in rows]
-                for radio, rows in info["devices"].items()
-            },
-            {int(row["id"]): str(row["name"]) for row in info.get("objects", [])},
-        )
-    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
-        raise AddonError(f"{file}: damaged; make the dataset anew") from error
+    if not all(0 <= frame <= _LAST_FRAME for frame in info["frames"]):
+        raise AddonError(f"{file}: expected frames from 0 to {_LAST_FRAME}; make the dataset anew")
+    return PathDataset(
+        found,
+        info["frames"],
+        {radio: [row["name"] for row in rows] for radio, rows in info["devices"].items()},
+        {row["id"]: row["name"] for row in info.get("objects", [])},
+    )
 
 
-def read_sequence(folder: Path) -> tuple[Path, dict[str, Any]]:
+def read_sequence(folder: Path, form: Fields) -> tuple[Path, dict[str, Any]]:
     """Folder of a dataset's only sequence, and what its `sequence.json` holds.
 
     Args:
         folder: The dataset, or one of its sequences.
+        form: What is read of that; its field `devices` names radios.
 
     Raises:
-        AddonError: There is none or several, or it cannot be read.
+        AddonError: There is none or several, or it is not of that form.
     """
     found = [folder] if (folder / "sequence.json").is_file() else []
     found = found or sorted(file.parent for file in folder.glob("*/sequence.json"))
@@ -124,7 +129,13 @@ def read_sequence(folder: Path) -> tuple[Path, dict[str, Any]]:
     if len(found) > 1:
         names = ", ".join(path.name for path in found)
         raise AddonError(f"{folder}: several sequences; choose the folder of one: {names}")
-    return found[0], _read_json(found[0] / "sequence.json")
+    file = found[0] / "sequence.json"
+    info = read_json(file, form, "make the dataset anew", _LARGEST_JSON)
+    # A radio's name is that of a folder, too.
+    strange = next((name for name in info["devices"] if not _NAME.fullmatch(name)), None)
+    if strange is not None:
+        raise AddonError(f"{file}: {strange[:60]!r} is no name of a radio; make the dataset anew")
+    return found[0], info
 
 
 def recorded_frames(dataset: PathDataset, radio: str) -> list[int]:
@@ -212,13 +223,3 @@ def _check(
         raise AddonError(f"{file}: {name} has shape {list(shape)}, expected {list(axes)}")
     if int(np.prod(shape, dtype=np.int64)) * dtype.itemsize > _MOST_BYTES:
         raise AddonError(f"{file}: {name} has shape {list(shape)}, which is too large to show")
-
-
-def _read_json(file: Path) -> dict[str, Any]:
-    try:
-        if file.stat().st_size > _LARGEST_JSON:
-            raise AddonError(f"{file}: larger than any sequence.json; make the dataset anew")
-        value = json.loads(file.read_text("utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise AddonError(f"{file}: cannot be read; make the dataset anew") from error
-    return value if isinstance(value, dict) else {}

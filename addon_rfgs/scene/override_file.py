@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable
 from dataclasses import fields
@@ -13,10 +12,13 @@ from typing import Any
 import numpy as np
 
 from ..errors import AddonError
+from ..json_file import read_json
 from ..naming import closest
 from ..tables import MATERIALS
 from .overrides import Overrides, RadioMaterial, Ring, Room
 
+#: Largest file that is read [bytes].
+_LARGEST = 4_000_000
 #: What Blender holds without a word about it: it cuts other numbers off.
 _FPS = (0.001, 32767)
 _LAST_FRAME = 1_048_574
@@ -31,12 +33,8 @@ def read_overrides(path: Path | None) -> Overrides:
     """
     if path is None:
         return Overrides()
-    try:
-        values = json.loads(path.read_text("utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise AddonError(f"{path}: expected a JSON file of overrides ({error})") from error
-    if not isinstance(values, dict):
-        raise AddonError(f"{path}: expected keys and values, got {type(values).__name__}")
+    # What each key may hold depends on Blender's own limits; their readers say it.
+    values = read_json(path, {str: object}, "expected overrides", _LARGEST)
     label = str(values.pop("label", path))
     known = [row.name for row in fields(Overrides) if row.name != "label"]
     _refuse_unknown(label, values, known)

@@ -9,13 +9,25 @@ from pathlib import Path
 
 import numpy as np
 
+from rfgs_core.arrays import Shape, load_arrays
 from rfgs_core.articulated.body import Body
 from rfgs_core.articulated.bones import BONES
 from rfgs_core.articulated.surface import vertex_normals
-from rfgs_core.errors import RfgsError
+from rfgs_core.errors import RfgsError, RfgsFormatError
 
 #: Written by `python -m blender_scenes bodies`.
 SHAPE_SPACE = Path(__file__).with_name("people.npz")
+_REMEDY = "install the package again"
+_SHAPES: dict[str, Shape] = {
+    "mean": ("point", 3),
+    "components": ("coefficient", "point", 3),
+    "faces": ("face", 3),
+    "bone": ("vertex", 4),
+    "weight": ("vertex", 4),
+    **{f"{age}_middle": ("coefficient",) for age in ("adults", "children")},
+    **{f"{age}_spread": ("coefficient", "coefficient") for age in ("adults", "children")},
+}
+_TYPES = {name: "f2 f4" for name in _SHAPES} | {"faces": "i2", "bone": "u1"}
 #: Draws farther out than this are drawn again [standard deviations].
 _FARTHEST = 2.2
 #: Thickest that clothes and hair are drawn [m].
@@ -128,13 +140,30 @@ class ShapeSpace:
 @cache
 def people() -> ShapeSpace:
     """The shape space that comes with the package, read once."""
-    with np.load(SHAPE_SPACE, allow_pickle=False) as stored:
-        arrays = {name: stored[name] for name in stored.files}
+    return read_shape_space(SHAPE_SPACE)
+
+
+def read_shape_space(file: Path) -> ShapeSpace:
+    """Reads a shape space.
+
+    Raises:
+        RfgsError: There is no such file.
+        RfgsFormatError: It is damaged.
+    """
+    arrays = load_arrays(file, _REMEDY, _SHAPES, types=_TYPES)
+    count = len(arrays["bone"])
+    weight = arrays["weight"].astype(np.float64)
+    if len(arrays["mean"]) != count + len(BONES):
+        raise RfgsFormatError(f"{file}: mean: expected a point for each vertex and bone; {_REMEDY}")
+    for name, most in (("faces", count), ("bone", len(BONES))):
+        if not 0 <= arrays[name].min() <= arrays[name].max() < most:
+            raise RfgsFormatError(f"{file}: {name}: expected indices below {most}; {_REMEDY}")
+    if weight.min() < 0.0 or not weight.sum(axis=1).min() > 0.0:
+        raise RfgsFormatError(f"{file}: weight: expected bones that hold each vertex; {_REMEDY}")
     spread = {
         name: tuple(arrays[f"{name}_{part}"].astype(np.float64) for part in ("middle", "spread"))
         for name in ("adults", "children")
     }
-    weight = arrays["weight"].astype(np.float64)
     return ShapeSpace(
         arrays["mean"].astype(np.float64),
         arrays["components"].astype(np.float64),

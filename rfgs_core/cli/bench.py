@@ -28,7 +28,9 @@ class BenchArgs:
     measured data are explained, each part beside a baseline; docs/captures.md names the files.
     tracers: the fast tracer beside Sionna RT on our scenes, as `rfgs-factory tracers`.
     limbs: joints and surface of a dataset's one person beside what knows less.
-    people: how often a dataset's people are counted right, beside channels without any.
+    people: how often a dataset's people are counted right, beside channels without any; or with
+    --data, joints of real people in a public set (MM-Fi, mmBody, HuPR) by our network, which saw
+    synthetic radio alone.
     live: six receivers of 1,000 packets/s each over UDP, made here: packets lost, latency, updates.
     fields: the grid search that settings of neural fields, our baselines, were taken from.
     table1: the paper's table 1, methods x Wi-Fi and mmWave, resumable; see --size and --out.
@@ -55,7 +57,7 @@ class BenchArgs:
     ]
     """What to time or judge."""
     data: Path | None = None
-    """Folder of real captures for the part `real`."""
+    """Folder of real captures for the part `real`, or of a public set for the part `people`."""
     blender: Path | None = None
     """Blender program for the part `blender`; else $BLENDER, else pip's bpy."""
     dataset: Path | None = None
@@ -63,8 +65,8 @@ class BenchArgs:
     radio: str = "wifi"
     """Radio for these parts."""
     network: Path | None = None
-    """Network for the part `limbs`, as `rfgs limbs` makes it; left out: the one that comes with
-    the package."""
+    """Network for the part `limbs`, and `people` with --data, as `rfgs limbs` makes it; left out:
+    the one that comes with the package."""
     hold_out: bool = False
     """For the parts `limbs` and `people`: hide what the dataset holds out, as training does."""
     frames: str | None = None
@@ -185,14 +187,35 @@ def _people(args: BenchArgs) -> dict[str, Any]:
     from rfgs_core.frames import chosen_frames
     from rfgs_core.threads import one_torch_thread
 
-    if args.dataset is None:
-        raise RfgsError("bench people: expected --dataset FOLDER, see `rfgs-factory generate`")
+    if args.data is not None and args.dataset is None:
+        return _people_set(args, args.data)
+    if args.dataset is None or args.data is not None:
+        raise RfgsError(
+            "bench people: expected --dataset FOLDER of ours, see `rfgs-factory generate`, or "
+            "--data FOLDER of a public set, see docs/captures.md"
+        )
     sequence = open_dataset(args.dataset).sequence()
     frames = chosen_frames(args.frames, sequence.frames)
     with tqdm(total=len(frames), desc="people") as bar, one_torch_thread():
         table = head_count_table(
             sequence, args.radio, frames, everything=not args.hold_out, on_frame=bar.update
         )
+    return {**table, **hardware()}
+
+
+def _people_set(args: BenchArgs, folder: Path) -> dict[str, Any]:
+    from tqdm import tqdm
+
+    from rfgs_core.bench import hardware
+    from rfgs_core.limbs.weights import load_network, own_network
+    from rfgs_core.people_sets.judge import MOST_FRAMES, judge_people
+    from rfgs_core.radio import PRESETS
+    from rfgs_core.threads import one_torch_thread
+
+    trained = load_network(args.network) if args.network else own_network(PRESETS["mmwave"].freq_hz)
+    assert trained is not None
+    with tqdm(total=MOST_FRAMES, desc="people") as bar, one_torch_thread():
+        table = judge_people(folder, trained.network, bar.update)
     return {**table, **hardware()}
 
 

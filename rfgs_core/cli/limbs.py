@@ -54,6 +54,8 @@ def run(args: LimbsArgs) -> int:
     for name in ("frames", "kept"):
         if getattr(args, name) < 1:
             raise RfgsError(f"--{name} {getattr(args, name)}: expected at least 1")
+    if not 0 <= args.workers <= 256:
+        raise RfgsError(f"--workers {args.workers}: expected 0 to 256")
     config = LearnConfig(
         frames=args.frames,
         steps_per_chunk=args.steps,

@@ -166,6 +166,12 @@ def _walking(
 ) -> tuple[Float64[np.ndarray, "17 3"], Float64[np.ndarray, "frame 17 3"]]:
     """Mean pose of random walks, and one moment of a walk for each frame, facing along x."""
     rng = np.random.default_rng(sub_seed(seed, "walks"))
+    ahead = moments_of_walks(rng)
+    return ahead.mean(axis=0), ahead[rng.integers(len(ahead), size=len(person.frames))]
+
+
+def moments_of_walks(rng: np.random.Generator) -> Float64[np.ndarray, "moment 17 3"]:
+    """Joints at moments of random walks, the pelvis above the origin, facing along x [m]."""
     body = people().body(np.zeros(0))
     moments = []
     for _ in range(_WALKS):
@@ -175,7 +181,7 @@ def _walking(
         ]
     ahead = _turned(np.array(moments), -headings_of(np.array(moments)))
     ahead[..., :2] -= ahead[:, :1, :2]
-    return ahead.mean(axis=0), ahead[rng.integers(len(ahead), size=len(person.frames))]
+    return ahead
 
 
 def _turned(

@@ -194,7 +194,7 @@ def observe(
         everything: Hides nothing: for poses and geometry, whose truth is no channel.
 
     Raises:
-        RfgsError: The channel holds values that are not finite.
+        RfgsError: The channel holds values that are not finite, or `empty` is another radio's.
     """
     elements, links, subcarriers, csi = visible_channel(
         sequence, radio, frame, channel, packets, everything=everything
@@ -209,6 +209,11 @@ def observe(
             static, links, subcarriers, f"csi_static of frame {frame} ({sequence.name}, {radio})"
         )
         empty = KINDS[kind].report(static, seen)
+    elif empty.shape != (own := KINDS[kind].report(csi[0], seen).shape):
+        raise RfgsError(
+            f"the background of {sequence.name}, {radio}: expected shape {own}, as each packet "
+            f"has, got {empty.shape}; train again into a new folder"
+        )
     change, interval_s = KINDS[kind].change(csi, empty, seen), 0.0
     if change.packets is not None:
         interval_s = float(np.diff(sequence.sample_times_s(radio, frame)[:2])[0])

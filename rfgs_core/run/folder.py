@@ -116,7 +116,9 @@ class Run:
         if self.config.settings.background == "empty_room":
             return None
         shapes = {"empty": ("tx", "rx", "entry")}
-        types = {"empty": "c8 f4"}
+        types = {
+            "empty": "f4" if self.config.settings.observe in ("power", "delay_power") else "c8"
+        }
         return load_arrays(self.path / BACKGROUND_FILE, _REMEDY, shapes, types=types)["empty"]
 
     def ply_path(self, frame: int) -> Path:

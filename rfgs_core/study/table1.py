@@ -8,7 +8,10 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
 
+from msgspec import Struct
+
 from rfgs_core.dataset import Dataset, open_dataset
+from rfgs_core.errors import RfgsFormatError
 from rfgs_core.evaluate.field_run import Given, fit_fields
 from rfgs_core.evaluate.metrics import METHOD, evaluate_method, evaluate_run
 from rfgs_core.evaluate.provenance import hardware, now, versions
@@ -112,6 +115,34 @@ class Cell:
         )
 
 
+class _Geometry(Struct):
+    f05: float | None = None
+    f10: float | None = None
+    f20: float | None = None
+    centroid_m: float | None = None
+
+
+class _Channel(Struct):
+    element_snr_db: float | None = None
+    subcarrier_snr_db: float | None = None
+
+
+class _Groups(Struct):
+    geometry: _Geometry
+    rf: _Channel
+
+
+class _Made(Struct):
+    """What is read of a cell's file."""
+
+    scene: str
+    radio: str
+    method: str
+    settings: dict[str, Any]
+    methods: dict[str, _Groups]
+    train_s: float
+
+
 def cells(size: Size, radios: tuple[str, ...], seeds: int) -> list[Cell]:
     """All cells: first one seed of everything, of each dataset ours first."""
     return [
@@ -133,7 +164,11 @@ def stored(cell: Cell, out: Path, size: Size) -> dict[str, Any] | None:
     refuse_link(path)
     if not path.exists():
         return None
-    found = record(path, read_json(path), dict[str, Any], "delete it to make it again")
+    remedy = "delete it to make it again"
+    found = record(path, read_json(path), dict[str, Any], remedy)
+    record(path, found, _Made, remedy)
+    if (found["scene"], found["radio"], found["method"]) != (cell.scene, cell.radio, cell.method):
+        raise RfgsFormatError(f"{path}: tells of another cell; {remedy}")
     return found if found.get("settings") == settings_of(cell, size) else None
 
 

@@ -54,6 +54,16 @@ def pass_inside(python: Run, monkeypatch: pytest.MonkeyPatch) -> Callable[[str],
     return run
 
 
+@pytest.fixture
+def rfgs_python(tmp_path: Path) -> Path:
+    """A Python that has rfgs, as a user's environment does."""
+    program = tmp_path / "python"
+    root = Path(__file__).parents[2]
+    program.write_text(f'#!/bin/sh\nPYTHONPATH="{root}" exec "{sys.executable}" "$@"\n')
+    program.chmod(0o755)
+    return program
+
+
 @pytest.fixture(scope="session")
 def scenes(python: Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder of small .blend files and their bundles."""

@@ -317,10 +317,11 @@ def test_devices_of_a_dataset_stand_where_it_has_them(tmp_path: Path) -> None:
     ("changes", "radio", "message"),
     [
         ({}, "wifi", "no radio 'wifi'; it has intel"),
-        ({"devices": {"intel": [{"name": "x"}]}}, "", "damaged pose"),
-        ({"devices": {"intel": ["x"]}}, "", "a device is damaged"),
+        ({"devices": {"intel": [{"name": "x"}]}}, "", "field 'position_m' is missing"),
+        ({"devices": {"intel": ["x"]}}, "", r"intel\[0\]: expected an object, found 'x'"),
+        ({"devices": {"../x": []}}, "", "'../x' is no name of a radio"),
         ({"devices": {"intel": []}}, "", "0 devices, expected 1 to 2000"),
-        ({"devices": 3}, "", "sequence.json is damaged"),
+        ({"devices": 3}, "", "devices: expected an object, found 3"),
     ],
 )
 def test_damaged_datasets_add_nothing(

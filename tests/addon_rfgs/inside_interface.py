@@ -34,6 +34,7 @@ COMMANDS = {
     "forget_job": "forget",
     "generate_dataset": "generate",
     "guess_materials": "materials guess",
+    "import_capture": "devices capture",
     "import_devices": "devices import",
     "import_gaussians": "import",
     "import_ply": "import",

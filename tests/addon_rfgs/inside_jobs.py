@@ -207,6 +207,72 @@ def test_no_record_names_a_program(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert with_blender(train, "/own/blender") == train
 
 
+#: Values for every setting of a job, by somebody who wants something else to run.
+HOSTILE = (
+    *("--blender=/evil", "-c", "/evil; rm -rf /", "$(evil)", "/a\n--x", "\0", "../..", "/" * 5000),
+    *(-1, 0, True, None, 10**9, 10**400, 1e308, [], {}, ["/evil"]),
+)
+_OPTIONS = (
+    *("out", "radio", "frames", "depth", "cameras", "resolution", "samples", "workers", "seed"),
+    *("iterations", "gaussians"),
+)
+
+
+@pytest.mark.parametrize("kind", ["generate", "train", "evaluate"])
+def test_a_record_of_an_adversary_starts_our_commands_alone(tmp_path: Path, kind: str) -> None:
+    made = {
+        "generate": GeneratePlan(str(tmp_path), "/a.blend"),
+        "train": TrainPlan(str(tmp_path), "/data"),
+        "evaluate": EvaluatePlan(str(tmp_path)),
+    }[kind]
+    write_record(Record(made, 1, ""))
+    file = record_file(made)
+    sound = json.loads(file.read_text())
+    rows = [
+        {**sound, "settings": {**sound["settings"], name: value}}
+        for name in (*sound["settings"], "blender", "python", "env", "arguments")
+        for value in HOSTILE
+    ]
+    rows += [{**sound, name: value} for name in (*sound, "python", "argv") for value in HOSTILE]
+    accepted = 0
+    for row in rows:
+        file.write_text(json.dumps(row))
+        try:
+            arguments = with_blender(read_record(file).plan, "/own/blender").arguments()
+        except AddonError as error:
+            assert "\n" not in str(error)
+            continue
+        accepted += 1
+        module, command, *rest = arguments[1:]
+        ours = {
+            "generate": "dataset_factory",
+            "train": "rfgs_core.cli",
+            "evaluate": "rfgs_core.cli",
+        }
+        assert arguments[0] == "-m" and module == ours[kind]
+        assert command == {"evaluate": "eval"}.get(kind, kind)
+        for text in rest:
+            name, equals, value = text.removeprefix("--").partition("=")
+            path = text.startswith("/")
+            switch = text in ("--no-paths", "--paths", "--images", "--no-images", "--oracle")
+            option = text.startswith("--") and equals and name in _OPTIONS
+            program = (name, value) == ("blender", "/own/blender")
+            assert path or switch or option or program or text == "--no-oracle", text
+    assert 10 < accepted < len(rows) / 2
+
+
+@pytest.mark.parametrize("name", ["log/job_train.json", "log/job_train.log"])
+def test_a_job_waits_for_no_pipe(jobs, tmp_path: Path, program, name: str) -> None:
+    place = Path(plan(tmp_path, "a").out, name)
+    place.parent.mkdir(parents=True, exist_ok=True)
+    os.mkfifo(place)
+    with pytest.raises(AddonError, match="expected a file"):
+        jobs.add(plan(tmp_path, "a"), program("quick"))
+    with pytest.raises(AddonError, match="expected a file"):
+        read_record(record_file(plan(tmp_path, "a")))
+    assert read_log(log_file(plan(tmp_path, "a"))) == (None, [])
+
+
 @pytest.mark.parametrize("name", ["log", "log/job_train.json", "log/job_train.log"])
 def test_a_job_writes_through_no_link(jobs, tmp_path: Path, program, name: str) -> None:
     victim = tmp_path / "victim"

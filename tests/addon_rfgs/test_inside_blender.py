@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-#: `test_inside_channels.py` gives one a run to draw, `test_inside_live.py` one a dataset to replay.
+#: Others are given what they need by tests of their own: a run, a dataset, captures.
 NAMES = sorted(
     path.stem.removeprefix("inside_")
     for path in Path(__file__).parent.glob("inside_*.py")
-    if path.stem not in ("inside_channels", "inside_live")
+    if not path.with_name(f"test_{path.name}").exists()
 )
 
 

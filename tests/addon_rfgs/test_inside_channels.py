@@ -4,23 +4,17 @@
 from __future__ import annotations
 
 import shutil
-import sys
 from pathlib import Path
 
 import pytest
 
 from rfgs_core.run import Run
 
-ROOT = Path(__file__).parents[2]
-
 
 def test_all_tests_of_channels_pass_inside_blender(
-    pass_inside, small_run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    pass_inside, small_run: Run, rfgs_python: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run = shutil.copytree(small_run.path, tmp_path / "run")
-    program = tmp_path / "python"
-    program.write_text(f'#!/bin/sh\nPYTHONPATH="{ROOT}" exec "{sys.executable}" "$@"\n')
-    program.chmod(0o755)
     monkeypatch.setenv("RFGS_RUN", str(run))
-    monkeypatch.setenv("RFGS_PYTHON", str(program))
+    monkeypatch.setenv("RFGS_PYTHON", str(rfgs_python))
     pass_inside("channels")

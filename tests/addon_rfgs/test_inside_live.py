@@ -3,24 +3,18 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
-
 
 def test_all_tests_of_live_clouds_pass_inside_blender(
     pass_inside: Callable[[str], None],
     tiny_dataset: Path,
-    tmp_path: Path,
+    rfgs_python: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    program = tmp_path / "python"
-    program.write_text(f'#!/bin/sh\nPYTHONPATH="{ROOT}" exec "{sys.executable}" "$@"\n')
-    program.chmod(0o755)
     monkeypatch.setenv("RFGS_DATASET", str(tiny_dataset))
-    monkeypatch.setenv("RFGS_PYTHON", str(program))
+    monkeypatch.setenv("RFGS_PYTHON", str(rfgs_python))
     pass_inside("live")

@@ -27,6 +27,7 @@ import rfgs_core  # noqa: E402, F401
 
 # isort: split
 from formats import Format, digest, make_all  # noqa: E402
+from other_formats import make_others  # noqa: E402
 from people_formats import make_people  # noqa: E402
 
 from dataset_factory.check.validate import checksum_faults  # noqa: E402
@@ -97,7 +98,8 @@ def _hang(*_: Any) -> NoReturn:
 
 def _formats(folder: Path, names: list[str]) -> list[Format]:
     if names != ["add-on"]:
-        return [*make_all(folder), *make_people(folder / "people")]
+        made = [*make_all(folder), *make_people(folder / "people")]
+        return [*made, *make_others(folder / "others", folder / "run", folder / "bundle")]
     from addon_formats import make_addon
 
     return make_addon(folder)

@@ -235,7 +235,7 @@ def _inputs(folder: Path) -> list[Format]:
         return [made.kind, made.radio, dict(made.model.state_dict())]
 
     paths = folder / "paths.npz"
-    _write_paths(paths)
+    write_path_table(paths)
     scene = folder / "scene.yaml"
     options = SceneOptions(scene_config=scene)
     lab = [folder / name for name in ("lab.yaml", "lab.json", "worn.json")]
@@ -251,7 +251,7 @@ def _inputs(folder: Path) -> list[Format]:
     ]
 
 
-def _write_paths(file: Path) -> None:
+def write_path_table(file: Path) -> None:
     """Three paths of two corners."""
     columns = {
         **dict.fromkeys(("tx_site", "rx_site", "tx_device", "rx_device"), np.zeros(3, np.int32)),

@@ -127,9 +127,10 @@ def read_json(path: Path, *, links_known: bool = False) -> Any:
     if not links_known:
         refuse_link(path)
     try:
-        if path.stat().st_size > LARGEST_JSON_BYTES:
-            raise RfgsFormatError(f"{path}: larger than any JSON file of ours; expected JSON")
-        return msgspec.json.decode(path.read_bytes())
+        with open(path, "rb") as stream:
+            if os.fstat(stream.fileno()).st_size > LARGEST_JSON_BYTES:
+                raise RfgsFormatError(f"{path}: larger than any JSON file of ours; expected JSON")
+            return msgspec.json.decode(stream.read())
     except FileNotFoundError as error:
         raise RfgsError(f"{path}: no such file") from error
     except RfgsFormatError:
@@ -151,7 +152,8 @@ def inside(root: Path, name: str) -> Path:
     Raises:
         RfgsFormatError: `name` is absolute or climbs out of `root`.
     """
-    target = (root / name).resolve()
-    if not target.is_relative_to(root.resolve()):
+    home = os.path.realpath(root)
+    target = os.path.realpath(os.path.join(home, name))
+    if target != home and not target.startswith(home.rstrip(os.sep) + os.sep):
         raise RfgsFormatError(f"{name!r} leads outside {root}; expected a name inside that folder")
-    return target
+    return Path(target)

@@ -222,10 +222,14 @@ def open_csi(path: Path, sizes: Mapping[str, int] | None = None) -> xarray.Datas
     check_store(path, sizes)
     name = ""
     try:
-        data = xarray.open_zarr(path, consolidated=False, chunks=None, zarr_format=3)
+        # Nothing of ours is a date or a text, whatever an attribute says.
+        data = xarray.open_zarr(
+            path, consolidated=False, chunks=None, zarr_format=3, concat_characters=False,
+            decode_times=False, decode_timedelta=False,
+        )  # fmt: skip
         # Coordinates are small; reading them now finds damage here, not deep in a caller.
         for name in data.coords:
-            data[name].load()
+            data.variables[name].load()
     except _DAMAGE as error:
         raise RfgsFormatError(f"{path / str(name)}: damaged or missing ({error})") from error
     return data

@@ -179,7 +179,7 @@ def check_store(path: Path, sizes: Mapping[str, int] | None = None) -> None:
         total += math.prod(array.shape) * _BYTES[array.data_type]
         if total > MOST_BYTES:
             raise RfgsFormatError(f"{path}: expected coordinates up to {MOST_BYTES} bytes in all")
-        _check_chunks(path / name, array)
+        _check_chunks(f"{path}/{name}", array)
 
 
 def is_channel(name: str) -> bool:
@@ -221,7 +221,7 @@ def check_array(
         RfgsError: There is no such array.
         RfgsFormatError: It is of another type, shape or codec than the schema says.
     """
-    file = path / name / "zarr.json"
+    file = path.joinpath(name, "zarr.json")
     array = record(file, read_json(file, links_known=links_known), Array)
     record(f"{file}: attributes", array.attributes, _Attributes)
     kind, dimensions = _ARRAYS[name]
@@ -247,12 +247,12 @@ def check_array(
     return array
 
 
-def _check_chunks(path: Path, array: Array) -> None:
+def _check_chunks(path: str, array: Array) -> None:
     """Refuses coordinates whose chunks are too many, or packed otherwise than they should be."""
     grid = [-(-size // step) for size, step in zip(array.shape, array.chunk, strict=True)]
     if math.prod(grid) > _MOST_CHUNKS:
         raise RfgsFormatError(
-            f"{path / 'zarr.json'}: expected up to {_MOST_CHUNKS} chunks, found {array.shape} in "
+            f"{path}/zarr.json: expected up to {_MOST_CHUNKS} chunks, found {array.shape} in "
             f"chunks of {array.chunk}"
         )
     size = chunk_bytes(array)
@@ -260,4 +260,4 @@ def _check_chunks(path: Path, array: Array) -> None:
         # What was never written reads as the fill value. Names are joined as text: a store has
         # many, and they are looked at whenever it is opened.
         with suppress(FileNotFoundError):
-            refuse_chunk("/".join((str(path), "c", *map(str, place))), size)
+            refuse_chunk("/".join((path, "c", *map(str, place))), size)

@@ -66,21 +66,24 @@ def decode(reader: RecordReader, datagrams: list[Datagram], counts: Counts) -> l
     """Decodes datagrams; what does not decode is counted.
 
     Datagrams of one length are mostly packets of one kind, which a reader decodes at once; where
-    one of them is another, each is decoded on its own.
+    one of them is another, halves are tried until it stands alone.
     """
     groups: dict[int, list[Datagram]] = {}
     for datagram in datagrams:
         length = 0 if reader is READERS["esp32"] else len(datagram[1])
         groups.setdefault(length, []).append(datagram)
     found = []
-    for group in groups.values():
+    left = [*groups.values()]
+    while left:
+        group = left.pop()
         whole = _together(reader, group)
         if whole is not None:
             found.append(whole)
-            continue
-        single = [_together(reader, [datagram]) for datagram in group]
-        counts.malformed += single.count(None)
-        found += [each for each in single if each is not None]
+        elif len(group) == 1:
+            counts.malformed += 1
+        else:
+            half = len(group) // 2
+            left += [group[half:], group[:half]]
     return found
 
 

@@ -63,6 +63,11 @@ def stood(
     return _best(log[:, None], shifts, time_s, 0.0)
 
 
+def off_track(shifts: Float64[np.ndarray, "shift 3"]) -> Float64[np.ndarray, "shift"]:
+    """What the prior takes from the evidence of places beside the track [nat]."""
+    return 0.5 * np.sum(shifts**2, axis=1) / _OFF_TRACK_M**2
+
+
 def _finer(log: np.ndarray) -> np.ndarray:
     """Evidence between phases, linear around the stride."""
     count = log.shape[1]
@@ -75,7 +80,7 @@ def _finer(log: np.ndarray) -> np.ndarray:
 def _best(log: np.ndarray, shifts: np.ndarray, time_s: np.ndarray, rate_hz: float) -> Path:
     """The likeliest path at one rate [strides/s]."""
     frames, phases = log.shape[:2]
-    gained = log - 0.5 * np.sum(shifts**2, axis=1) / _OFF_TRACK_M**2
+    gained = log - off_track(shifts)
     jump_m2 = np.sum((shifts[:, None] - shifts) ** 2, axis=2)
     turn = np.arange(phases) / phases
     total = gained[0]

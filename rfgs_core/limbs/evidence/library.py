@@ -9,15 +9,18 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float64
 
-from rfgs_core.articulated import Body, Pose, grounded
+from rfgs_core.articulated import BONES, Body, Pose, grounded
 from rfgs_core.seeds import sub_seed
 from rfgs_core.skeleton import JOINTS
 from rfgs_core.worlds.motion import Motion, random_motion
+from rfgs_core.worlds.motion.curves import Y, about
 
 #: Phases of a stride that are tried.
 PHASES = 12
 #: A stride's speed is off the wanted one by at most this share, and it turns by at most this [rad].
 _OFF, _TURNS_RAD = 0.2, 0.25
+#: How much more than in a stride hips may be bent, and knees twice that [rad].
+BENDS_RAD = (0.0, 0.05, 0.1, 0.15, 0.2)
 #: Walks that are looked through for strides.
 _MOST_WALKS = 400
 #: Moments per second at which walks are looked at.
@@ -31,6 +34,27 @@ class Stride(NamedTuple):
     """At `PHASES` equal phases, pelvis above the origin."""
     lasts_s: float
     """From one heel strike of the left foot to the next [s]."""
+
+    def bent(self, body: Body, bend_rad: float) -> Stride:
+        """The stride of the same person on legs that are bent more; feet stay as level as before.
+
+        How low somebody walks differs by centimetres from person to person.
+
+        Args:
+            body: Who walks.
+            bend_rad: How much more hips are bent [rad]; knees are by twice as much.
+        """
+        turns = {"upperleg": -bend_rad, "lowerleg": 2.0 * bend_rad, "foot": -bend_rad}
+        poses = []
+        for pose in self.poses:
+            local = pose.local()
+            for row, name in enumerate(BONES):
+                angle_rad = turns.get(name.split("_")[0])
+                if angle_rad is not None:
+                    local[row] = about(Y, angle_rad) @ local[row]
+            low = grounded(body, Pose.from_local(body.heads[0], local))
+            poses.append(low.moved(-_flat(body.joints17(low)[0])))
+        return Stride(poses, self.lasts_s)
 
 
 def upright(body: Body) -> Pose:

@@ -2,8 +2,8 @@
 """Limbs of somebody who walks, by evidence alone; nothing where it does not stand out.
 
 In turn: the way from the places found, the amplitude of walls, the places anew by a few poses, the
-stride by a few frames, and the likeliest walk. It is told only if device pairs that had no say in
-its phases and places hear it rather than somebody who stands there.
+stride and how far legs are bent by a few frames, and the likeliest walk. It is told only if device
+pairs that had no say in its phases and places hear it rather than somebody who stands there.
 """
 
 from __future__ import annotations
@@ -17,8 +17,15 @@ from jaxtyping import Float, Float64
 
 from rfgs_core.articulated import Body, Pose, people
 from rfgs_core.limbs.evidence.body import figure_of
-from rfgs_core.limbs.evidence.follow import stood, walked
-from rfgs_core.limbs.evidence.library import PHASES, Stride, about_z, strides, upright
+from rfgs_core.limbs.evidence.follow import Path, off_track, stood, walked
+from rfgs_core.limbs.evidence.library import (
+    BENDS_RAD,
+    PHASES,
+    Stride,
+    about_z,
+    strides,
+    upright,
+)
 from rfgs_core.limbs.evidence.table import evidence_table, stacked
 from rfgs_core.limbs.evidence.track import Way, way_of
 from rfgs_core.limbs.propose import Joints
@@ -35,6 +42,8 @@ STRIDES, ALPHAS, _FEW_FRAMES = 8, (0.0, 0.25, 0.5, 0.8), 8
 _FAR = np.array([[x, y, 0.0] for x in range(-2, 3) for y in range(-2, 3)]) * 0.05
 _NEAR = np.array([[0, 0, 0], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]]) * 0.04
 _HERE = np.zeros((1, 3))
+#: Places around those of the likeliest walk [m].
+_FINE = np.array([[x, y, 0.0] for x in range(-1, 2) for y in range(-1, 2)]) * 0.02
 #: A joint is known no better than this [m].
 _SUREST_M = 0.055
 #: Phases this far from the likeliest one are in doubt [share of a stride].
@@ -105,7 +114,7 @@ def long_enough(time_s: Float64[np.ndarray, "frame"]) -> bool:
 def looks(frames: int) -> int:
     """How often `tell` calls `on_frame` for a walk of so many frames."""
     few = min(frames, _FEW_FRAMES)
-    return few + frames + STRIDES * few + frames
+    return few + frames + (STRIDES + len(BENDS_RAD)) * few + 2 * frames
 
 
 def tell(
@@ -150,8 +159,10 @@ def best_walk(
     case = replace(case, alpha=ALPHAS[int(by_alpha.argmax())])
     case = replace(case, way=_nearer(case, found[0], on_frame))
     stride = _likeliest(case.few(), found, on_frame)
+    bent = [stride.bent(case.body, bend) for bend in BENDS_RAD]
+    stride = _likeliest(case.few(), bent, on_frame)
     log = case.log([upright(case.body), *stride.poses], _NEAR, on_frame=on_frame)
-    return _told(case, stride, log[:, :, :, 0])
+    return _told(case, stride, log[:, :, :, 0], on_frame)
 
 
 def _nearer(case: _Case, stride: Stride, on_frame: Callable[[], Any]) -> Way:
@@ -173,7 +184,12 @@ def _likeliest(case: _Case, found: list[Stride], on_frame: Callable[[], Any]) ->
     return found[int(np.argmax(scores))]
 
 
-def _told(case: _Case, stride: Stride, log: Float64[np.ndarray, "frame pose shift pair"]) -> Told:
+def _told(
+    case: _Case,
+    stride: Stride,
+    log: Float64[np.ndarray, "frame pose shift pair"],
+    on_frame: Callable[[], Any],
+) -> Told:
     """The likeliest walk, and by how much pairs that had no say prefer it to standing."""
     time_s, every = case.time_s, np.arange(len(case.seen))
     whole, lead = log.sum(axis=3), 0.0
@@ -187,10 +203,27 @@ def _told(case: _Case, stride: Stride, log: Float64[np.ndarray, "frame pose shif
     path = walked(whole[:, 1:], _NEAR, time_s, stride.lasts_s)
     floor_m = float(case.seen[0].bounds_m[0, 2])
     spots = np.column_stack([case.way.xy, np.full(len(every), floor_m)]) + _NEAR[path.shift]
+    spots += _settled(case, stride, path, on_frame)
     alone = whole[:, 1:].max(axis=2).argmax(axis=1) / PHASES
     off = np.abs((path.phase - alone + 0.5) % 1.0 - 0.5)
     agree = float(np.mean(off <= _NEAR_PHASE))
     return Told(_joints(case, stride, path.phase, spots), lead, agree)
+
+
+def _settled(
+    case: _Case, stride: Stride, path: Path, on_frame: Callable[[], Any]
+) -> Float64[np.ndarray, "frame 3"]:
+    """How far from the places of the likeliest walk its poses are likelier still [m]."""
+    moves = np.zeros((len(case.seen), 3))
+    for frame, one in enumerate(case.seen):
+        pose = stride.poses[int(np.round(path.phase[frame] * PHASES)) % PHASES]
+        place = case.way.xy[frame], float(case.way.heading[frame])
+        shifts = _NEAR[path.shift[frame]] + _FINE
+        table = evidence_table(one, case.figure, [pose], place, shifts, (case.alpha,))
+        likely = sum(found[0, :, 0] for found in table.values())
+        moves[frame] = _FINE[int(np.argmax(likely - off_track(shifts)))]
+        on_frame()
+    return moves
 
 
 def _joints(

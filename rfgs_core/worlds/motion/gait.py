@@ -30,6 +30,12 @@ _ANKLE = (0, -4, -4, 0, 2, 4, 6, 8, 9, 10, 7, -2, -14, -17, -8, 0, 2, 3, 2, 1)
 _WALK_RATIO = 0.0060
 #: A foot bears from heel strike to here of its stride, and takes this long to begin or end.
 _TOE_OFF, _FADE = 0.60, 0.08
+#: Its sole comes down until the first of these and lies flat until the second; after the third the
+#: ankle alone lifts the heel (Perry and Burnfield: foot flat at 12 %, heel off at 31 %).
+_FLAT, _HEEL_LIFTS, _HEEL_OFF = 0.10, 0.30, 0.48
+#: Toes that bend at the ball take this share of a lifted heel's angle until they leave the floor
+#: (by the heights of an ankle over the ball and over the tip of a foot); ours is one piece.
+_TOES_BEND = 0.4
 
 
 @dataclass(frozen=True)
@@ -106,18 +112,30 @@ def set_legs(
         middle = np.radians(6.0)
         lifted = gait.knee * (0.6 + 0.4 * np.minimum(swing, 1.2))
         # Slow steps lift the knee less, but toes must still pass over the floor.
-        knee = np.radians(4.0) + going * (lifted * knee + (1 - lifted) * np.radians(8.0))
+        knee = lifted * knee + (1 - lifted) * np.radians(8.0)
+        knee = np.radians(4.0) + going * (knee - np.radians(4.0))
         hip = np.radians(4.0) + going * (middle + swing * (hip - middle) - np.radians(4.0))
         in_swing = np.exp(-0.5 * (((own % 1.0) - 0.8) / 0.07) ** 2)
         hip = hip + 0.06 * going * in_swing
+        ankle = going * (np.minimum(swing, 1.1) * ankle + 0.08 * in_swing)
+        # Angles of several sources would leave whoever bears on the tips of their toes.
+        flat, rolls = _bears_flat(own % 1.0)
+        level = flat + (1.0 - flat) * _TOES_BEND * rolls
         track.leg(
             side,
             hip + tilt,
             knee,
-            going * (np.minimum(swing, 1.1) * ankle + 0.08 * in_swing),
+            ankle + level * (knee - hip - ankle),
             -gait.adduction,
             gait.toe_out,
         )
+
+
+def _bears_flat(own: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """How far a sole lies flat, and how far it rolls over the floor, at phases of its stride."""
+    down = between(own, 0.0, _FLAT)
+    lifted = between(own, _HEEL_LIFTS, _HEEL_OFF)
+    return down * (1.0 - lifted), down * (1.0 - between(own, _TOE_OFF, _TOE_OFF + _FADE))
 
 
 def travel(track: Track, gait: Gait, phase: np.ndarray) -> np.ndarray:

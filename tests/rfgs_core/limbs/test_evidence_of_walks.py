@@ -67,6 +67,29 @@ def test_strides_start_with_the_left_foot_ahead_and_face_along_x() -> None:
         assert 0.8 < stride.lasts_s < 2.0
 
 
+def test_who_bends_the_legs_walks_lower_on_level_feet() -> None:
+    body = people().body(np.zeros(0))
+    stride = strides(body, 1.0, 1, seed=3)[0]
+    legs = [JOINTS.index(f"left_{name}") for name in ("hip", "knee", "ankle")]
+    before, after = (
+        np.array([body.joints17(pose) for pose in one.poses])
+        for one in (stride, stride.bent(body, 0.15))
+    )
+    assert 0.015 < (before[:, 0, 2] - after[:, 0, 2]).mean() < 0.05
+    lengths = [np.linalg.norm(np.diff(some[:, legs], axis=1), axis=2) for some in (before, after)]
+    np.testing.assert_allclose(*lengths, atol=1e-9)
+    # On one leg the ankle stays where it was, and everything above the legs only comes down.
+    single = [k for k in range(PHASES) if k % (PHASES // 2) in (1, 2, 3, 4)]
+    lowest = [some[single][..., 2].min(axis=1) for some in (before, after)]
+    np.testing.assert_allclose(*lowest, atol=2e-3)
+    above = [j for j, name in enumerate(JOINTS) if not name.endswith(("knee", "ankle"))]
+    fell = (before - after)[:, above]
+    np.testing.assert_allclose(fell, np.broadcast_to(fell[:, :1], fell.shape), atol=1e-9)
+    same = stride.bent(body, 0.0)
+    for one, other in zip(stride.poses, same.poses, strict=True):
+        np.testing.assert_allclose(one.turns, other.turns, atol=1e-12)
+
+
 def test_a_walk_of_another_body_is_told(heard, stride, walker_joints, monkeypatch) -> None:
     """Four frames, a third of a second apart: joints nearer than of somebody who stands."""
     # Nothing comes by way of walls here, and one stride is enough.

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -48,6 +50,45 @@ def test_a_foot_that_bears_stays_where_it_is(person: Body, speed_m_s: float) -> 
         alone = (phase > 0.14) & (phase < 0.44)
         assert speed.min(axis=1)[alone].max() < 0.5
         assert points[:-1][alone][:, :, 2].min(axis=1).max() < 0.03
+
+
+@pytest.mark.parametrize("speed_m_s", [0.6, 1.0, 1.4])
+def test_the_sole_lies_flat_in_mid_stance_and_both_feet_touch_in_double_support(
+    person: Body, speed_m_s: float
+) -> None:
+    """Perry and Burnfield, Gait Analysis (2010): foot flat from 12 % to 31 % of the stride."""
+    how = replace(gait.random_gait(np.random.default_rng(2), person, speed_m_s), limp=0.0)
+    track = walking(person, how)
+    world = track.world()
+    heads = track.heads(world)
+    phase = (track.times / how.stride_s) % 1.0
+    for side, late in (("left", 0.0), ("right", 0.5)):
+        height = soles(track, side, world, heads)[:, :, 2]
+        own = (phase + late) % 1.0
+        flat = (own > 0.13) & (own < 0.30)
+        assert height[flat].max() < 0.012
+        assert np.ptp(height[flat], axis=1).max() < 0.01
+        both = (own > 0.05) & (own < 0.10)
+        assert height[both].min(axis=1).max() < 0.025
+
+
+@pytest.mark.parametrize("speed_m_s", [0.8, 1.0, 1.3])
+def test_the_pelvis_is_lower_than_in_standing_and_lowest_in_double_support(
+    person: Body, speed_m_s: float
+) -> None:
+    """It rises and falls by 2 to 5 cm twice a stride and does not reach the height of somebody
+    who stands (Saunders, Inman and Eberhart, J. Bone Joint Surg. 35-A(3), 1953)."""
+    how = replace(gait.random_gait(np.random.default_rng(2), person, speed_m_s), limp=0.0)
+    track = walking(person, how)
+    standing = Track(person, 0.1)
+    standing.ground()
+    drop = standing.root[0, 2] - track.root[:, 2]
+    assert 0.0 < drop.min() < 0.02
+    assert 0.01 < drop.mean() < 0.05
+    assert 0.012 < np.ptp(drop) < 0.06
+    # Steps follow each other twice a stride; both feet bear until 10 % of it.
+    double = np.cos(2.0 * np.pi * (2.0 * track.times / how.stride_s - 0.1))
+    assert np.corrcoef(double, drop)[0, 1] > 0.7
 
 
 def test_curves_pass_through_what_was_read_off() -> None:

@@ -56,16 +56,16 @@ class LiveLimbs:
         ground[:, 0, :2] = tracks.axes_xy
         around = said.xyz - ground
         if self._around is None or len(self._around) != len(around):
-            self._around, self._poses = around, [None] * len(around)
+            self._poses = [None] * len(around)
         else:
             elapsed_s = max(tracks.time_s - self._time_s, 1e-3)
             share = 1.0 - np.exp(-elapsed_s / SMOOTH_S)
-            self._around = self._around + share * (around - self._around)
-        self._time_s = tracks.time_s
+            around = self._around + share * (around - self._around)
+        self._around, self._time_s = around, tracks.time_s
         weight = np.minimum((_SUREST_M / said.sigma_m) ** 2, 1.0)
         poses = [
             fit_pose(self._body, joints, one, before)
-            for joints, one, before in zip(self._around + ground, weight, self._poses, strict=True)
+            for joints, one, before in zip(around + ground, weight, self._poses, strict=True)
         ]
         self._poses = list(poses)
         posed = PosedPeople(

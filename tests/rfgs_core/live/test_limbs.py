@@ -61,6 +61,7 @@ def test_joints_are_averaged_over_windows(walker: Walker, network) -> None:
     # The same window again, at once and much later: nothing new is said.
     for later_s in (0.0, 9.0):
         limbs.on_skins(seen, replace(state.tracks, time_s=later_s))
+        assert limbs.joints is not None
         np.testing.assert_allclose(limbs.joints, first, atol=1e-6)
 
 

@@ -17,7 +17,7 @@ from typing import Any, NoReturn
 from .errors import AddonError
 from .files import refuse_pipe
 
-#: Whole numbers have no more than 64 bits, as in `rfgs_core`.
+#: Whole numbers have no more than 64 bits, as NumPy's.
 _MOST = 2**63
 _WORDS = {
     int: "a whole number",

@@ -5,13 +5,15 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import json
 import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 from blender_scenes.catalogue import scenes
+
+#: Larger descriptions are refused [bytes].
+_LARGEST_JSON = 4_000_000
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -61,10 +63,13 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _shapes(description: Path, out: Path) -> int:
+    from addon_rfgs.errors import AddonError
+    from addon_rfgs.json_file import read_json
+
     try:
-        parts = json.loads(description.read_text("utf-8"))
-    except (OSError, ValueError) as error:
-        sys.stderr.write(f"error: {description}: expected a JSON file, got: {error}\n")
+        parts = read_json(description, {str: object}, "see verification.py", _LARGEST_JSON)
+    except AddonError as error:
+        sys.stderr.write(f"error: {error}\n")
         return 2
     from blender_scenes.verification import build
 

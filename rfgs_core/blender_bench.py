@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import importlib.util
-import json
 import os
 import subprocess
 import sys
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from rfgs_core.errors import MissingToolError, RfgsError
+from rfgs_core.records import read_record
 
 #: What Blender's Python runs. The add-on needs not be installed there.
 _CODE = """
@@ -80,4 +80,4 @@ def bench_blender(
         if not out.exists():
             lines = [line for line in (done.stdout + done.stderr).splitlines() if line.strip()]
             raise RfgsError(f"Blender stopped with code {done.returncode}: {lines[-1:]}")
-        return json.loads(out.read_text())
+        return read_record(out, dict[str, float | int | str])

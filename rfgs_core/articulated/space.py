@@ -152,7 +152,8 @@ def read_shape_space(file: Path) -> ShapeSpace:
     """
     arrays = load_arrays(file, _REMEDY, _SHAPES, types=_TYPES)
     count = len(arrays["bone"])
-    weight = arrays["weight"].astype(np.float64)
+    exact = {name: values.astype(np.float64) for name, values in arrays.items()}
+    weight = exact["weight"]
     if len(arrays["mean"]) != count + len(BONES):
         raise RfgsFormatError(f"{file}: mean: expected a point for each vertex and bone; {_REMEDY}")
     for name, most in (("faces", count), ("bone", len(BONES))):
@@ -161,12 +162,11 @@ def read_shape_space(file: Path) -> ShapeSpace:
     if weight.min() < 0.0 or not weight.sum(axis=1).min() > 0.0:
         raise RfgsFormatError(f"{file}: weight: expected bones that hold each vertex; {_REMEDY}")
     spread = {
-        name: tuple(arrays[f"{name}_{part}"].astype(np.float64) for part in ("middle", "spread"))
-        for name in ("adults", "children")
+        age: (exact[f"{age}_middle"], exact[f"{age}_spread"]) for age in ("adults", "children")
     }
     return ShapeSpace(
-        arrays["mean"].astype(np.float64),
-        arrays["components"].astype(np.float64),
+        exact["mean"],
+        exact["components"],
         arrays["faces"].astype(np.int32),
         (arrays["bone"].astype(np.int64), weight / weight.sum(axis=1, keepdims=True)),
         spread,

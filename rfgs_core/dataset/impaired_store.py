@@ -189,7 +189,7 @@ def read_draw(path: Path, sizes: Mapping[str, int]) -> Impaired:
             raise RfgsFormatError(f"{path / name}: truncated or damaged ({error})") from error
     try:
         settings = impairments_from_json(msgspec.json.decode(about.impairments))
-    except (ValueError, RfgsError) as error:
+    except (ValueError, RecursionError, RfgsError) as error:
         raise RfgsFormatError(f"{path / IMPAIRED}: damaged settings ({error})") from error
     gain_db = values.pop("gain_db")
     return Impaired(settings, about.seed, Draw(**values), gain_db)

@@ -74,6 +74,9 @@ def json_of(data: bytes, state: random.Random) -> bytes:
     elif kind == 4:
         holder[key] = "\0mark\0"
         return json.dumps(value).replace('"\\u0000mark\\u0000"', state.choice(RAW)).encode()
+    elif kind in (6, 7) and str(holder[key])[:1] == "{" and isinstance(holder[key], str):
+        # JSON within JSON, as settings that an array carries.
+        holder[key] = json_of(holder[key].encode(), state).decode("utf-8", "replace")
     elif kind == 5 and isinstance(holder[key], int | float):
         holder[key] = state.choice((-1, 1e9, 0.1, -1e-9, 3)) * holder[key]
     else:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dataset_factory.make.impair import impair_dataset
 from rfgs_core.arrays import load_arrays
 from rfgs_core.dataset import open_dataset
 from rfgs_core.dataset.pictures import read_planes, write_exr
@@ -22,6 +23,7 @@ from rfgs_core.dataset.store_schema import check_store
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.gaussians.ply import read_ply
 from rfgs_core.radio.files import read_radio
+from rfgs_core.radio.impairments import IMPAIRMENT_PRESETS
 
 #: Bytes of a bomb's content, far beyond the memory that is allowed.
 BOMB_BYTES = 2**31 - 2**22
@@ -151,3 +153,14 @@ def test_channels_of_an_exr(tmp_path: Path) -> None:
     assert file.stat().st_size < 2_000_000
     with pytest.raises(RfgsFormatError, match="30 channels of 2048 x 2048 pixels are too large"):
         read_planes(file, "Z")
+
+
+def test_settings_that_are_nested_without_end(tiny_dataset: Path, tmp_path: Path) -> None:
+    data = Path(shutil.copytree(tiny_dataset, tmp_path / "data"))
+    impair_dataset(data, IMPAIRMENT_PRESETS["lab"])
+    file = data / "tiny/radio/wifi/csi.zarr/csi_impaired/zarr.json"
+    about = json.loads(file.read_text())
+    about["attributes"]["impairments"] = "[" * 20_000
+    file.write_text(json.dumps(about))
+    with pytest.raises(RfgsFormatError, match="damaged settings"):
+        open_dataset(data).sequence().impairments("wifi")

@@ -35,7 +35,12 @@ def open_dataset(path: Path | str) -> Dataset:
         )
     path = Path(path)
     file = path / "dataset.json"
-    if not file.is_file():
+    try:
+        there = file.is_file()
+    except OSError as error:
+        # Names that no file system has, as a damaged run may give.
+        raise RfgsError(f"{str(path)[:200]}: no dataset there ({error.strerror})") from error
+    if not there:
         raise RfgsError(f"{path}: no dataset there; expected a folder with dataset.json")
     info = read_dataset_info(file)
     if not info.manifest_sha256:

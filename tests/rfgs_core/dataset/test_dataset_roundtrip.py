@@ -271,3 +271,9 @@ def test_impossible_radios_are_named(tmp_path: Path, field: str, value: object) 
     assert radio_from_json(tmp_path / "sequence.json", values) == preset("wifi")
     with pytest.raises(RfgsFormatError, match=r"sequence\.json: radio 'wifi': .* is impossible"):
         radio_from_json(tmp_path / "sequence.json", {**values, field: value})
+
+
+def test_a_name_that_no_file_system_has_is_told_in_one_line() -> None:
+    with pytest.raises(RfgsError, match="no dataset there") as caught:
+        open_dataset("a" * 5000)
+    assert len(str(caught.value)) < 300

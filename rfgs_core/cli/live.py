@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
+    from rfgs_core.live.limbs import LiveLimbs
     from rfgs_core.live.replay import Replay
     from rfgs_core.live.session import Session, Sink, Tally
     from rfgs_core.live.setting import Reported, Setting
@@ -59,6 +60,9 @@ class LiveArgs:
     """How many people move."""
     gaussians: int = 400
     """Moving Gaussians."""
+    limbs: Literal["auto", "off"] = "auto"
+    """auto: where a network for the radio comes with the package (mmwave), it tells in every window
+    how people hold themselves; off: Gaussians are moved as they were drawn."""
     updates_per_s: float = 25.0
     """Windows, and updates of the Gaussians, in a second."""
     learn_s: float = 3.0
@@ -93,7 +97,8 @@ def run(args: LiveArgs) -> int:
         open_things.callback(source.close)
         sinks = open_things.enter_context(_sinks(args, source.setting))
         counts = dict(zip(source.setting.receivers, source.counts, strict=True))
-        session = Session(source, counts, config, options, sinks)
+        limbs = _limbs(args, source.setting)
+        session = Session(source, counts, config, options, sinks, limbs)
         open_things.callback(session.close)
         try:
             _follow(args, session)
@@ -102,6 +107,17 @@ def run(args: LiveArgs) -> int:
         for line in summary(source.setting, session.tally):
             sys.stdout.write(f"{line}\n")
     return 0
+
+
+def _limbs(args: LiveArgs, setting: Setting) -> LiveLimbs | None:
+    """What tells limbs; None where nothing does, or nobody asks."""
+    from rfgs_core.limbs.weights import own_network
+    from rfgs_core.live.limbs import LiveLimbs
+
+    trained = own_network(setting.freq_hz) if len(setting.freq_hz) > 1 else None
+    if trained is None or args.limbs == "off" or args.observe != "complex":
+        return None
+    return LiveLimbs(trained.network, args.gaussians)
 
 
 def summary(setting: Setting, tally: Tally) -> list[str]:

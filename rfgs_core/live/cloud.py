@@ -4,7 +4,8 @@
 A step looks for each body near where it is expected, by the matched filter; moves its Gaussians
 along; and takes conjugate-gradient steps towards the reflectivities that explain the window. What a
 body is like beside that comes from whole fits, which take seconds and run in a process of their own
-(`whole_fit`); a step takes milliseconds.
+(`whole_fit`); a step takes milliseconds. Where a network tells limbs (`limbs`), Gaussians lie on
+posed skins instead, and whole fits only say whether somebody was lost.
 """
 
 from __future__ import annotations
@@ -21,7 +22,9 @@ from rfgs_core.bodies.localise import PairMaps, locate_bodies, pair_maps
 from rfgs_core.bodies.start import StartDensity
 from rfgs_core.bodies.tracks import FASTEST_M_S, REACH_M, Tracks
 from rfgs_core.fit.frame import FrameState, solve_reflectivity, state_at
+from rfgs_core.live.limbs import LiveLimbs
 from rfgs_core.measure.observations import Observations
+from rfgs_core.model.first_gaussians import quats_from_normals
 from rfgs_core.radio import layout, place_devices, preset
 from rfgs_core.settings import Observe, TrainConfig
 
@@ -42,13 +45,15 @@ _REMEMBERED = 1024
 class Cloud:
     """The moving Gaussians of a stream."""
 
-    def __init__(self, config: TrainConfig, seed: int = 0) -> None:
+    def __init__(self, config: TrainConfig, seed: int = 0, limbs: LiveLimbs | None = None) -> None:
         """No Gaussians yet.
 
         Args:
             config: Number of Gaussians and bodies, kind of report, steps of the solver.
             seed: Seed of the draws.
+            limbs: Tells how bodies hold themselves; None: they are moved as they were drawn.
         """
+        self._limbs = limbs
         self.config = config
         self.state: FrameState | None = None
         self._rng = np.random.default_rng(seed)
@@ -66,7 +71,7 @@ class Cloud:
             self.state = self._begun(observations, maps)
         else:
             tracks = self._followed(self.state.tracks, observations, maps)
-            self.state = _moved(self.state, tracks)
+            self.state = self._carried(observations, tracks) or _moved(self.state, tracks)
         self._places.append(self.state.tracks)
         self.state = solve_reflectivity(observations, self.state, self.config)
         return self.state
@@ -84,7 +89,7 @@ class Cloud:
         apart = np.linalg.norm(fitted.tracks.axes_xy[:, None] - then.axes_xy, axis=2)
         nearest = apart.argmin(axis=1)
         self._lost |= bool((apart.min(axis=1) > LOST_M).any()) or len(set(nearest)) < len(nearest)
-        if not self._lost:
+        if not self._lost and self._limbs is None:
             shift = now.axes_xy[nearest] - fitted.tracks.axes_xy
             body = nearest_axis(_means(fitted), fitted.tracks.axes_xy)
             self.state = replace(_shifted(fitted, shift[body]), tracks=now)
@@ -92,12 +97,25 @@ class Cloud:
     def _begun(self, observations: Observations, maps: PairMaps) -> FrameState:
         """Bodies anywhere in the scene, drawn by prior and matched filter."""
         axes_xy = locate_bodies(maps, observations.bounds_m, self.config.bodies)
+        still = _resting(axes_xy, observations.time_s)
+        if self._limbs is not None:
+            skins = self._limbs.on_skins(observations, still)
+            return state_at(skins.points, skins.normals, observations, self.config, still)
         bodies = Bodies.standing(axes_xy)
         density = StartDensity.of(maps, bodies, observations.bounds_m)
         points = density.draw(self.config.num_gaussians, self._rng)
-        still = _resting(axes_xy, observations.time_s)
         normals = outward_normals(points, bodies)
         return state_at(points, normals, observations, self.config, still)
+
+    def _carried(self, observations: Observations, tracks: Tracks) -> FrameState | None:
+        """The same Gaussians on the skins of a window; None where nobody tells limbs."""
+        if self._limbs is None or self.state is None:
+            return None
+        skins, gaussians = self._limbs.on_skins(observations, tracks), self.state.gaussians
+        means = torch.from_numpy(skins.points).to(gaussians.means)
+        quats = quats_from_normals(skins.normals).to(gaussians.quats)
+        gaussians = replace(gaussians, means=means, quats=quats)
+        return replace(self.state, gaussians=gaussians, tracks=tracks)
 
     def _followed(self, before: Tracks, observations: Observations, maps: PairMaps) -> Tracks:
         """Places and velocities of the bodies in a window."""

@@ -12,6 +12,7 @@ from rfgs_core.fit.frame import FrameState
 from rfgs_core.live.background import Background
 from rfgs_core.live.cloud import Cloud
 from rfgs_core.live.counts import Counts, Times
+from rfgs_core.live.limbs import LiveLimbs
 from rfgs_core.live.setting import Source
 from rfgs_core.live.whole_fit import WholeFit
 from rfgs_core.live.windows import Windows
@@ -89,6 +90,7 @@ class Session:
         config: TrainConfig,
         options: LiveOptions,
         sinks: Sequence[Sink] = (),
+        limbs: LiveLimbs | None = None,
     ) -> None:
         """Prepares everything; nothing is taken yet.
 
@@ -98,12 +100,13 @@ class Session:
             config: Gaussians, bodies and solver of the short step.
             options: How the stream is followed.
             sinks: Who is shown every update.
+            limbs: Tells how bodies hold themselves; None: nobody does.
         """
         self._source, self._sinks, self._options = source, list(sinks), options
         step_s = 1.0 / options.updates_per_s
         self._windows = Windows(source.setting, counts, step_s, min(options.span_s, step_s))
         self._background = Background(source.setting, options.learn_s, options.memory_s)
-        self.cloud = Cloud(config, config.seed)
+        self.cloud = Cloud(config, config.seed, limbs)
         self.tally = Tally(counts, float("nan"))
         self._whole = WholeFit(config) if options.whole_fit_s > 0 else None
         self._offered_s = -float("inf")

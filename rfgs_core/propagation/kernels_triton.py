@@ -155,48 +155,71 @@ def _across(x, y, z, ux, uy, uz):
 
 
 @triton.jit
+def _plus(x, y, z, weight, ux, uy, uz):
+    """A vector and a weighted one."""
+    return x + weight * ux, y + weight * uy, z + weight * uz
+
+
+@triton.jit
 def _store_three(out, row, mask, total, x, y, z):
     tl.store(out + row, x, mask)
     tl.store(out + total + row, y, mask)
     tl.store(out + 2 * total + row, z, mask)
 
 
+@triton.jit
+def _by_echo(
+    length_m, spread, g, h, seed, chunk, chunks, columns, subcarrier,
+    ROWS: tl.constexpr, SUBCARRIERS: tl.constexpr,
+):  # fmt: skip
+    """Sums over a link's subcarriers for the gain (re, im), the weight, the length and the spread.
+
+    All but that of the weight are for a weight of 1.
+    """
+    offset = tl.arange(0, SUBCARRIERS)
+    none = tl.zeros([ROWS], tl.float32)
+    real, imaginary, by_weight, by_length, by_spread = none, none, none, none, none
+    for part in range(chunks):
+        zr, zi, k = _echo(length_m, spread, subcarrier + 2 * part, SUBCARRIERS)
+        source = seed + tl.load(chunk + 2 * part)
+        inside = offset < tl.load(chunk + 2 * part + 1)
+        u = tl.load(source + offset, inside, other=0.0)[None, :]
+        v = tl.load(source + columns + offset, inside, other=0.0)[None, :]
+        p, q = zr * u - zi * v, zr * v + zi * u
+        real += tl.sum(p, axis=1)
+        imaginary -= tl.sum(q, axis=1)
+        s, t = g[:, None] * p - h[:, None] * q, g[:, None] * q + h[:, None] * p
+        by_weight += tl.sum(s, axis=1)
+        by_length += tl.sum(k[None, :] * t, axis=1)
+        by_spread -= 0.5 * tl.sum((k * k)[None, :] * s, axis=1)
+    return real, imaginary, by_weight, by_length, by_spread
+
+
+@triton.jit
+def _by_leg(scale, by_length, ux, uy, uz, inverse, vx, vy, vz):
+    """What a Gaussian's place gets through one leg: of its length, and of its direction by `v`.
+
+    dd/dp = -u and du/dp = -(I - u u^T)/d for each antenna.
+    """
+    near = scale * inverse - by_length
+    ax, ay, az = _across(vx, vy, vz, ux, uy, uz)
+    return near * ux - ax * inverse, near * uy - ay * inverse, near * uz - az * inverse
+
+
 @triton.jit(do_not_specialize=["total", "links", "chunks", "columns", "rows_out", "per_split"])
 def scatter_backward(
-    means,
-    shape,
-    gain,
-    visibility,
-    normals,
-    ends,
-    group,
-    chunk,
-    subcarrier,
-    seed,
-    out,
-    total,
-    links,
-    chunks,
-    columns,
-    rows_out,
-    per_split,
-    sharpness,
-    FACING: tl.constexpr,
-    WEIGHED: tl.constexpr,
-    ROWS: tl.constexpr,
-    SUBCARRIERS: tl.constexpr,
-):
+    means, shape, gain, visibility, normals, ends, group, chunk, subcarrier, seed, out,
+    total, links, chunks, columns, rows_out, per_split, sharpness,
+    FACING: tl.constexpr, WEIGHED: tl.constexpr, ROWS: tl.constexpr, SUBCARRIERS: tl.constexpr,
+):  # fmt: skip
     """Writes out[split, rows_out, gaussian], given seed[link, re/im, column] = conj(dL/dH)."""
-    split = tl.program_id(1)
-    row = tl.program_id(0) * ROWS + tl.arange(0, ROWS)
+    split, row = tl.program_id(1), tl.program_id(0) * ROWS + tl.arange(0, ROWS)
     mask = row < total
-    offset = tl.arange(0, SUBCARRIERS)
     px, py, pz = _three(means, row, mask, total, _FAR_M)
     g, h = tl.load(gain + row, mask, other=0.0), tl.load(gain + total + row, mask, other=0.0)
     none = tl.zeros([ROWS], tl.float32)
-    gx, gy, gz, by_gain_r, by_gain_i = none, none, none, none, none
-    gxx, gyy, gzz, gxy, gxz, gyz = none, none, none, none, none, none
-    normal_x, normal_y, normal_z, nx, ny, nz = none, none, none, none, none, none
+    gx, gy, gz, gxx, gyy, gzz, gxy, gxz, gyz = (none,) * 9
+    by_gain_r, by_gain_i, normal_x, normal_y, normal_z, nx, ny, nz = (none,) * 8
     if FACING:
         nx, ny, nz = _three(normals, row, mask, total, 0.0)
     base = out + (split * rows_out).to(tl.int64) * total
@@ -213,50 +236,30 @@ def scatter_backward(
         weight = seen
         if WEIGHED:
             weight *= tl.load(visibility + tl.load(group + link) * total + row, mask, other=0.0)
-        by_weight, by_length, by_spread = none, none, none
-        for part in range(chunks):
-            zr, zi, k = _echo(d_t + d_r, spread, subcarrier + 2 * part, SUBCARRIERS)
-            source = seed + 2 * link * columns + tl.load(chunk + 2 * part)
-            inside = offset < tl.load(chunk + 2 * part + 1)
-            u = tl.load(source + offset, inside, other=0.0)[None, :]
-            v = tl.load(source + columns + offset, inside, other=0.0)[None, :]
-            p, q = zr * u - zi * v, zr * v + zi * u
-            by_gain_r += weight * tl.sum(p, axis=1)
-            by_gain_i -= weight * tl.sum(q, axis=1)
-            s, t = g[:, None] * p - h[:, None] * q, g[:, None] * q + h[:, None] * p
-            by_weight += tl.sum(s, axis=1)
-            by_length += weight * tl.sum(k[None, :] * t, axis=1)
-            by_spread -= 0.5 * weight * tl.sum((k * k)[None, :] * s, axis=1)
-        # dd/dp = -u and du/dp = -(I - u u^T)/d for each antenna.
+        real, imaginary, by_weight, by_length, by_spread = _by_echo(
+            d_t + d_r, spread, g, h, seed + 2 * link * columns, chunk, chunks, columns, subcarrier,
+            ROWS, SUBCARRIERS,
+        )  # fmt: skip
+        by_gain_r, by_gain_i = by_gain_r + weight * real, by_gain_i + weight * imaginary
+        by_length, by_spread, scale = weight * by_length, weight * by_spread, weight * by_weight
         twice = 2.0 * by_spread
-        gxx += by_spread * qx * qx
-        gyy += by_spread * qy * qy
-        gzz += by_spread * qz * qz
-        gxy += twice * qx * qy
-        gxz += twice * qx * qz
-        gyz += twice * qy * qz
-        x1, y1, z1 = _across(twice * sx, twice * sy, twice * sz, tx, ty, tz)
-        x2, y2, z2 = _across(twice * sx, twice * sy, twice * sz, rx, ry, rz)
-        scale = by_weight * weight
-        near_t, near_r = scale * by_t - by_length, scale * by_r - by_length
-        gx += near_t * tx + near_r * rx - x1 * by_t - x2 * by_r
-        gy += near_t * ty + near_r * ry - y1 * by_t - y2 * by_r
-        gz += near_t * tz + near_r * rz - z1 * by_t - z2 * by_r
+        gxx, gyy, gzz = _plus(gxx, gyy, gzz, by_spread, qx * qx, qy * qy, qz * qz)
+        gxy, gxz, gyz = _plus(gxy, gxz, gyz, twice, qx * qy, qx * qz, qy * qz)
+        vtx, vty, vtz = twice * sx, twice * sy, twice * sz
+        vrx, vry, vrz = vtx, vty, vtz  # What the directions of both legs get.
         if FACING:
             facing_t, facing_r = sharpness * scale * hide_t, sharpness * scale * hide_r
-            normal_x += facing_t * tx + facing_r * rx
-            normal_y += facing_t * ty + facing_r * ry
-            normal_z += facing_t * tz + facing_r * rz
-            x1, y1, z1 = _across(nx, ny, nz, tx, ty, tz)
-            x2, y2, z2 = _across(nx, ny, nz, rx, ry, rz)
-            facing_t, facing_r = facing_t * by_t, facing_r * by_r
-            gx -= facing_t * x1 + facing_r * x2
-            gy -= facing_t * y1 + facing_r * y2
-            gz -= facing_t * z1 + facing_r * z2
+            normal_x, normal_y, normal_z = _plus(normal_x, normal_y, normal_z, facing_t, tx, ty, tz)
+            normal_x, normal_y, normal_z = _plus(normal_x, normal_y, normal_z, facing_r, rx, ry, rz)
+            vtx, vty, vtz = _plus(vtx, vty, vtz, facing_t, nx, ny, nz)
+            vrx, vry, vrz = _plus(vrx, vry, vrz, facing_r, nx, ny, nz)
+        x1, y1, z1 = _by_leg(scale, by_length, tx, ty, tz, by_t, vtx, vty, vtz)
+        x2, y2, z2 = _by_leg(scale, by_length, rx, ry, rz, by_r, vrx, vry, vrz)
+        gx, gy, gz = gx + x1 + x2, gy + y1 + y2, gz + z1 + z2
         if WEIGHED:
             # Nobody else adds here; atomic, since a warp must see what another one has stored.
-            target = base + (_GROUP + tl.load(group + link)) * total + row
-            tl.atomic_add(target, by_weight * seen, mask)
+            own = (_GROUP + tl.load(group + link)) * total + row
+            tl.atomic_add(base + own, by_weight * seen, mask)
     _store_three(base, row, mask, total, gx, gy, gz)
     _store_three(base + _SHAPE * total, row, mask, total, gxx, gyy, gzz)
     _store_three(base + (_SHAPE + 3) * total, row, mask, total, gxy, gxz, gyz)

@@ -80,3 +80,48 @@ def test_nodes_follow_the_delay_of_the_slowest_slab_that_is_open(small_radio: Ra
     nodes = node_frequencies(small_radio, thick)
     turn_rad = 2.0 * np.pi * np.diff(nodes).max() * thick
     assert turn_rad <= 0.28 + 1e-9
+
+
+def test_walls_at_another_frequency_are_those_that_sionna_traces_there(
+    person_bundle: Bundle,
+    small_radio: Radio,
+    two_devices: list[DevicePose],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Sionna RT itself, asked for the same paths at another carrier, shares nothing of ours."""
+    import sionna.rt as rt
+
+    from dataset_factory.trace import Tracer
+    from dataset_factory.trace.rays.scene import set_frequency
+
+    # The body absorbs at every frequency; Sionna asks its material for a table that it has not.
+    monkeypatch.setattr(
+        rt.AbsorberRadioMaterial, "frequency_update", lambda self: None, raising=False
+    )
+    tracer = Tracer(person_bundle, small_radio, two_devices, depth=2)
+    body = tracer._bodies.points(person_bundle.frame(person_bundle.frames[0]).vertices)
+    other_hz = 1.06 * small_radio.centre_hz
+    at = {}
+    for freq_hz in (small_radio.centre_hz, other_hz):
+        set_frequency(tracer._bodies.scene, freq_hz)
+        at[freq_hz] = tracer._bounces.paths(body, tracer._environment.around)
+    rows = [
+        [
+            tuple(row)
+            for row in np.column_stack(
+                [paths.tx, paths.rx, paths.kinds, paths.objects, paths.primitives]
+            )
+        ]
+        for paths in at.values()
+    ]
+    places = {row: place for place, row in enumerate(rows[0])}
+    assert len(places) == len(rows[0])
+    both = np.array([(places[row], i) for i, row in enumerate(rows[1]) if row in places])
+    assert len(both) > 0.9 * max(map(len, rows)) > 100
+    carrier, traced = at[small_radio.centre_hz].select(both[:, 0]), at[other_hz].select(both[:, 1])
+    # Amplitudes of Sionna carry λ once; that and the facets are not the walls' to answer for.
+    wanted = traced.amplitude[:, 0, 0] * other_hz / small_radio.centre_hz
+    found = tracer._walls.over_band(carrier, np.array([other_hz])).amplitude[:, 0, 0]
+    power = np.sum(np.abs(wanted) ** 2)
+    assert np.sum(np.abs(found - wanted) ** 2) < 1e-6 * power
+    assert np.sum(np.abs(carrier.amplitude[:, 0, 0] - wanted) ** 2) > 1e-4 * power

@@ -127,7 +127,7 @@ def read_json(path: Path, *, links_known: bool = False) -> Any:
     if not links_known:
         refuse_link(path)
     try:
-        with open(path, "rb") as stream:
+        with open(path, "rb", buffering=0) as stream:
             if os.fstat(stream.fileno()).st_size > LARGEST_JSON_BYTES:
                 raise RfgsFormatError(f"{path}: larger than any JSON file of ours; expected JSON")
             return msgspec.json.decode(stream.read())

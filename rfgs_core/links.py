@@ -112,14 +112,16 @@ def strange_entries(folder: Path | str, without: Collection[str] = ()) -> Iterat
         folder: Where to look; no link is followed.
         without: Names of folders in it that are not looked into.
     """
-    with os.scandir(folder) as entries:
-        rows = sorted(entries, key=lambda entry: entry.name)
-    for entry in rows:
-        if entry.is_dir(follow_symlinks=False):
-            if entry.name not in without:
-                yield from strange_entries(entry.path)
-        elif not entry.is_file(follow_symlinks=False):
-            yield Path(entry.path)
+    left, first = [os.fspath(folder)], True
+    while left:
+        with os.scandir(left.pop()) as entries:
+            for entry in entries:
+                if entry.is_dir(follow_symlinks=False):
+                    if not first or entry.name not in without:
+                        left.append(entry.path)
+                elif not entry.is_file(follow_symlinks=False):
+                    yield Path(entry.path)
+        first = False
 
 
 def described(entry: Path) -> str:

@@ -68,7 +68,7 @@ def validate(path: Path) -> list[str]:
 
 
 def _link_faults(path: Path) -> Iterator[str]:
-    for entry in strange_entries(path):
+    for entry in sorted(strange_entries(path)):
         yield f"{entry}: {described(entry)}; expected files and folders"
 
 

@@ -18,10 +18,12 @@ from typing import Any
 import msgspec
 
 from rfgs_core.errors import RfgsError, RfgsFormatError
-from rfgs_core.links import refuse_link
+from rfgs_core.links import refuse_link, stands_at
 
 #: Objects of Python take some thirty times the bytes that the file has.
 LARGEST_JSON_BYTES = 2**25
+#: Opens to read and does not wait, where the system knows of that.
+_READ_AT_ONCE = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0)
 
 
 @contextmanager
@@ -113,6 +115,27 @@ def write_json(path: Path, value: Any) -> None:
     write_text(path, json.dumps(value, indent=1, sort_keys=True, allow_nan=False) + "\n")
 
 
+def _content(path: Path, links_known: bool) -> bytes:
+    """What is in a file of at most `LARGEST_JSON_BYTES`, reached without forbidden links."""
+    try:
+        # Whoever opens a pipe like this does not wait for somebody who writes.
+        place = os.open(path, _READ_AT_ONCE)
+    except OSError:
+        refuse_link(path)
+        raise
+    try:
+        if not (links_known or stands_at(place, path)):
+            refuse_link(path)
+        if (size := os.fstat(place).st_size) > LARGEST_JSON_BYTES:
+            raise RfgsFormatError(f"{path}: larger than any JSON file of ours; expected JSON")
+        content = os.read(place, size)
+        while len(content) < size and (more := os.read(place, size - len(content))):
+            content += more
+        return content
+    finally:
+        os.close(place)
+
+
 def read_json(path: Path, *, links_known: bool = False) -> Any:
     """Reads a JSON file.
 
@@ -124,13 +147,8 @@ def read_json(path: Path, *, links_known: bool = False) -> Any:
         RfgsError: The file does not exist.
         RfgsFormatError: The file is not JSON, which knows no NaN and no infinity.
     """
-    if not links_known:
-        refuse_link(path)
     try:
-        with open(path, "rb", buffering=0) as stream:
-            if os.fstat(stream.fileno()).st_size > LARGEST_JSON_BYTES:
-                raise RfgsFormatError(f"{path}: larger than any JSON file of ours; expected JSON")
-            return msgspec.json.decode(stream.read())
+        return msgspec.json.decode(_content(path, links_known))
     except FileNotFoundError as error:
         raise RfgsError(f"{path}: no such file") from error
     except RfgsFormatError:

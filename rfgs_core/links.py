@@ -96,13 +96,26 @@ def _is_plain(spelt: str) -> bool:
     except (AttributeError, OSError, ValueError):
         return False
     try:
-        kind = os.fstat(place).st_mode
-        plain = stat.S_ISREG(kind) or stat.S_ISDIR(kind)
-        return plain and os.readlink(f"/proc/self/fd/{place}") == spelt
-    except OSError:
-        return False
+        return stands_at(place, spelt)
     finally:
         os.close(place)
+
+
+def stands_at(place: int, path: Path | str) -> bool:
+    """Whether an open file or folder is the one of this path, and no link is on the way there.
+
+    Where the system cannot be asked, the answer is no; `refuse_link` then looks itself.
+
+    Args:
+        place: Descriptor of what is open.
+        path: By which it was opened.
+    """
+    try:
+        kind = os.fstat(place).st_mode
+        plain = stat.S_ISREG(kind) or stat.S_ISDIR(kind)
+        return plain and os.readlink(f"/proc/self/fd/{place}") == os.path.abspath(path)
+    except OSError:
+        return False
 
 
 def strange_entries(folder: Path | str, without: Collection[str] = ()) -> Iterator[Path]:

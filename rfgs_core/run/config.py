@@ -68,9 +68,16 @@ class RunConfig:
             RfgsFormatError: It is of another version, or damaged.
         """
         path = run / CONFIG_FILE
-        if not path.exists():
-            raise RfgsError(f"{run} is not a run: it has no {CONFIG_FILE}; `rfgs train` makes one")
-        stored = record(path, read_json(path), dict[str, Any])
+        try:
+            stored = read_json(path)
+        except RfgsFormatError:
+            raise
+        except RfgsError as error:
+            raise RfgsError(
+                f"{run} is not a run: it has no {CONFIG_FILE}; `rfgs train` makes one"
+            ) from error
+        if not isinstance(stored, dict):
+            stored = record(path, stored, dict[str, Any])
         if stored.get("schema") != SCHEMA:
             raise RfgsFormatError(
                 f"{path}: expected schema {SCHEMA}, found {stored.get('schema')}; "
@@ -98,6 +105,8 @@ _REMEDY = "train again"
 _OWN = tuple(field.name for field in fields(RunConfig) if field.name not in ("settings", "train_s"))
 _SETTINGS = tuple(field.name for field in fields(TrainConfig) if field.name not in _NOT_KEPT)
 
+_KNOWN = frozenset((*_OWN, *_SETTINGS))
+
 
 def _need_entries(path: Path, stored: dict[str, Any]) -> None:
     """Refuses entries that are missing or unknown.
@@ -105,8 +114,7 @@ def _need_entries(path: Path, stored: dict[str, Any]) -> None:
     Raises:
         RfgsFormatError: There are such; they are named.
     """
-    known = {*_OWN, *_SETTINGS}
-    missing, unknown = known - stored.keys(), stored.keys() - known - {"schema", "train_s"}
+    missing, unknown = _KNOWN - stored.keys(), stored.keys() - _KNOWN - {"schema", "train_s"}
     if missing or unknown:
         parts = (("missing", sorted(missing)), ("unknown", sorted(unknown)))
         found = "; ".join(f"{', '.join(names)} {word}" for word, names in parts if names)

@@ -191,7 +191,7 @@ def _by_echo(
         s, t = g[:, None] * p - h[:, None] * q, g[:, None] * q + h[:, None] * p
         by_weight += tl.sum(s, axis=1)
         by_length += tl.sum(k[None, :] * t, axis=1)
-        by_spread -= 0.5 * tl.sum((k * k)[None, :] * s, axis=1)
+        by_spread -= tl.sum((0.5 * k * k)[None, :] * s, axis=1)
     return real, imaginary, by_weight, by_length, by_spread
 
 

@@ -20,6 +20,11 @@ def add_import(parser: Any) -> None:
     """Options of `import` beside the settings of the panels."""
     parser.add_argument("--out", type=Path, help=".blend to save")
     parser.add_argument("--picture", type=Path, help="PNG to render")
+    parser.add_argument(
+        "--frame",
+        type=int,
+        help="frame of the picture, at which the .blend opens too (default: in the middle)",
+    )
     parser.add_argument("--camera", help="camera object for the picture (default: a chosen view)")
     parser.add_argument(
         "--resolution", type=int, default=480, help="longer side of each half (480)"
@@ -57,5 +62,6 @@ def import_(options: argparse.Namespace) -> str:
         settings.inspection(),
         blend=options.out,
         picture=picture if options.picture else None,
+        frame=options.frame,
         compare=options.compare,
     )

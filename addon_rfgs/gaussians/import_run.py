@@ -51,11 +51,15 @@ def import_run(
     blend: Path | None = None,
     picture: Picture | None = None,
     compare: bool = False,
+    frame: int | None = None,
 ) -> str:
     """Imports, compares, saves and renders; returns one line about it.
 
+    The file opens at, and the picture is of, `frame`, by default the one in the middle.
+
     Raises:
-        AddonError: Nothing to import, nothing to write, or an unknown camera.
+        AddonError: Nothing to import, nothing to write, an unknown camera, or a frame without
+            Gaussians.
     """
     if blend is None and picture is None:
         raise AddonError("import: give --out FILE.blend, --picture FILE.png or both")
@@ -65,6 +69,11 @@ def import_run(
             f"{', '.join(sorted(cameras_of(scene))) or 'none'}"
         )
     imported = import_gaussians(scene, path, wanted)
+    if frame is not None and frame not in imported.frames:
+        raise AddonError(
+            f"--frame {frame}: expected a frame with Gaussians: "
+            f"{', '.join(map(str, imported.frames)) or 'these have none'}"
+        )
     done = [f"imported {imported.count} Gaussians in {len(imported.objects)} clouds"]
     if compare:
         found = compare_with_mesh(scene, imported.objects, wanted.display, every_frame=True)
@@ -72,7 +81,8 @@ def import_run(
         keep_result(scene, found)
         done.append(found.sentence())
     if imported.frames:
-        scene.frame_set(imported.frames[len(imported.frames) // 2])
+        middle = imported.frames[len(imported.frames) // 2]
+        scene.frame_set(middle if frame is None else frame)
     if picture is not None:
         camera = render_picture(scene, imported, wanted.display, picture)
         done.append(f"wrote {picture.path} (camera {camera}, frame {scene.frame_current})")

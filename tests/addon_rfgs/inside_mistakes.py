@@ -259,6 +259,7 @@ def test_places_that_cannot_be_written_get_one_line(
         (("export", "--out", "{tmp}/b", "--cameras", "9"), "cameras"),
         (("import", "{tmp}/nothing", "--out", "{tmp}/x.blend"), "no such run"),
         (("import", "{tmp}", "--picture", "{tmp}/x.png", "--camera", "nope"), "no camera 'nope'"),
+        (("import", "{run}", "--out", "{tmp}/x.blend", "--frame", "2"), "with Gaussians: 1, 3"),
         (("import", "{tmp}", "--out", "{tmp}/x.blend", "--crop-box", "crate"), "an Empty"),
         (("import", "{tmp}", "--out", "{tmp}/x.blend", "--opacity-threshold", "2"), "opacity"),
         (("export-gaussians", "{tmp}/x.ply"), "no imported Gaussians"),
@@ -271,11 +272,12 @@ def test_senseless_commands_get_one_line_and_exit_code_2(
     arguments: tuple[str, ...],
     words: str,
 ) -> None:
-    filled = [argument.format(tmp=tmp_path) for argument in arguments]
+    run_folder = write_run(tmp_path / "run", (1, 3))
+    filled = [argument.format(tmp=tmp_path, run=run_folder) for argument in arguments]
     assert run(filled, blend=library) == 2
     lines = capfd.readouterr().err.strip().splitlines()
     assert len(lines) == 1 and lines[0].startswith("error: ") and words in lines[0], lines
-    assert os.listdir(tmp_path) == [library.name], "nothing was written"
+    assert sorted(os.listdir(tmp_path)) == [library.name, "run"], "nothing was written"
 
 
 def test_windows_is_told_before_anything_is_written(

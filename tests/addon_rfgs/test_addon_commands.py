@@ -206,10 +206,10 @@ def test_import_saves_a_file_that_shows_each_frame_without_the_add_on(
     write_run(tmp_path / "run", (1, 3, 4))
     blend, picture = tmp_path / "inspect.blend", tmp_path / "picture.png"
     shapes = ("--mode", "ellipsoids", "--no-solid-view")
-    arguments = ("--out", blend, "--picture", picture, "--resolution", "64", *shapes)
-    done = addon(scenes / "room.blend", "import", tmp_path / "run", *arguments)
+    arguments = ("--out", blend, "--picture", picture, "--resolution", "64", "--frame", "4")
+    done = addon(scenes / "room.blend", "import", tmp_path / "run", *arguments, *shapes)
     assert done.returncode == 0, done.stderr
-    assert len(done.stdout.splitlines()) == 1
+    assert len(done.stdout.splitlines()) == 1 and "frame 4)" in done.stdout
     seen = json.loads(python("-c", _LOOK, blend).stdout.splitlines()[-1])
     now = {"1": "000001", "2": "000001", "3": "000003", "4": "000004", "5": "000004"}
     for frame, name in now.items():

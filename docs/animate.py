@@ -1,17 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
 r"""The moving picture of the README: the true person, and beside it a run's Gaussians.
 
-After `make demo`, this made docs/person.webp in a few seconds:
+After `make demo`, these made docs/person.webp, some minutes in Blender:
 
-    python docs/animate.py demo/run-wifi --camera cam04 --out docs/person.webp
+    for f in $(seq 10 5 45); do
+        python -m addon_rfgs --blend blender_scenes/living_room_walk.blend import demo/run-wifi \
+            --frame $f --camera cam_03 --resolution 400 --picture shots/$f.png
+    done
+    python docs/animate.py demo/run-wifi --pictures shots --out docs/person.webp
 
-The Gaussians are drawn over the picture of the empty room. Their places come from radio alone;
-their colours were fitted to pictures afterwards, for display.
+Without `--pictures` the Gaussians are drawn as splats over the picture of the empty room, from a
+camera of the dataset, in seconds. Their places come from radio alone; their colours were fitted to
+pictures afterwards, for display.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -30,37 +37,53 @@ ZOOM = 2
 WORDS = {"wifi": "Wi-Fi", "mmwave": "60 GHz radar", "uwb": "ultra-wide band"}
 
 
-def picture(run: Run, camera: str, frame: int) -> Image.Image:
-    """One frame, the true picture at the left."""
+def splats(run: Run, camera: str, frame: int) -> Image.Image:
+    """The true picture of a frame, and Gaussians over the empty room."""
     true = run.sequence.image(camera, frame)[..., :3]
     fitted = to_bytes(render_view(run, camera_of(run.sequence, camera), frame).rgb)
     image = Image.fromarray(side_by_side(np.ascontiguousarray(true), fitted))
-    image = image.resize((ZOOM * image.width, ZOOM * image.height), Image.Resampling.LANCZOS)
-    radio = run.config.radio
-    draw, font = ImageDraw.Draw(image), ImageFont.load_default(10 * ZOOM)
-    right = image.width - ZOOM * fitted.shape[1]
-    for left, text in ((0, "true person"), (right, f"from {WORDS.get(radio, radio)}")):
-        where = (left + 6 * ZOOM, 4 * ZOOM)
+    return image.resize((ZOOM * image.width, ZOOM * image.height), Image.Resampling.LANCZOS)
+
+
+def shot(folder: Path, frame: int) -> Image.Image:
+    """The picture of a frame that the command `import` of the add-on wrote.
+
+    Raises:
+        RfgsError: There is none.
+    """
+    path = folder / f"{frame}.png"
+    if not path.is_file():
+        raise RfgsError(f"{path}: no such picture; `import RUN --frame {frame}` writes one")
+    with Image.open(path) as image:
+        return image.convert("RGB")
+
+
+def named(image: Image.Image, radio: str) -> Image.Image:
+    """Says what its two halves are."""
+    size = max(image.height // 24, 10)
+    draw, font = ImageDraw.Draw(image), ImageFont.load_default(size)
+    for left, text in ((0, "true person"), (image.width // 2, f"from {WORDS.get(radio, radio)}")):
+        where = (left + size // 2, size // 3)
         draw.text(where, text, fill="white", stroke_width=1, stroke_fill="black", font=font)
     return image
 
 
-def animate(run: Run, camera: str, out: Path, pace: float) -> None:
+def animate(run: Run, drawn: Callable[[int], Image.Image], out: Path, pace: float) -> None:
     """Writes all frames of a run as one moving picture.
 
     Args:
         run: A trained run.
-        camera: Name of one of the dataset's cameras.
+        drawn: Makes the picture of a frame, truth at the left.
         out: The .webp or .gif to write.
         pace: Speed beside that of the scene.
 
     Raises:
-        RfgsError: The run is not finished.
+        RfgsError: The run is not finished, or a picture is missing.
     """
     run.need_frames()
     times_s = [run.sequence.time_s(frame) for frame in run.frames]
     step_ms = 1000.0 * (times_s[-1] - times_s[0]) / max(len(times_s) - 1, 1) / pace
-    pictures = [picture(run, camera, frame) for frame in run.frames]
+    pictures = [named(drawn(frame), run.config.radio) for frame in run.frames]
     with replacing(out) as file:
         pictures[0].save(
             file,
@@ -80,13 +103,18 @@ if __name__ == "__main__":
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("run", type=Path, help="folder of a run")
-    parser.add_argument("--camera", help="name of a camera; default: the first")
+    parser.add_argument("--camera", help="camera of the dataset for splats; default: the first")
+    parser.add_argument("--pictures", type=Path, help="folder of pictures by frame, as 10.png")
     parser.add_argument("--pace", type=float, default=1.0, help="speed beside the scene's")
     parser.add_argument("--out", type=Path, default=Path("person.webp"), help="picture to write")
     args = parser.parse_args()
     try:
         trained = open_run(args.run)
-        name = args.camera or trained.sequence.cameras[0]["name"]
-        animate(trained, name, args.out, args.pace)
+        if args.pictures:
+            source = partial(shot, args.pictures)
+        else:
+            name = args.camera or trained.sequence.cameras[0]["name"]
+            source = partial(splats, trained, name)
+        animate(trained, source, args.out, args.pace)
     except RfgsError as error:
         parser.exit(2, f"error: {error}\n")

@@ -268,7 +268,7 @@ def test_a_job_waits_for_no_pipe(jobs, tmp_path: Path, program, name: str) -> No
     os.mkfifo(place)
     with pytest.raises(AddonError, match="expected a file"):
         jobs.add(plan(tmp_path, "a"), program("quick"))
-    with pytest.raises(AddonError, match="expected a file"):
+    with pytest.raises(AddonError, match="expected a file" if ".json" in name else "No such file"):
         read_record(record_file(plan(tmp_path, "a")))
     assert read_log(log_file(plan(tmp_path, "a"))) == (None, [])
 

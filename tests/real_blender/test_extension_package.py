@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
+import tomllib
 import zipfile
 from pathlib import Path
 
@@ -45,9 +47,14 @@ def test_add_on_imports_only_itself_numpy_and_the_standard_library() -> None:
                 assert str(node.module).split(".")[0] in allowed, path
 
 
+#: The one place that opens a connection: to this machine alone.
+FEED = ROOT / "addon_rfgs" / "live" / "feed.py"
+
+
 def test_add_on_reaches_for_no_network_shell_or_pickle() -> None:
-    banned = {"socket", "ssl", "http", "urllib", "ftplib", "smtplib", "xmlrpc", "pickle", "shelve"}
+    everywhere = {"ssl", "http", "urllib", "ftplib", "smtplib", "xmlrpc", "pickle", "shelve"}
     for path in (ROOT / "addon_rfgs").rglob("*.py"):
+        banned = everywhere if path == FEED else everywhere | {"socket"}
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
             if isinstance(node, ast.Import):
                 assert not {alias.name.split(".")[0] for alias in node.names} & banned, path
@@ -57,6 +64,21 @@ def test_add_on_reaches_for_no_network_shell_or_pickle() -> None:
                 assert not any(row.arg in {"shell", "allow_pickle"} for row in node.keywords), path
                 name = ast.unparse(node.func)
                 assert name not in {"eval", "exec", "os.system", "os.popen", "compile"}, path
+
+
+def test_the_live_feed_is_of_this_machine_alone_and_declared() -> None:
+    text = FEED.read_text("utf-8")
+    opened = [
+        node
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.Call)
+        and re.search(r"connect|bind|socket\.socket|addrinfo", ast.unparse(node.func))
+    ]
+    reached = [ast.unparse(node.args[0]) for node in opened if node.args]
+    assert reached and all(place.startswith("(_LOOPBACK, ") for place in reached), reached
+    assert '_LOOPBACK = "127.0.0.1"' in text
+    manifest = tomllib.loads((ROOT / "addon_rfgs" / "blender_manifest.toml").read_text("utf-8"))
+    assert "this machine" in manifest["permissions"]["network"]
 
 
 @pytest.mark.blender

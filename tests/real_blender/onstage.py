@@ -25,6 +25,8 @@ import bpy
 EXTENSION = "bl_ext.user_default.addon_rfgs"
 #: Pixels between the places where a button is looked for; buttons are 20 high.
 _SEARCH_PX = 13
+#: How far above where a button was found the row above it is: rows are 26 apart.
+_UP_PX = 22
 #: How far below a button the first item of its menu lies.
 _MENU_PX = 30
 
@@ -114,15 +116,16 @@ class Stage:
             self.window.event_simulate(type="LEFTMOUSE", value=value, x=found[0], y=found[1])
             yield 0.2
 
-    def choose_first(self, beside: str) -> Iterator[float]:
-        """Clicks the menu at the left of an operator's button, and then its first item.
+    def choose_first(self, above: str) -> Iterator[float]:
+        """Clicks the menu in the row above an operator's button, and then its first item.
 
         Blender tells operators below the pointer, but no menus of operators.
         """
-        found = yield from self._find(beside)
+        found = yield from self._find(above)
         if found is None:
-            raise LookupError(f"no button of {beside} in the sidebar")
-        x, y = self.sidebar.x + self.sidebar.width // 5, found[1]
+            raise LookupError(f"no button of {above} in the sidebar")
+        # Buttons are found from above, by their upper edge.
+        x, y = self.sidebar.x + self.sidebar.width // 5, found[1] + _UP_PX
         for down in (0, _MENU_PX):
             for kind, value in (
                 ("MOUSEMOVE", "NOTHING"),

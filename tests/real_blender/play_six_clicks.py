@@ -20,7 +20,7 @@ def play(stage: Any) -> Iterator[float]:
     stored.python, stored.blender = stage.arguments
     steps = ("devices", "check", "generate", "train", "jobs", "gaussians")
     yield from stage.open_tab(*(f"RFGS_PT_{name}" for name in steps))
-    yield from stage.choose_first(beside="rfgs.import_devices")
+    yield from stage.choose_first(above="rfgs.import_devices")
     placed = sorted(item.rfgs.radio for item in bpy.data.objects if item.rfgs.role != "NONE")
     yield from stage.shoot("placed")
 

@@ -1,25 +1,36 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Played inside Blender: every operator that changes the file is undone and done again.
 
-Arguments: folder with `cloud.ply`, `dataset/` and `run/`. The file is the small room of
+Arguments: folder with `cloud.ply`, `dataset/`, `run/`, the captures `a.csi` and `b.csi` and their
+layout `radios.yaml`; Python program of the environment. The file is the small room of
 `build_scenes.py`.
 """
 
 from __future__ import annotations
 
 import json
+import socket
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import bpy
+import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 
 #: Operators whose undo and redo another script plays, as they need the environment outside.
 ELSEWHERE = {"show_csi": "play_channels.py"}
+
+#: Two receivers, as the panel asks for them.
+CAPTURE = {
+    "captures": "{folder}/a.csi, {folder}/b.csi",
+    "layout": "{folder}/radios.yaml",
+    "dataset": "{folder}/captured",
+}
 
 
 @dataclass
@@ -115,6 +126,8 @@ def steps() -> list[Step]:
         Step("remove_data"),
         Step("import_ply", {"filepath": "{folder}/cloud.ply"}),
         Step("import_devices", {"directory": "{folder}/dataset"}),
+        Step("import_capture", CAPTURE, name_environment),
+        Step("follow_live", {"updates": 1}, send_an_update),
     ]
 
 
@@ -129,6 +142,26 @@ def differing(_stage: Any, _folder: Path) -> None:
 
 def activate_crate(_stage: Any, _folder: Path) -> None:
     bpy.context.view_layer.objects.active = item("crate")
+
+
+def name_environment(stage: Any, _folder: Path) -> None:
+    stage.part("jobs.preferences").preferences().python = stage.arguments[1]
+
+
+def send_an_update(stage: Any, _folder: Path) -> None:
+    """Four Gaussians for whoever connects, once."""
+    columns = list(stage.part("live.feed").NEEDED)
+    data = np.full((4, len(columns)), 0.5, "<f4").tobytes()
+    head = {"rfgs": 1, "time_s": 0.0, "count": 4, "columns": columns, "bytes": len(data)}
+    server = socket.create_server(("127.0.0.1", 0))
+    bpy.context.scene.rfgs.live.port = server.getsockname()[1]
+
+    def answer() -> None:
+        with server, server.accept()[0] as reader:
+            reader.sendall(json.dumps(head).encode() + b"\n" + data)
+            reader.recv(1)  # Until the reader goes.
+
+    threading.Thread(target=answer, daemon=True).start()
 
 
 def find_something(_stage: Any, _folder: Path) -> None:

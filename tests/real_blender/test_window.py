@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from capture_files import write_captures
 from leaving_nothing import write_material
 from PIL import Image
 from window import play
@@ -53,10 +54,14 @@ def room_blend(python, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "room.blend"
 
 
-def test_every_change_can_be_undone(blender, room_blend: Path, tmp_path: Path) -> None:
+def test_every_change_can_be_undone(
+    blender, programs: tuple[Path, Path], room_blend: Path, tmp_path: Path
+) -> None:
     write_material(tmp_path)
     write_run(tmp_path / "run", (1, 3))
-    done = play(blender, HERE / "play_undo.py", room_blend, tmp_path, tmp_path, timeout=600)
+    write_captures(tmp_path)
+    script = HERE / "play_undo.py"
+    done = play(blender, script, room_blend, tmp_path, tmp_path, programs[0], timeout=600)
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
     told = json.loads((tmp_path / "undo.json").read_text())
     assert told["operators"] == told["undoable"], "every operator that undo knows was walked"

@@ -95,9 +95,10 @@ def run(args: LiveArgs) -> int:
         warm_up(config)
         source = _source(args)
         open_things.callback(source.close)
+        limbs = _limbs(args, source.setting)
+        # Whoever reads that updates are sent may stop the command from then on.
         sinks = open_things.enter_context(_sinks(args, source.setting))
         counts = dict(zip(source.setting.receivers, source.counts, strict=True))
-        limbs = _limbs(args, source.setting)
         session = Session(source, counts, config, options, sinks, limbs)
         open_things.callback(session.close)
         try:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -122,13 +121,13 @@ def recorded_captures(files: Sequence[Path], given: CaptureLayout, reported: Rep
 
 
 class Replay:
-    """A recording from the moment it is made on.
+    """A recording from the moment on when it is first asked for packets.
 
     It is read as it is taken, so a program that falls behind makes it wait and loses nothing.
     """
 
     def __init__(self, recording: Recording, rate: float = 1.0) -> None:
-        """Begins at once.
+        """Waits for the first `take`: whoever follows it may have much to load before.
 
         Args:
             recording: What to play.
@@ -148,21 +147,24 @@ class Replay:
             if recording.own_units is not None
         ]
         first_s = float(recording.time_s[0])
-        self._due_s = time.monotonic() + (recording.time_s - first_s) / rate
+        self._after_s = (recording.time_s - first_s) / rate
+        self._began_s: float | None = None
 
     @property
     def ended(self) -> bool:
         """Whether everything was taken."""
-        return self._next == len(self._due_s)
+        return self._next == len(self._after_s)
 
     def take(self, now_s: float) -> list[Heard]:
         """Packets that are due since the last call."""
-        until = int(np.searchsorted(self._due_s, now_s, side="right"))
+        if self._began_s is None:
+            self._began_s = now_s
+        until = int(np.searchsorted(self._after_s, now_s - self._began_s, side="right"))
         rows, self._next = range(self._next, until), max(until, self._next)
         if not rows:
             return []
         csi = np.stack([self._recording.read(row) for row in rows])
-        due_s = self._due_s[rows.start : rows.stop]
+        due_s = self._began_s + self._after_s[rows.start : rows.stop]
         return [self._heard(row, device, csi, due_s) for row, device in self._numbered()]
 
     def close(self) -> None:

@@ -157,9 +157,10 @@ def test_a_study_says_what_is_left_and_learns_how_long_it_takes(
     line = price_line(chosen, tmp_path)
     assert "3 cases; 1 datasets, 3 trainings and 3 evaluations to make" in line
     assert "usual speeds of two cores" in line and "fewer --seeds" in line
-    with timed_work("train", chosen[0], tmp_path):
-        pass
     write_json(tmp_path / chosen[0].dataset / "dataset.json", {})
+    with timed_work("train", chosen[0], tmp_path):
+        write_json(tmp_path / chosen[0].run / "config.json", {})
+    assert list(tmp_path.rglob("study-*.json")), "the time of this training is kept"
     write_json(tmp_path / chosen[0].run / "metrics.json", {})
     line = price_line(chosen, tmp_path)
     assert "3 cases; 0 datasets, 2 trainings and 2 evaluations to make" in line
@@ -184,7 +185,7 @@ def test_work_that_failed_or_went_on_tells_no_time(
         raise RfgsError("no")
     (tmp_path / case.run).mkdir(parents=True)
     with timed_work("train", case, tmp_path):
-        pass
+        write_json(tmp_path / case.run / "config.json", {})
     assert not list(tmp_path.rglob("study-*.json"))
 
 

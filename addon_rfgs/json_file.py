@@ -57,16 +57,26 @@ def read_json(file: Path, form: Form, remedy: str, most_bytes: int) -> Any:
         refuse_pipe(file)
         if file.stat().st_size > most_bytes:
             raise AddonError(f"{file}: larger than any file of this kind; {remedy}")
-        value = json.loads(
-            file.read_text("utf-8"), parse_constant=_constant, object_pairs_hook=_object
-        )
-    except (OSError, ValueError, RecursionError) as error:
+        value = decoded(file.read_bytes())
+    except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or " ".join(str(error).split())[:80]
         raise AddonError(f"{file}: cannot be read as JSON ({reason}); {remedy}") from error
     problem = misfit(value, form)
     if problem:
         raise AddonError(f"{file}: {problem}; {remedy}")
     return value
+
+
+def decoded(text: bytes) -> Any:
+    """A JSON text.
+
+    Raises:
+        ValueError: It is none, or not one that every reader takes alike.
+    """
+    try:
+        return json.loads(text.decode(), parse_constant=_constant, object_pairs_hook=_object)
+    except RecursionError as error:
+        raise ValueError("nested too deeply") from error
 
 
 def misfit(value: Any, form: Form, place: str = "") -> str:

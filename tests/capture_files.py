@@ -99,22 +99,6 @@ def feitcsi_file(path: Path, packets: int = 5, count: int = 56) -> np.ndarray:
     return value
 
 
-def write_captures(folder: Path) -> None:
-    """Writes `a.csi` and `b.csi` of two receivers, and `radios.yaml`, where they stood."""
-    for name in ("a.csi", "b.csi"):
-        feitcsi_file(folder / name, packets=20)
-    (folder / "radios.yaml").write_text("""
-name: lab
-radio: wifi
-centre_hz: 5.5e9
-fps: 10
-devices:
-  - {name: tx, role: TRANSMITTER, position_m: [0, 0, 1.2]}
-  - {name: r1, role: RECEIVER, position_m: [3, 0, 1.2]}
-  - {name: r2, role: RECEIVER, position_m: [0, 3, 1.2]}
-""")
-
-
 _BASIC = {
     1: "<HQhBHHBBBBbBBBB",
     2: "<HQhBHHBBBBBBbBBBB",

@@ -7,16 +7,15 @@ N bytes: M rows of little-endian float32, a value per column.
 
 from __future__ import annotations
 
-import json
 import math
 import socket
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from ..errors import AddonError
 from ..gaussians.splats import FARTHEST_M, LARGEST_LOG_SCALE, POSITION, ROTATION, SCALE, Cloud
+from ..json_file import Fields, decoded, misfit
 
 #: Version of the messages that are understood.
 VERSION = 1
@@ -29,6 +28,8 @@ _AT_ONCE = 1 << 24
 _PIECE = 1 << 18
 _PATIENCE_S = 2.0
 _LOOPBACK = "127.0.0.1"
+#: The head of a message.
+_FORM = Fields({"time_s": float, "columns": [str], "count": int, "bytes": int})
 #: Opacities this close to none and all have a logarithm.
 _INSIDE = 1e-6
 
@@ -117,44 +118,31 @@ class Feed:
 
     def _head(self, line: bytes) -> _Head:
         try:
-            told = json.loads(line)
-        # Deeply nested brackets end Python's own recursion.
-        except (ValueError, RecursionError) as error:
+            told = decoded(line)
+        except ValueError as error:
             raise self._senseless(f"no JSON: {line[:40]!r}") from error
-        if not isinstance(told, dict) or told.get("rfgs") != VERSION:
-            version = told.get("rfgs") if isinstance(told, dict) else None
-            raise self._senseless(f"version {str(version)[:20]}, expected {VERSION}")
-        columns, count = told.get("columns"), told.get("count")
-        if not isinstance(columns, list) or not all(isinstance(name, str) for name in columns):
-            raise self._senseless("columns that are no names")
+        if problem := misfit(told, Fields({"rfgs": int})):
+            raise self._senseless(problem)
+        # A newer version may have another form.
+        if told["rfgs"] != VERSION:
+            raise self._senseless(f"version {told['rfgs']}, expected {VERSION}")
+        if problem := misfit(told, _FORM):
+            raise self._senseless(problem)
+        columns, count = told["columns"], told["count"]
         if len(columns) > MOST_COLUMNS or len(set(columns)) < len(columns):
             raise self._senseless(f"{len(columns)} columns, expected {MOST_COLUMNS} at most, once")
         lacking = [name for name in NEEDED if name not in columns]
         if lacking:
             raise self._senseless(f"no column {lacking[0]}")
-        if not _whole(count) or not 0 <= count <= MOST_GAUSSIANS:
-            raise self._senseless(f"count {str(count)[:20]}, expected 0 to {MOST_GAUSSIANS}")
-        head = _Head(_number(told.get("time_s")), tuple(columns), count)
-        if told.get("bytes") != head.size:
-            raise self._senseless(f"{str(told.get('bytes'))[:20]} bytes, expected {head.size}")
+        if not 0 <= count <= MOST_GAUSSIANS:
+            raise self._senseless(f"count {count}, expected 0 to {MOST_GAUSSIANS}")
+        head = _Head(float(told["time_s"]), tuple(columns), count)
+        if told["bytes"] != head.size:
+            raise self._senseless(f"{told['bytes']} bytes, expected {head.size}")
         return head
 
     def _senseless(self, what: str) -> AddonError:
         return AddonError(f"{self.name} sends no updates of rfgs live ({what}); check the port")
-
-
-def _whole(value: Any) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool)
-
-
-def _number(value: Any) -> float:
-    """A time, zero where it is none."""
-    if not isinstance(value, (int, float)) or isinstance(value, bool):
-        return 0.0
-    try:
-        return float(value) if math.isfinite(value) else 0.0
-    except OverflowError:
-        return 0.0
 
 
 def _update(head: _Head, data: bytes) -> Update:

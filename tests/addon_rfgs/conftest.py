@@ -89,6 +89,21 @@ def registered() -> Iterator[None]:
 
 
 @pytest.fixture
+def empty_scene(registered: None) -> Iterator[Any]:
+    """A scene without anything; preferences that name the environment, $RFGS_PYTHON."""
+    import bpy
+
+    from addon_rfgs.jobs.preferences import ADDON
+
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    stored = bpy.context.preferences.addons.new()
+    stored.module = ADDON
+    stored.preferences.python = os.environ["RFGS_PYTHON"]
+    yield bpy.context.scene
+    bpy.context.preferences.addons.remove(stored)
+
+
+@pytest.fixture
 def in_room(registered: None) -> None:
     """The small room of `build_scenes.py`, open and as it was built."""
     from build_scenes import room

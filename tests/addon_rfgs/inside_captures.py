@@ -7,7 +7,6 @@ $RFGS_CAPTURES holds `a.csi`, `b.csi` and `radios.yaml`, and $RFGS_PYTHON is a P
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,44 +16,35 @@ import pytest
 
 from addon_rfgs.cli import run
 from addon_rfgs.devices import captured
-from addon_rfgs.jobs.preferences import ADDON
 
-FOLDER, PYTHON = Path(os.environ["RFGS_CAPTURES"]), os.environ["RFGS_PYTHON"]
+FOLDER = Path(os.environ["RFGS_CAPTURES"])
 BOTH = f"{FOLDER / 'a.csi'}, {FOLDER / 'b.csi'}"
 
 
-@pytest.fixture
-def scene(registered: None) -> Iterator[Any]:
-    """An empty scene; preferences that name the environment."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    stored = bpy.context.preferences.addons.new()
-    stored.module = ADDON
-    stored.preferences.python = PYTHON
-    yield bpy.context.scene
-    bpy.context.preferences.addons.remove(stored)
-
-
-def test_devices_stand_where_the_layout_says(scene: Any, tmp_path: Path) -> None:
+def test_devices_stand_where_the_layout_says(empty_scene: Any, tmp_path: Path) -> None:
     out = tmp_path / "lab"
     values = {"layout": str(FOLDER / "radios.yaml"), "dataset": str(out), "sanitize": True}
     assert bpy.ops.rfgs.import_capture(captures=BOTH, **values) == {"FINISHED"}
     assert (out / "dataset.json").is_file()
-    places = {item.name: tuple(np.round(item.location, 5)) for item in scene.objects}
+    places = {item.name: tuple(np.round(item.location, 5)) for item in empty_scene.objects}
     assert places == {"tx": (0.0, 0.0, 1.2), "r1": (3.0, 0.0, 1.2), "r2": (0.0, 3.0, 1.2)}
     assert bpy.data.objects["tx"].rfgs.role == "TRANSMITTER"
     assert bpy.data.objects["r1"].rfgs.role == "RECEIVER"
-    assert scene.rfgs.jobs.dataset_folder == str(out) and scene.rfgs.jobs.train_radio == "wifi"
+    assert (
+        empty_scene.rfgs.jobs.dataset_folder == str(out)
+        and empty_scene.rfgs.jobs.train_radio == "wifi"
+    )
     bpy.ops.rfgs.remove_data()
-    assert not scene.objects
+    assert not empty_scene.objects
 
 
-def test_files_of_the_browser_are_taken(scene: Any, tmp_path: Path) -> None:
+def test_files_of_the_browser_are_taken(empty_scene: Any, tmp_path: Path) -> None:
     values = {"layout": str(FOLDER / "radios.yaml"), "dataset": str(tmp_path / "lab")}
     files = [{"name": "a.csi"}, {"name": "b.csi"}]
     assert bpy.ops.rfgs.import_capture(directory=f"{FOLDER}/", files=files, **values) == {
         "FINISHED"
     }
-    assert len(scene.objects) == 3
+    assert len(empty_scene.objects) == 3
 
 
 def refused(words: str, **values: Any) -> None:
@@ -65,7 +55,7 @@ def refused(words: str, **values: Any) -> None:
 
 
 def test_mistakes_are_told_in_one_line(
-    scene: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    empty_scene: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = str(tmp_path / "lab")
     refused("no capture is chosen", dataset=out)
@@ -80,7 +70,7 @@ def test_mistakes_are_told_in_one_line(
 
 
 def test_the_command_saves_the_devices(
-    scene: Any, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    empty_scene: Any, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     blend = tmp_path / "lab.blend"
     command = ["devices", "capture", str(FOLDER / "a.csi"), str(FOLDER / "b.csi")]

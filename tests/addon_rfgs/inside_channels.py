@@ -7,7 +7,6 @@ $RFGS_RUN is a trained run and $RFGS_PYTHON a Python that has rfgs.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -24,14 +23,9 @@ RUN, PYTHON = os.environ["RFGS_RUN"], os.environ["RFGS_PYTHON"]
 
 
 @pytest.fixture
-def said(registered: None) -> Iterator[Any]:
+def said(empty_scene: Any) -> Any:
     """Settings of an empty scene; preferences that name the environment."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    stored = bpy.context.preferences.addons.new()
-    stored.module = ADDON
-    stored.preferences.python = PYTHON
-    yield bpy.context.scene.rfgs.channels
-    bpy.context.preferences.addons.remove(stored)
+    return empty_scene.rfgs.channels
 
 
 def refused(words: str) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from capture_files import write_captures
+from two_receivers import write_captures
 
 
 def test_all_tests_of_captures_pass_inside_blender(

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from capture_files import write_captures
 from leaving_nothing import write_material
 from PIL import Image
+from two_receivers import write_captures
 from window import play
 
 pytestmark = [pytest.mark.blender, pytest.mark.slow]

@@ -22,17 +22,11 @@ import numpy as np
 import pytest
 from capture_files import feitcsi_record, integers
 from sending import free_port, room, send, wait_for
+from two_receivers import LAYOUT
 
 from rfgs_core.live.stream import Stream, StreamOptions
 
 ROOT = Path(__file__).resolve().parents[3]
-LAYOUT = """
-centre_hz: 5.5e9
-devices:
-  - {name: tx, role: TRANSMITTER, position_m: [0, 0, 1.2]}
-  - {name: r1, role: RECEIVER, position_m: [3, 0, 1.2]}
-  - {name: r2, role: RECEIVER, position_m: [0, 3, 1.2]}
-"""
 SOUND = feitcsi_record(integers((2, 1, 56), 300), 1)
 #: Where a record holds the bytes of its values, its antennas, its subcarriers and its clock.
 _SIZE, _RX, _TX, _COUNT, _CLOCK = 0, 46, 47, 52, 88

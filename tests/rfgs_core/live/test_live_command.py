@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 from capture_files import feitcsi_file, feitcsi_record, integers
 from sending import free_port, send
+from two_receivers import LAYOUT
 
 from rfgs_core.cli import main
 from rfgs_core.errors import RfgsError
@@ -25,13 +26,6 @@ from rfgs_core.live.replay import Replay, recorded_captures, recorded_dataset
 from rfgs_core.live.session import LiveOptions, Session
 
 ROOT = Path(__file__).resolve().parents[3]
-LAYOUT = """
-centre_hz: 5.5e9
-devices:
-  - {name: tx, role: TRANSMITTER, position_m: [0, 0, 1.2]}
-  - {name: r1, role: RECEIVER, position_m: [3, 0, 1.2]}
-  - {name: r2, role: RECEIVER, position_m: [0, 3, 1.2]}
-"""
 QUICK = ("--no-view", "--whole-fit-s", "0", "--gaussians", "40")
 
 

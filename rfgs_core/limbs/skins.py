@@ -21,6 +21,11 @@ _SUREST_M = 0.005
 _HALF_SURE_M = 0.02
 
 
+def pulls(joints: Joints) -> Float64[np.ndarray, "*body 17"]:
+    """How strongly each joint pulls at a body, at most 1; see `articulated.fit_pose`."""
+    return np.minimum((_SUREST_M / joints.sigma_m) ** 2, 1.0)
+
+
 @dataclass(frozen=True)
 class OnSkin:
     """Gaussians of one frame on the skins of its people."""
@@ -54,7 +59,7 @@ class PosedPeople:
             joints: Of all frames, shape (frame, body, 17, ·).
         """
         frames, bodies = joints.xyz.shape[:2]
-        weight = np.minimum((_SUREST_M / joints.sigma_m) ** 2, 1.0)
+        weight = pulls(joints)
         told = 1.0 / (1.0 + (joints.sigma_m.mean(axis=(0, 2)) / _HALF_SURE_M) ** 2)
         shapes, roots, turns = [], np.zeros((frames, bodies, 3)), []
         for body in range(bodies):

@@ -13,13 +13,11 @@ from rfgs_core.articulated import Pose, fit_pose, people
 from rfgs_core.bodies.tracks import Tracks
 from rfgs_core.limbs.network import LimbNetwork
 from rfgs_core.limbs.propose import propose
-from rfgs_core.limbs.skins import OnSkin, PosedPeople
+from rfgs_core.limbs.skins import OnSkin, PosedPeople, pulls
 from rfgs_core.measure.observations import Observations
 
 #: Time over which joints are averaged [s].
 SMOOTH_S = 0.12
-#: σ of a joint that pulls at a body with weight 1 [m]; see `articulated.fit_pose`.
-_SUREST_M = 0.005
 
 
 class LiveLimbs:
@@ -62,7 +60,7 @@ class LiveLimbs:
             share = 1.0 - np.exp(-elapsed_s / SMOOTH_S)
             around = self._around + share * (around - self._around)
         self._around, self._time_s = around, tracks.time_s
-        weight = np.minimum((_SUREST_M / said.sigma_m) ** 2, 1.0)
+        weight = pulls(said)
         poses = [
             fit_pose(self._body, joints, one, before)
             for joints, one, before in zip(around + ground, weight, self._poses, strict=True)

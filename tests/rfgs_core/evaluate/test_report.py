@@ -105,7 +105,8 @@ def test_names_of_baselines_stand_behind_what_they_do() -> None:
     text = in_words("F10 0.8 against 0.6 of matched_filter and template_filled (0.9); 1 of linear.")
     assert text == (
         "match within 10 cm (F10) 0.8 against 0.6 of a plain radar image (matched_filter) and a "
-        "solid standing figure at our own place (template_filled) (0.9); 1 of a straight line between antennas (linear)."
+        "solid standing figure at our own place (template_filled) (0.9); 1 of a straight line "
+        "between antennas (linear)."
     )
 
 

@@ -63,7 +63,7 @@ def work(stage: Any, photograph: Callable[[str], Iterator[float]]) -> Iterator[f
     bpy.ops.rfgs.generate_dataset()
     bpy.ops.rfgs.train_gaussians()
     jobs = stage.part("jobs.following").QUEUE.jobs
-    traced = ("trace 1", "done")
+    traced = ("trace", "done")
     yield from stage.wait(lambda: jobs[0].message.startswith(traced), "tracing", 900)
     yield from photograph("generating")
     yield from stage.wait(lambda: all(job.state in ENDED for job in jobs), "jobs", 900)

@@ -6,6 +6,7 @@ PICTURES=docs/blender .venv/bin/pytest -m blender tests/real_blender/test_states
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import shutil
@@ -43,7 +44,7 @@ def test_every_state_is_drawn(blender, programs, tmp_path: Path, size: tuple[int
     assert [state for state, _ in states] == ["Done", "Done", "Failed"]
     assert "900:901" in states[-1][1] and not states[-1][1].startswith("error")
     pictures = {name: _picture(made / f"{name}.png") for name in ("fresh", *STATES)}
-    for before, after in zip(STATES, STATES[1:], strict=False):
+    for before, after in itertools.pairwise(STATES):
         assert (pictures[before] != pictures[after]).any(), f"{after} looks like {before}"
     _keep(made, size)
 
@@ -56,15 +57,16 @@ def _picture(file: Path) -> np.ndarray:
 
 
 def _keep(made: Path, size: tuple[int, int]) -> None:
-    """Puts the pictures of the docs where $PICTURES says: panels of the tall window, a small one."""
+    """Puts the pictures of the docs where $PICTURES says: panels of the tall window, and a view."""
     kept = os.environ.get("PICTURES")
     if not kept:
         return
     folder = ROOT / kept
     folder.mkdir(parents=True, exist_ok=True)
     if size != TALL:
-        with Image.open(made / "imported.png") as image:
-            _save(image, folder / "imported.png")
+        # A palette would take the colours of Gaussians for others.
+        with Image.open(made / "compared.png") as image:
+            image.convert("RGB").save(folder / "compared.webp", quality=85, method=6)
         return
     panels = [Image.open(made / f"{name}_panel.png") for name in STRIP]
     width = sum(panel.width for panel in panels) + _GAP_PX * (len(panels) - 1)
@@ -73,8 +75,5 @@ def _keep(made: Path, size: tuple[int, int]) -> None:
     for panel in panels:
         strip.paste(panel, (left, 0))
         left += panel.width + _GAP_PX
-    _save(strip, folder / "states.png")
-
-
-def _save(image: Image.Image, file: Path) -> None:
-    image.quantize(_COLOURS, dither=Image.Dither.NONE).save(file, optimize=True)
+    small = strip.quantize(_COLOURS, dither=Image.Dither.NONE)
+    small.save(folder / "states.png", optimize=True)

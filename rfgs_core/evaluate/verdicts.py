@@ -81,12 +81,13 @@ def _error_share(metrics: dict[str, Any]) -> list[str]:
     if not between or own is None or other is None or other >= 1.0:
         return []
     share = (own - other) / (1.0 - other)
-    text = f"{100 * share:.0f} % of the matched filter's error 1 − F10 is removed"
+    full = "a full match (1 − F10)"
+    text = f"{100 * share:.0f} % of what the radar image lacks to {full} is gained"
     if share < 0.0:
-        text = f"the error 1 − F10 is {-100 * share:.0f} % larger than the matched filter's"
+        text = f"{-100 * share:.0f} % more is lacking to {full} than with the radar image"
     if share >= ERROR_SHARE:
-        return [f"{WON}{text}; the target is a third removed."]
-    return [f"{LOST}{text}; the target is a third removed. {_why(metrics, 'f10', other)}"]
+        return [f"{WON}{text}; the target is a third."]
+    return [f"{LOST}{text}; the target is a third. {_why(metrics, 'f10', other)}"]
 
 
 def _other_geometry(metrics: dict[str, Any]) -> list[str]:

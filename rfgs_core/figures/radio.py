@@ -28,7 +28,7 @@ def channel_chart(scene: Scene, frame: int) -> str:
     tx = 0
     links = np.flatnonzero(scene.layout.measured[tx])
     mhz = scene.radio.freq_hz / 1e6
-    with new_figure(10.5, 3.0) as figure:
+    with new_figure(10.5, 3.4) as figure:
         axes = figure.subplots(1, 3)
         panels = (("|H|", csi[tx, links]), ("|H − H static|", (csi - scene.csi_static)[tx, links]))
         for axis, (title, values) in zip(axes, panels, strict=False):
@@ -160,26 +160,28 @@ def _longest_m(scene: Scene) -> float:
     return min(2.0 * float(np.linalg.norm(high - low)), scene.radio.unambiguous_path_m)
 
 
-def f10_chart(frames: list[dict], shown: dict[str, str]) -> str:
+def f10_chart(frames: list[dict], shown: dict[str, tuple[str, str]]) -> str:
     """F10 of every frame, the method beside chosen baselines.
 
     Args:
         frames: `frames` of `metrics.json`.
-        shown: Baseline name → colour.
+        shown: Baseline name → words for it and its colour.
     """
-    with new_figure(10.5, 2.4) as figure:
+    with new_figure(10.5, 3.4) as figure:
         axis = figure.subplots()
         number = [row["frame"] for row in frames]
         own = [row["geometry"]["f10"] for row in frames]
-        for name, colour in shown.items():
+        for name, (words, colour) in shown.items():
             values = [
                 row["baselines"].get(name, {}).get("geometry", {}).get("f10", np.nan)
                 for row in frames
             ]
             if not np.isnan(values).all():
-                axis.plot(number, values, "o-", ms=3.5, lw=1.2, color=colour, label=name)
+                axis.plot(number, values, "o-", ms=3.5, lw=1.2, color=colour, label=words)
         axis.plot(number, own, "o-", ms=5, lw=2.2, color=METHOD, label="RF-GS")
-        axis.set(xlabel="frame", ylabel="F10", ylim=(0, 1), xticks=number)
+        label = "match within 10 cm (F10)"
+        axis.set(xlabel="frame", ylabel=label, ylim=(0, 1.02), xticks=number)
         axis.grid(axis="y", color=INK, alpha=0.25, lw=0.6)
-        axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        # Above, in a column: a narrow page shows the left end of a chart first.
+        figure.legend(loc="outside upper left", fontsize=8.5)
         return figure_uri(figure)

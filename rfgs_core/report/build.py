@@ -22,7 +22,7 @@ from rfgs_core.figures.shapes import shape_chart
 from rfgs_core.figures.style import BASELINE, file_uri, picture_uri
 from rfgs_core.files import write_text
 from rfgs_core.render.view import pictures_of
-from rfgs_core.report.cards import headline_cards, in_words
+from rfgs_core.report.cards import headline_cards, in_words, strongest
 from rfgs_core.report.metrics_file import read_metrics
 from rfgs_core.report.page import (
     Page,
@@ -42,8 +42,9 @@ from rfgs_core.run.people import HeadCount
 SCENE_SHOTS, VIEW_ROWS = 4, 4
 #: Pictures at least this wide are large enough to lead the page [px].
 HERO_PX = 400
-#: Baselines drawn beside the method frame by frame.
+#: Baselines drawn beside the method frame by frame, and the strongest of all others.
 DRAWN = {"matched_filter": BASELINE, "template": "#6a994e", "oracle_init": "#b8a1d9"}
+STRONGEST = "#c9a227"
 #: Pictures a demo may leave beside its report, with their captions.
 BLENDER_PICTURES = {
     "inspect.png": "The fitted Gaussians imported into Blender, beside the scene they came from.",
@@ -151,6 +152,7 @@ def _section(run: EvaluatedRun, metrics: dict[str, Any]) -> RunSection:
     frame = run.frames[len(run.frames) // 2]
     centroid = scene.reference(frame).mean(axis=0)
     radio = scene.radio
+    shapes, colours = shape_chart(scene, frame)
     return RunSection(
         anchor=f"run-{radio.name}",
         title=f"{radio.name}: {radio.freq_min_hz / 1e9:.4g}–{radio.freq_max_hz / 1e9:.4g} GHz",
@@ -168,11 +170,15 @@ def _section(run: EvaluatedRun, metrics: dict[str, Any]) -> RunSection:
             "marks where the true person's direct echo belongs.",
         ),
         shape=Shot(
-            shape_chart(scene, frame),
-            f"Frame {frame}: true mesh (grey), Gaussians coloured by reflected power, and what "
+            shapes,
+            f"Frame {frame}: true mesh (grey), Gaussians coloured by {colours}, and what "
             "the matched filter alone would say.",
         ),
-        f10=Shot(f10_chart(metrics["frames"], DRAWN), "F10 of every frame beside its baselines."),
+        f10=Shot(
+            f10_chart(metrics["frames"], _drawn(metrics)),
+            "How well every frame matches the true moving surface, beside what knows less; the "
+            "fit that starts on the truth is a ceiling and does not compete.",
+        ),
         motion=_motion(run),
         views=_views(run),
         tables=metric_tables(metrics),
@@ -180,6 +186,13 @@ def _section(run: EvaluatedRun, metrics: dict[str, Any]) -> RunSection:
         conditions=pairs(_conditions(run, metrics)),
         reasons=sorted(metrics["reasons"].items()),
     )
+
+
+def _drawn(metrics: dict[str, Any]) -> dict[str, tuple[str, str]]:
+    """Words and colour of each baseline that is drawn."""
+    rival = strongest(metrics, "geometry", "f10")
+    colours = ({} if rival is None else {rival[0]: STRONGEST}) | DRAWN
+    return {name: (in_words(name), colour) for name, colour in colours.items()}
 
 
 def _motion(run: EvaluatedRun) -> Shot | None:

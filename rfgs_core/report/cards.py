@@ -29,6 +29,14 @@ WORDS = {
     "linear": "a straight line between antennas",
     "gaussian_process": "a Gaussian process between antennas",
     "spectrum": "kriging by angle and delay spectra",
+    "silhouette": "the true outline filled with one colour",
+    "oracle_init": "our fit started on the truth",
+}
+#: Metrics in the words of their cards.
+_METRICS = {
+    "F5": "match within 5 cm (F5)",
+    "F10": "match within 10 cm (F10)",
+    "psnr_person": "pictures of the person (PSNR)",
 }
 #: No competitors: the fit that starts on the truth, and a part of the method itself.
 _NO_BASELINES = ("oracle_init", GAUSSIANS_ALONE)
@@ -88,8 +96,10 @@ def _unseen(metrics: Mapping[str, Any]) -> list[Card]:
 
 
 def in_words(sentence: str) -> str:
-    """A sentence with what each baseline does before its name."""
+    """A sentence with what each baseline does before its name, and what a metric is called."""
     names = "|".join(sorted(WORDS, key=len, reverse=True))
+    for metric, words in _METRICS.items():
+        sentence = re.sub(rf"^{metric}\b", words, sentence)
     return re.sub(rf"\b(?:{names})\b", lambda found: _said(found[0]), sentence)
 
 

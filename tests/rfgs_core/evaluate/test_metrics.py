@@ -125,9 +125,12 @@ def test_a_lost_comparison_says_whether_the_optimisation_is_at_fault() -> None:
 @pytest.mark.parametrize(
     ("own", "sentence"),
     [
-        (0.8, "Won: 60 % of the matched filter's error 1 − F10 is removed; the target is a third"),
-        (0.6, "Lost: 20 % of the matched filter's error 1 − F10 is removed; the target is a third"),
-        (0.235, "Lost: the error 1 − F10 is 53 % larger than the matched filter's; the target is"),
+        (0.8, "Won: 60 % of what the radar image lacks to a full match (1 − F10) is gained; the"),
+        (0.6, "Lost: 20 % of what the radar image lacks to a full match (1 − F10) is gained; the"),
+        (
+            0.235,
+            "Lost: 53 % more is lacking to a full match (1 − F10) than with the radar image; the",
+        ),
     ],
 )
 def test_an_error_that_grew_is_not_removed(own: float, sentence: str) -> None:

@@ -17,6 +17,7 @@ from rfgs_core.cli.compare import CompareArgs
 from rfgs_core.cli.compare import run as compare
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.evaluate.baselines import BASELINES
+from rfgs_core.figures.shapes import colouring
 from rfgs_core.report import write_demo_report, write_run_report
 from rfgs_core.report.cards import WORDS, headline_cards, in_words
 from rfgs_core.report.tables import metric_tables, show, text_table
@@ -104,9 +105,22 @@ def test_cards_compare_with_the_strongest_baseline_whichever_it_is(evaluated_run
 def test_names_of_baselines_stand_behind_what_they_do() -> None:
     text = in_words("F10 0.8 against 0.6 of matched_filter and template_filled (0.9); 1 of linear.")
     assert text == (
-        "F10 0.8 against 0.6 of a plain radar image (matched_filter) and a solid standing figure "
-        "at our own place (template_filled) (0.9); 1 of a straight line between antennas (linear)."
+        "match within 10 cm (F10) 0.8 against 0.6 of a plain radar image (matched_filter) and a "
+        "solid standing figure at our own place (template_filled) (0.9); 1 of a straight line "
+        "between antennas (linear)."
     )
+
+
+def test_colours_of_shapes_say_something_whether_powers_differ_or_not() -> None:
+    surface = np.zeros((1, 3))
+    means = np.array([[0.0, 0.0, 0.05], [0.0, 0.1, 0.0]])
+    alike = colouring(means, np.zeros(2), surface)
+    assert alike.label == "distance to the true surface [cm]"
+    assert alike.values == pytest.approx([5.0, 10.0]) and alike.low == 0.0
+    apart = colouring(means, np.array([-6.0, 0.0]), surface)
+    assert apart.label.startswith("reflected power") and apart.values[0] == -6.0
+    assert -6.0 <= apart.low < apart.high <= 0.0
+    assert len(colouring(means[:0], np.zeros(0), surface).values) == 0
 
 
 def test_the_player_holds_every_frame_true_and_fitted(evaluated_run) -> None:

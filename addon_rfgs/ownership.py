@@ -9,6 +9,9 @@ import bpy
 
 from .errors import AddonError
 
+#: How the names of all collections begin that the add-on makes.
+_BEGINS = "RF-GS "
+
 
 def need_own(block: bpy.types.ID) -> None:
     """Refuses to change what comes from another file: the change would not be saved.
@@ -52,6 +55,12 @@ def is_own(collection: bpy.types.Collection, name: str) -> bool:
     """Whether a collection is one of a name; Blender numbers the second, and so on."""
     fits = re.fullmatch(re.escape(name) + r"(\.\d+)?", collection.name)
     return fits is not None and collection.library is None
+
+
+def is_shown_by_us(item: bpy.types.Object) -> bool:
+    """Whether an object stands in collections of the add-on alone: a cloud, a path, a device."""
+    homes = item.users_collection
+    return bool(homes) and all(home.name.startswith(_BEGINS) for home in homes)
 
 
 def drop_empty(name: str) -> None:

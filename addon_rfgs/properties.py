@@ -57,7 +57,7 @@ class RFGS_PG_object(bpy.types.PropertyGroup):
         description="Objects of one name form one instance in masks; empty: the object itself",
     )
     surface_m2: bpy.props.FloatProperty(
-        name="Nominal surface [m²]",
+        name="Surface [m²]",
         description="Outer surface of its whole instance [m²], by which evaluation sizes "
         "predictions; 0: the standard body for people, the box around it for vehicles",
         min=0.0,

@@ -1,7 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The RF-GS tab of the 3D view's sidebar, where every panel stands."""
 
+import textwrap
+
 import bpy
+
+#: Width of a letter of the interface's font at scale 1 [px].
+_LETTER_PX = 7
+#: Share of a row that names take, and values the rest.
+_NAMES = 0.4
 
 
 class Tab:
@@ -12,11 +19,16 @@ class Tab:
     bl_category = "RF-GS"
 
     @staticmethod
-    def automatic(layout: bpy.types.UILayout, settings: object, name: str, text: str) -> None:
-        """Shows a number whose zero is no number: what it stands for is written beside it."""
-        row = layout.row()
-        row.prop(settings, name)
-        if not getattr(settings, name):
+    def automatic(
+        layout: bpy.types.UILayout, settings: object, name: str, text: str, number: int = 0
+    ) -> None:
+        """Shows a setting of which one number is none: what that stands for is written below."""
+        column = layout.column(align=True)
+        column.prop(settings, name)
+        if getattr(settings, name) == number:
+            row = column.split(factor=_NAMES)
+            row.active, row.scale_y = False, 0.8
+            row.label(text="")
             row.label(text=text)
 
     def columns(self) -> bpy.types.UILayout:
@@ -24,3 +36,20 @@ class Tab:
         self.layout.use_property_split = True
         self.layout.use_property_decorate = False
         return self.layout
+
+
+def paragraph(layout: bpy.types.UILayout, text: str, icon: str) -> None:
+    """Writes words in as many lines as the sidebar needs: labels do not break.
+
+    Args:
+        layout: Where to.
+        text: The words.
+        icon: Stands before the first line.
+    """
+    context = bpy.context
+    scale = context.preferences.system.ui_scale
+    letters = max(20, int(context.region.width / (_LETTER_PX * scale)) - 4)
+    column = layout.column(align=True)
+    column.scale_y = 0.8
+    for number, line in enumerate(textwrap.wrap(text, letters)):
+        column.label(text=line, icon="BLANK1" if number else icon)

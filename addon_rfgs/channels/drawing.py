@@ -36,8 +36,7 @@ class Drawing:
         if self.question.code is None:
             raise AddonError(f"no picture after {_PATIENCE_S:.0f} s; draw it with `rfgs csi`")
         if self.question.code:
-            said = reason(lines) or "rfgs csi said nothing"
-            raise AddonError(said.removeprefix("error: "))
+            raise AddonError(reason(lines) or "rfgs csi said nothing")
         return lines[-1].removeprefix(f"{self.out}: ") if lines else "drawn"
 
 

@@ -16,6 +16,7 @@ class RFGS_PT_channels(Tab, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         """Shows the link and the button."""
         layout, settings = self.columns(), context.scene.rfgs.channels
-        for name in ("run_folder", "tx_device", "rx_device"):
-            layout.prop(settings, name)
+        layout.prop(settings, "run_folder", placeholder="the one imported")
+        layout.prop(settings, "tx_device")
+        self.automatic(layout, settings, "rx_device", "the first to hear", number=-1)
         layout.operator("rfgs.show_csi", icon="IMAGE_DATA")

@@ -28,7 +28,7 @@ def fill(context: bpy.types.Context, found: list[Finding]) -> str:
     check.active = min(check.active, max(len(found) - 1, 0))
     counts = [(sum(row.severity == name for row in found), name) for name in SEVERITIES]
     said = [f"{count} {name}{'s' * (count > 1)}" for count, name in counts if count]
-    check.summary = ", ".join(said) or "Nothing to say"
+    check.summary = ", ".join(said) or "Nothing is wrong"
     return check.summary
 
 
@@ -60,7 +60,10 @@ class _OnFinding(Undoable):
     @classmethod
     def ready(cls, context: bpy.types.Context) -> bool:
         """There is a list."""
-        return len(context.window_manager.rfgs.check.rows) > 0
+        there = len(context.window_manager.rfgs.check.rows) > 0
+        if not there:
+            cls.poll_message_set("Press Check Scene first; nothing is listed")
+        return there
 
 
 class RFGS_OT_check_scene(SceneChoice, Reporting, bpy.types.Operator):

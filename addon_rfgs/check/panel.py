@@ -3,17 +3,14 @@
 
 from __future__ import annotations
 
-import textwrap
 from typing import Any
 
 import bpy
 
-from ..tab import Tab
+from ..tab import Tab, paragraph
 from .settings import RFGS_PG_finding
 
 _ICONS = {"ERROR": "CANCEL", "WARNING": "ERROR", "INFO": "INFO"}
-#: Width of a letter of the interface's font at scale 1 [px].
-_LETTER_PX = 7
 
 
 class RFGS_UL_findings(bpy.types.UIList):
@@ -47,7 +44,8 @@ class RFGS_PT_check(Tab, bpy.types.Panel):
         if check.outdated:
             layout.label(text="Out of date: check again", icon="ERROR")
         elif check.summary:
-            layout.label(text=check.summary)
+            worst = _ICONS[check.rows[0].severity] if check.rows else "CHECKMARK"
+            layout.label(text=check.summary, icon=worst)
         if not check.rows:
             return
         layout = layout.column()
@@ -56,13 +54,9 @@ class RFGS_PT_check(Tab, bpy.types.Panel):
         if check.active >= len(check.rows):
             return
         item = check.rows[check.active]
-        scale = context.preferences.system.ui_scale
-        letters = max(20, int(context.region.width / (_LETTER_PX * scale)) - 4)
-        column = layout.box().column(align=True)
-        for index, text in enumerate((f"{item.object}: {item.message}", item.remedy)):
-            for number, line in enumerate(textwrap.wrap(text, letters)):
-                icon = _ICONS[item.severity] if index == number == 0 else "BLANK1"
-                column.label(text=line, icon=icon)
+        box = layout.box()
+        paragraph(box, f"{item.object}: {item.message}", _ICONS[item.severity])
+        paragraph(box, item.remedy, "BLANK1")
         row = layout.row(align=True)
         part = row.row(align=True)
         part.enabled = item.object != "the scene"

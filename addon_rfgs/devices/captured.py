@@ -116,6 +116,5 @@ def imported(
     if question.code is None:
         raise AddonError(f"no dataset after {_PATIENCE_S:.0f} s; make it with `rfgs import`")
     if question.code:
-        said = reason(lines) or "rfgs import said nothing"
-        raise AddonError(said.removeprefix("error: "))
+        raise AddonError(reason(lines) or "rfgs import said nothing")
     return lines[-1].partition("; next:")[0] if lines else str(dataset)

@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 
-from ..tab import Tab
+from ..tab import Tab, paragraph
 from .empties import OWN_RADIOS, is_device
 from .fields import draw_fields
 
@@ -19,7 +19,7 @@ _ICONS = {
 }
 
 
-#: Kinds of objects that scatter or carry antennas.
+#: Kinds of objects that scatter, an Empty by what it makes copies of.
 _MEANINGFUL = {"MESH", "CURVE", "SURFACE", "FONT", "META", "EMPTY"}
 
 
@@ -75,13 +75,18 @@ class RFGS_PT_devices(Tab, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("rfgs.import_devices", text="Of a Dataset", icon="IMPORT")
         row.operator("rfgs.import_capture", text="Of a Capture", icon="FILE_NEW")
+        there = any(is_device(item) for item in context.scene.objects)
+        if not there:
+            paragraph(layout, "None yet: Generate takes the places of a preset", "INFO")
         row = layout.row()
-        row.template_list(*("RFGS_UL_devices", "", bpy.data, "objects", settings, "active"), rows=4)
+        shown = ("RFGS_UL_devices", "", bpy.data, "objects", settings, "active")
+        row.template_list(*shown, rows=4 if there else 2)
         side = row.column(align=True)
         side.operator("rfgs.remove_device", text="", icon="REMOVE")
         side.operator("rfgs.duplicate_device", text="", icon="DUPLICATE")
-        side.separator()
-        side.operator_menu_enum("rfgs.mirror_device", "axis", text="", icon="MOD_MIRROR")
+        if there:
+            side.separator()
+            side.operator_menu_enum("rfgs.mirror_device", "axis", text="", icon="MOD_MIRROR")
         row = layout.row(align=True)
         row.prop(settings, "overlay", text="Antennas", toggle=True, icon="OVERLAY")
         part = row.row(align=True)
@@ -89,27 +94,44 @@ class RFGS_PT_devices(Tab, bpy.types.Panel):
         part.prop(settings, "names", toggle=True)
 
 
-class RFGS_PT_object(Tab, bpy.types.Panel):
-    """Radio meaning of the active object."""
+class RFGS_PT_device(Tab, bpy.types.Panel):
+    """The radio of the active Empty."""
 
-    bl_label = "Active Object"
+    bl_label = "Active Device"
     bl_parent_id = "RFGS_PT_devices"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether the active object can mean something to the radio."""
-        return context.object is not None and context.object.type in _MEANINGFUL
+        """Whether the active object can be a device."""
+        return context.object is not None and context.object.type == "EMPTY"
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Shows what applies to the type of the active object."""
+        """Shows its role, and what applies to it."""
         layout, item = self.columns(), context.object
-        if item.type == "EMPTY":
-            layout.prop(item.rfgs, "role")
-            if is_device(item):
-                layout.prop(item.rfgs, "radio")
-                if item.rfgs.radio in OWN_RADIOS:
-                    draw_fields(layout, item.rfgs.rf, item.rfgs.role)
-                    layout.operator("rfgs.match_devices", icon="PASTEDOWN").device = item.name
+        layout.prop(item.rfgs, "role")
+        if is_device(item):
+            layout.prop(item.rfgs, "radio")
+            if item.rfgs.radio in OWN_RADIOS:
+                draw_fields(layout, item.rfgs.rf, item.rfgs.role)
+                layout.operator("rfgs.match_devices", icon="PASTEDOWN").device = item.name
+
+
+class RFGS_PT_object(Tab, bpy.types.Panel):
+    """What the active object counts as."""
+
+    bl_label = "Active Object"
+    bl_parent_id = "RFGS_PT_devices"
+    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether the active object can scatter."""
+        item = context.object
+        return item is not None and item.type in _MEANINGFUL and not is_device(item)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Shows class, instance and surface."""
+        layout, item = self.columns(), context.object
         layout.prop(item.rfgs, "object_class")
         layout.prop(item.rfgs, "instance", placeholder="the object itself")
         self.automatic(layout, item.rfgs, "surface_m2", "from its class")

@@ -56,9 +56,9 @@ def _elements(name: str, label: str, axis: str) -> Any:
     return _count(name, label, f"Elements along local {axis}", min=1, max=MOST_ELEMENTS)
 
 
-def _number(name: str, label: str, text: str, **limits: float) -> Any:
+def _level(name: str, label: str, text: str, **limits: float) -> Any:
     return bpy.props.FloatProperty(
-        name=label, description=text, default=RADIO_DEFAULTS[name], precision=4, **limits
+        name=label, description=text, default=RADIO_DEFAULTS[name], precision=1, **limits
     )
 
 
@@ -136,14 +136,14 @@ class RadioFields:
     own_device_links: _choice(
         "own_device_links", "Monostatic links", "Whether a device hears its own transmitter"
     )
-    isolation_db: _number(
+    isolation_db: _level(
         "isolation_db",
         "Isolation [dB]",
         "Of a device's receiver from its transmitter [dB]",
         min=0.0,
     )
-    power_dbm: _number("power_dbm", "Power [dBm]", "Transmit power")
-    noise_figure_db: _number("noise_figure_db", "Noise figure [dB]", "Of the receiver")
+    power_dbm: _level("power_dbm", "Power [dBm]", "Transmit power")
+    noise_figure_db: _level("noise_figure_db", "Noise [dB]", "Noise figure of the receiver [dB]")
     pattern: _choice("pattern", "Pattern", "Antenna pattern")
     polarization: _choice(
         "polarization", "Polarisation", "V, H, or two ports per element: VH, cross"

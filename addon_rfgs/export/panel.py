@@ -17,12 +17,13 @@ class RFGS_PT_dataset(Tab, bpy.types.Panel):
         """Shows settings and the two buttons."""
         layout, settings = self.columns(), context.scene.rfgs.export
         layout.prop(settings, "frames", placeholder="all")
-        layout.prop(settings, "overrides")
+        layout.prop(settings, "overrides", placeholder="none")
         self.automatic(layout, settings, "cameras", "all")
         self.automatic(layout, settings, "resolution", "from the file")
         layout.separator()
-        for name in ("bundle_folder", "spans", "velocities"):
-            layout.prop(settings, name)
+        layout.prop(settings, "bundle_folder")
+        layout.prop(settings, "spans", placeholder="none")
+        layout.prop(settings, "velocities")
         layout.operator("rfgs.export_bundle", icon="EXPORT")
         for name in ("pictures_folder", "samples", "passes", "empty"):
             layout.prop(settings, name)

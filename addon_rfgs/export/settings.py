@@ -35,8 +35,8 @@ class RFGS_PG_export(SceneChoice, bpy.types.PropertyGroup):
         name="Samples", description="Cycles samples per pixel", default=16, min=1
     )
     passes: bpy.props.BoolProperty(
-        name="Depth, normals, masks",
-        description="Also write a multilayer EXR per picture",
+        name="Passes",
+        description="Also write depth, normals and masks: a multilayer EXR per picture",
         default=True,
     )
     empty: bpy.props.BoolProperty(

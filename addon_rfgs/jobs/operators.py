@@ -141,12 +141,17 @@ class _OnChosenJob(Reporting):
     """Mixed into operators on the list's active row."""
 
     states: tuple[str, ...] = ()
+    needs = ""
+    """What to choose in the list, for whoever rests on a button that cannot be pressed."""
 
     @classmethod
     def ready(cls, _context: bpy.types.Context) -> bool:
         """The chosen job is in a state that the operator is for."""
         job = following.chosen_job()
-        return job is not None and cls.suits(job)
+        suits = job is not None and cls.suits(job)
+        if not suits:
+            cls.poll_message_set(cls.needs)
+        return suits
 
     @classmethod
     def suits(cls, job: Job) -> bool:
@@ -194,6 +199,7 @@ class RFGS_OT_stop_job(_OnJob, bpy.types.Operator):
     bl_label = "Stop"
     command = Command("stop", words={"folder": "folder"})
     states = (WAITING, RUNNING)
+    needs = "Choose a job in the list that waits or runs"
 
     def work(self, _context: bpy.types.Context, _progress: Progress) -> str:
         """Asks it to stop; it is killed if it does not within some seconds."""
@@ -213,6 +219,7 @@ class RFGS_OT_resume_job(_OnJob, InEnvironment, bpy.types.Operator):
 
     bl_label = "Resume"
     command = Command("resume", words={"folder": "folder"})
+    needs = "Choose a job in the list that was stopped or has failed"
 
     @classmethod
     def suits(cls, job: Job) -> bool:
@@ -230,6 +237,7 @@ class RFGS_OT_forget_job(_OnJob, bpy.types.Operator):
 
     bl_label = "Remove from List"
     command = Command("forget", words={"folder": "folder"})
+    needs = "Choose a job in the list that is over"
 
     @classmethod
     def suits(cls, job: Job) -> bool:
@@ -248,6 +256,7 @@ class RFGS_OT_import_result(_OnChosenJob, Undoable, bpy.types.Operator):
     """Bring the Gaussians of the chosen training into the scene."""
 
     bl_label = "Import Result"
+    needs = "Choose a training in the list that is done"
 
     @classmethod
     def suits(cls, job: Job) -> bool:

@@ -4,8 +4,8 @@
 import bpy
 
 from ..scene.taking_part import wanted_radios
-from ..tab import Tab
-from .following import chosen_job
+from ..tab import Tab, paragraph
+from .following import QUEUE, chosen_job
 from .preferences import ADDON, draw_check, environment_path, preferences
 from .process import SUPPORTED
 from .queue import DONE, FAILED, RUNNING, STOPPED, STOPPING, WAITING
@@ -51,14 +51,16 @@ class RFGS_PT_generate(Tab, bpy.types.Panel):
         layout.prop(settings, "dataset_folder")
         layout.prop(settings, "radios", placeholder=", ".join(wanted_radios(context.scene)))
         if missing := doing_without(context.scene):
-            layout.label(text=missing, icon="ERROR")
+            paragraph(layout, missing, "ERROR")
         layout.prop(settings, "frames", placeholder="all")
         layout.prop(settings, "images")
         if stored is not None and not environment_path():
-            layout.label(text="Choose a Python with rfgs, or run", icon="INFO")
-            layout.label(text="`rfgs addon install` there", icon="BLANK1")
+            paragraph(layout, "Choose a Python with rfgs, or run `rfgs addon install`", "INFO")
             layout.prop(stored, "python", text="Python")
+        elif not bpy.data.filepath:
+            paragraph(layout, "Save the file first: what is traced is the file on disk", "INFO")
         layout.operator("rfgs.generate_dataset", icon="PLAY")
+        _draw_standing(layout, "generate")
 
 
 class RFGS_PT_generate_more(Tab, bpy.types.Panel):
@@ -97,6 +99,8 @@ class RFGS_PT_train(Tab, bpy.types.Panel):
         layout.prop(settings, "train_radio", placeholder=wanted_radios(context.scene)[0])
         layout.operator("rfgs.train_gaussians", icon="PLAY")
         layout.operator("rfgs.evaluate_run", icon="VIEWZOOM")
+        _draw_standing(layout, "train")
+        _draw_standing(layout, "evaluate")
 
 
 class RFGS_PT_train_more(Tab, bpy.types.Panel):
@@ -145,6 +149,24 @@ class RFGS_PT_jobs(Tab, bpy.types.Panel):
             _draw_job(layout, job, stored.jobs[stored.active_job])
 
 
+def _draw_standing(layout: bpy.types.UILayout, kind: str) -> None:
+    """How far the last job of a kind is, or how it ended, below the button that began it."""
+    stored = preferences()
+    rows = [
+        row
+        for row, job in zip(stored.jobs if stored else (), QUEUE.jobs, strict=False)
+        if job.plan.kind == kind
+    ]
+    if not rows:
+        return
+    row = rows[-1]
+    if row.state == RUNNING:
+        layout.progress(factor=row.share, text=row.message)
+    else:
+        said = row.state if row.state.lower() == row.message else f"{row.state}: {row.message}"
+        paragraph(layout, said, _ICONS.get(row.state, "DOT"))
+
+
 def _draw_job(layout: bpy.types.UILayout, job: object, row: object) -> None:
     """Progress, the end of the log and what can be done with a job."""
     box = layout.box()
@@ -152,7 +174,7 @@ def _draw_job(layout: bpy.types.UILayout, job: object, row: object) -> None:
         # Blender 4.0 and newer draw a progress bar.
         box.progress(factor=row.share, text=row.message)
     else:
-        box.label(text=row.message, icon=_ICONS.get(row.state, "DOT"))
+        paragraph(box, row.message, _ICONS.get(row.state, "DOT"))
     column = box.column(align=True)
     column.scale_y = 0.7
     for line in job.tail[-4:]:

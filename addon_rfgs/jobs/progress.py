@@ -75,4 +75,4 @@ def split_output(text: str) -> tuple[Progress | None, list[str]]:
 def reason(lines: list[str]) -> str:
     """The line in which a program says why it failed; empty if it said nothing."""
     told = [line for line in lines if line.startswith("error:")] or lines
-    return told[-1] if told else ""
+    return told[-1].removeprefix("error: ") if told else ""

@@ -134,8 +134,7 @@ def _carry_out(job: Job, progress: Progress) -> str:
         stop_and_wait(job)
         raise
     if job.state != DONE:
-        reason = job.message.removeprefix("error: ")
-        raise AddonError(f"{job.state.lower()}: {reason} (log: {log_file(job.plan)})")
+        raise AddonError(f"{job.state.lower()}: {job.message} (log: {log_file(job.plan)})")
     return f"{job.title} is done: {job.plan.out}"
 
 

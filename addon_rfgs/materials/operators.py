@@ -106,7 +106,10 @@ class RFGS_OT_apply_guesses(Undoable, bpy.types.Operator):
     @classmethod
     def ready(cls, context: bpy.types.Context) -> bool:
         """There is a table."""
-        return len(context.window_manager.rfgs.guesses.rows) > 0
+        there = len(context.window_manager.rfgs.guesses.rows) > 0
+        if not there:
+            cls.poll_message_set("Press Guess from Names first")
+        return there
 
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
         """Applies the table."""

@@ -121,6 +121,7 @@ def show_paths(
             # Corners are metres; the object's scale carries them into the scene's units.
             item.scale = (1 / unit_scale(scene),) * 3
             item[LINK] = f"{selection.radio}: {ends}" + ("" if frame is not None else _STATIC)
+            item.rfgs.object_class = "IGNORE"  # A curve with thickness would be traced as a thing.
             item["power_db"] = [float(value) for value in part.power_db]
             item["delay_s"] = [float(value) for value in part.delay_s]
             item["interactions"] = json.dumps([part.interactions(i) for i in range(len(part))])

@@ -46,7 +46,10 @@ class RFGS_OT_clear_paths(Undoable, bpy.types.Operator):
     @classmethod
     def ready(cls, _context: bpy.types.Context) -> bool:
         """There are paths."""
-        return bool(collections_of(COLLECTION))
+        there = bool(collections_of(COLLECTION))
+        if not there:
+            cls.poll_message_set("No ray paths are shown")
+        return there
 
     def work(self, _context: bpy.types.Context, _progress: Progress) -> str:
         """Removes objects, curves and materials."""

@@ -20,6 +20,9 @@ class RFGS_PT_paths(Tab, bpy.types.Panel):
             if name not in {"rna_type", "name"}:
                 row = layout.row()
                 row.active = name != "follow" or not settings.static
-                row.prop(settings, name)
+                if name in {"tx_device", "rx_device"}:
+                    self.automatic(row, settings, name, "all of them", number=-1)
+                else:
+                    row.prop(settings, name)
         layout.operator("rfgs.show_paths", icon="CURVE_PATH")
         layout.operator("rfgs.clear_paths", icon="TRASH")

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import bpy
 
+from ..ownership import is_shown_by_us
 from .findings import Finding
 from .state import Keeper
 from .survey import Surface
@@ -39,7 +40,9 @@ def absences(
     present |= _bone_shapes().keys()
     findings = []
     for item in sorted(bpy.data.objects, key=lambda item: item.name):
-        if item.name not in present:
+        ignored = item.rfgs.object_class == "IGNORE"
+        # Nobody misses what the add-on itself has drawn.
+        if item.name not in present and not (ignored and is_shown_by_us(item)):
             findings += _left_out(scene, item)
         findings += _strands(item)
     others = [other.name for other in bpy.data.scenes if other != scene]

@@ -51,7 +51,7 @@ def voxel_budget(instances: Sequence[dict[str, Any]]) -> int:
         raise RfgsError(
             "no instance of this sequence has a nominal_surface_m2, so there is nothing that "
             "moves to compare with; make the dataset again with a class for what moves (--people "
-            "NAME, --vehicles NAME) or with its Nominal surface set in Blender"
+            "NAME, --vehicles NAME) or with its Surface set in Blender"
         )
     return round(VOXELS_PER_FACE * surface / VOXEL_M**2)
 

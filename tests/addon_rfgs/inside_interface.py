@@ -275,6 +275,17 @@ def test_every_choice_has_words_and_every_operator_says_what_it_does() -> None:
         assert len(words.split()) >= 4, f"{name}: {words}"
 
 
+def test_every_button_that_cannot_be_pressed_says_why() -> None:
+    bpy.ops.wm.read_homefile(use_empty=True)
+    grey = [name for name in operators() if not getattr(bpy.ops.rfgs, name).poll()]
+    assert {"generate_dataset", "stop_job", "import_result", "repair_finding"} <= set(grey)
+    for name in grey:
+        with pytest.raises(RuntimeError) as refused:
+            getattr(bpy.ops.rfgs, name)()
+        reason = str(refused.value).partition("poll() ")[2].strip()
+        assert len(reason.split()) >= 3 and "context is incorrect" not in reason, (name, reason)
+
+
 def test_steps_stand_in_their_order() -> None:
     panels = [kind for kind in CLASSES if issubclass(kind, bpy.types.Panel)]
     top = [kind.bl_label for kind in panels if not getattr(kind, "bl_parent_id", "")]

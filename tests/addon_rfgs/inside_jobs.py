@@ -72,7 +72,7 @@ def test_jobs_run_one_after_the_other(jobs, program, tmp_path: Path) -> None:
 def test_a_failure_is_told_in_its_own_words(jobs, program, tmp_path: Path) -> None:
     job = jobs.add(plan(tmp_path, "a"), program("failing"))
     step_until(jobs, job, queue.FAILED)
-    assert job.message == "error: no wall anywhere"
+    assert job.message == "no wall anywhere"
     gone = jobs.add(plan(tmp_path, "b"), tmp_path / "nothing")
     step_until(jobs, gone, queue.FAILED)
     assert "cannot be started" in gone.message

@@ -17,6 +17,8 @@ from addon_rfgs.cli import open_blend, run
 from addon_rfgs.errors import AddonError
 from addon_rfgs.paths import dataset as ours
 from addon_rfgs.removal.contents import remove_data
+from addon_rfgs.scene.absences import absences
+from addon_rfgs.scene.survey import survey
 from rfgs_core.dataset.path_store import read_paths, write_paths
 from rfgs_core.radio import images
 from rfgs_core.radio.path_table import PathTable
@@ -100,6 +102,16 @@ def test_tables_are_read_as_the_core_reads_them(data: Path) -> None:
     np.testing.assert_allclose(paths.power_db, 10 * np.log10(power[order]), atol=1e-4)
     np.testing.assert_array_equal(paths.vertices, core.vertices[order])
     np.testing.assert_array_equal(paths.delay_s, core.delay_s[order])
+
+
+def test_curves_are_nothing_to_the_radio(scene) -> None:
+    bpy.ops.mesh.primitive_cube_add()
+    assert bpy.ops.rfgs.show_paths() == {"FINISHED"}
+    bpy.context.view_layer.update()
+    surfaces, _ = survey(scene)
+    assert [surface.key for surface in surfaces] == ["Cube"]
+    told = [row.object for row in absences(scene, surfaces, [])]
+    assert not [name for name in told if name in {item.name for item in curves()}]
 
 
 def test_each_path_of_a_link_is_a_curve(scene, data: Path) -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import shutil
@@ -67,6 +68,19 @@ def refuse_pipe(path: Path) -> None:
 
 def write_json(path: Path, value: Any) -> None:
     """Writes `value` as indented JSON with sorted keys."""
-    text = json.dumps(value, indent=1, sort_keys=True, allow_nan=False) + "\n"
     with replacing(path) as temporary:
-        temporary.write_text(text, "utf-8")
+        temporary.write_text(json_text(value), "utf-8")
+
+
+def sha256_below(folder: Path) -> dict[str, str]:
+    """Digest of every file below a folder, by its name from there."""
+    return {
+        file.relative_to(folder).as_posix(): hashlib.sha256(file.read_bytes()).hexdigest()
+        for file in sorted(folder.rglob("*"))
+        if file.is_file()
+    }
+
+
+def json_text(value: Any) -> str:
+    """Indented JSON with sorted keys."""
+    return json.dumps(value, indent=1, sort_keys=True, allow_nan=False) + "\n"

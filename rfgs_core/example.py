@@ -19,7 +19,7 @@ from rfgs_core.errors import RfgsError
 
 #: What is shipped, and its digest: a file that was cut short on its way is told from a whole one.
 ARCHIVE = Path(__file__).with_name("example.zip")
-SHA256 = "c224c14c5c33025ad6a1cddc2888f8f05cc056987ea186d60d0f749669f8dbf2"
+SHA256 = "3bec6bbcc31e06a31ab1e747f464e94418d987d60166e82dbff9ba5179670ac0"
 #: Folders in the archive.
 DATASET, RUN = "dataset", "run"
 #: Entries of an archive have the same time on every machine.

@@ -112,11 +112,21 @@ def write_text(path: Path, text: str) -> None:
 
 def write_json(path: Path, value: Any) -> None:
     """Writes `value` as indented JSON with sorted keys, so equal values give equal bytes."""
-    write_text(path, json.dumps(value, indent=1, sort_keys=True, allow_nan=False) + "\n")
+    write_text(path, json_text(value))
 
 
-def _content(path: Path, links_known: bool) -> bytes:
-    """What is in a file of at most `LARGEST_JSON_BYTES`, reached without forbidden links."""
+def json_text(value: Any) -> str:
+    """Indented JSON with sorted keys, as all files of ours have it."""
+    return json.dumps(value, indent=1, sort_keys=True, allow_nan=False) + "\n"
+
+
+def json_bytes(path: Path, *, links_known: bool = False) -> bytes:
+    """What is in a JSON file of at most `LARGEST_JSON_BYTES`, reached without forbidden links.
+
+    Raises:
+        FileNotFoundError: There is no such file.
+        RfgsFormatError: It is larger, or lies where a link leads.
+    """
     try:
         # Whoever opens a pipe like this does not wait for somebody who writes.
         place = os.open(path, _READ_AT_ONCE)
@@ -148,11 +158,19 @@ def read_json(path: Path, *, links_known: bool = False) -> Any:
         RfgsFormatError: The file is not JSON, which knows no NaN and no infinity.
     """
     try:
-        return msgspec.json.decode(_content(path, links_known))
+        return decoded_json(path, json_bytes(path, links_known=links_known))
     except FileNotFoundError as error:
         raise RfgsError(f"{path}: no such file") from error
-    except RfgsFormatError:
-        raise
+
+
+def decoded_json(path: Path, data: bytes) -> Any:
+    """Values of a JSON text.
+
+    Raises:
+        RfgsFormatError: It is no JSON; the message names `path`.
+    """
+    try:
+        return msgspec.json.decode(data)
     except (ValueError, RecursionError) as error:
         raise RfgsFormatError(f"{path}: expected JSON, got something else ({error})") from error
 

@@ -12,6 +12,7 @@ from plyfile import PlyData, PlyListProperty, PlyParseError
 
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.links import refuse_link
+from rfgs_core.seals import check_seal
 
 #: What plyfile and NumPy say of damaged files.
 _DAMAGE = (
@@ -21,7 +22,10 @@ _DAMAGE = (
 
 
 def read_elements(
-    path: Path, what: str, lists: Mapping[str, Mapping[str, int]] | None = None
+    path: Path,
+    what: str,
+    lists: Mapping[str, Mapping[str, int]] | None = None,
+    seal: str | None = None,
 ) -> PlyData:
     """Reads a PLY file.
 
@@ -29,6 +33,7 @@ def read_elements(
         path: The file.
         what: What is expected of it, for messages.
         lists: Lengths of lists by element and property, where all are equally long.
+        seal: What to do about a file that has changed since it was sealed; None looks for no seal.
 
     Raises:
         RfgsError: There is no such file.
@@ -40,6 +45,8 @@ def read_elements(
             row = 2 * len(element.properties) if header.text else _least_bytes(element.properties)
             if element.count * max(row, 1) > room:
                 raise ValueError(f"{element.count} rows of {element.name!r} do not fit into it")
+        if seal is not None:
+            check_seal(path, path.read_bytes(), seal)
         return PlyData.read(str(path), known_list_len=dict(lists or {}))
 
 

@@ -11,12 +11,12 @@ import bpy
 
 from ..command import Command
 from ..errors import AddonError
-from ..files import write_json
 from ..saving import save_copy
 from ..scene.check import check_scene
 from ..scene.findings import Finding
 from ..scene.outline import outline
 from ..scene.override_file import read_overrides
+from ..seals import write_sealed_json
 from .repairs import REPAIRABLE, findings, repair, repairable, select_meant
 
 
@@ -44,7 +44,7 @@ def check(options: argparse.Namespace) -> str:
         return f"selected {item.name}; wrote {options.save}"
     if options.out is None:
         return "\n".join(f"{row.severity}: {row.sentence}" for row in rows) or "nothing to say"
-    write_json(options.out, report)
+    write_sealed_json(options.out, report)
     return f"wrote {options.out}: {len(rows)} findings"
 
 
@@ -60,7 +60,7 @@ def _add_outline(parser: Any) -> None:
 def _outline(options: argparse.Namespace) -> str:
     scene, overrides = bpy.context.scene, _overrides(options)
     found = outline(scene, options.frames, overrides, between=options.between)
-    write_json(options.out, found)
+    write_sealed_json(options.out, found)
     return f"wrote {options.out}: {len(found['frames'])} frames, {len(found['devices'])} devices"
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..files import replacing, replacing_folder, write_json
+from ..files import replacing, replacing_folder, sha256_below, write_json
 from ..naming import Names
 from ..scene.cameras import find_devices, find_views
 from ..scene.check import report
@@ -23,11 +23,12 @@ from ..scene.overrides import Overrides
 from ..scene.people import action_label, joints, segments
 from ..scene.state import kept
 from ..scene.survey import Surface, positions
+from ..seals import write_sealed_json
 from .mesh_ply import write_mesh
 from .poses import at_offsets, pose_offsets, pose_table
 from .velocities import SegmentVelocities, vertex_velocity
 
-SCHEMA = "rfgs-bundle/1"
+SCHEMA = "rfgs-bundle/2"
 VERSION = "0.1.0"
 
 
@@ -85,8 +86,9 @@ def export_bundle(
             )
             content.guesses += table.guesses
             write_json(target / "guesses.json", content.guesses)
-            write_json(target / "check.json", report(scene, content, views, devices))
-            write_json(target / "bundle.json", info)
+            write_sealed_json(target / "check.json", report(scene, content, views, devices))
+            info["digests"] = sha256_below(target)
+            write_sealed_json(target / "bundle.json", info)
     return info
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..array_file import array_file
 from ..errors import AddonError
+from ..seals import check_seal
 
 #: Array → kinds of numbers it may hold, and whether it has a second axis.
 _ARRAYS = {
@@ -36,11 +37,14 @@ def read_features(ply: Path, count: int) -> dict[str, np.ndarray]:
         count: Its Gaussians.
 
     Raises:
-        AddonError: The file is damaged or does not belong to the PLY.
+        AddonError: The file is damaged or does not belong to the PLY, or one of them has changed
+            since it was written.
     """
     path = ply.with_name(ply.stem + ".features.npz")
     if not path.is_file():
         return {}
+    for file in (ply, path):
+        check_seal(file, "train this run again")
     with array_file(path) as arrays:
         return {
             name: arrays.read(name, lambda *found, name=name: _check(path, name, count, *found))

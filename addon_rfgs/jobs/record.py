@@ -9,6 +9,7 @@ from pathlib import Path
 from ..errors import AddonError
 from ..files import refuse_pipe, write_json
 from ..json_file import Fields, read_json
+from ..seals import check_seal, write_sealed_json
 from .plans import Plan, plan_of_json, plan_to_json
 
 SCHEMA = "rfgs-job-1"
@@ -51,7 +52,7 @@ def write_record(record: Record) -> None:
     _refuse_link(file)
     row = {"schema": SCHEMA, "pid": record.pid, "born": record.born, **plan_to_json(record.plan)}
     try:
-        write_json(file, row)
+        write_sealed_json(file, row)
     except OSError as error:
         raise AddonError(f"{file}: cannot be written: {error.strerror}") from error
 
@@ -63,6 +64,7 @@ def read_record(file: Path) -> Record:
         AddonError: There is none, or it is damaged.
     """
     row = read_json(file, _FORM, _REMEDY, _LARGEST)
+    check_seal(file, _REMEDY)
     pid, born = row["pid"], row["born"]
     if row["schema"] != SCHEMA or not 0 <= pid < 1 << 31:
         raise AddonError(f"{file}: no job of this add-on; {_REMEDY}")

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from blender_scenes.people.body import Body, Phenotype, load_body
+from rfgs_core.arrays import save_arrays
 from rfgs_core.articulated.bones import BONES
 
 ADULTS, CHILDREN = 136, 24
@@ -50,13 +51,12 @@ def write_shape_space(path: Path) -> str:
     points = np.stack([_points(body, corners, shares) for body in bodies])
     arrays, error_m = _components(points, grown)
     bone, weight = _skin(bodies[0], corners, shares)
-    np.savez_compressed(
-        path,
-        **arrays,
-        faces=faces.astype(np.int16),
-        bone=bone.astype(np.uint8),
-        weight=weight.astype(np.float16),
-    )
+    skin = {
+        "faces": faces.astype(np.int16),
+        "bone": bone.astype(np.uint8),
+        "weight": weight.astype(np.float16),
+    }
+    save_arrays(path, {**arrays, **skin}, packed=True)
     return (
         f"{len(bodies)} bodies, {points.shape[1] - len(BONES)} vertices, {len(faces)} triangles, "
         f"{COMPONENTS} components: mean error {1e3 * error_m.mean():.2f} mm, "

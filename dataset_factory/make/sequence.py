@@ -31,7 +31,6 @@ def describe_sequence(
     images = image_split([row["name"] for row in cameras], bundle.frames)
     for row in cameras:
         row["split"] = "test" if row["name"] in images["test_cameras"] else "train"
-    file = bundle.path / "guesses.json"
     return SequenceInfo(
         scene=plan.scene,
         blend_sha256=plan.blend_sha256,
@@ -52,7 +51,7 @@ def describe_sequence(
         materials=bundle.materials,
         instances=[instance_row(row) for row in bundle.instances],
         objects=bundle.path_objects,
-        guesses=[*read_guesses(file), *guesses],
+        guesses=[*read_guesses(bundle.file("guesses.json")), *guesses],
         trace_depth=plan.depth,
         shadow=plan.shadow,
         tracer=plan.tracer,

@@ -14,11 +14,12 @@ from dataset_factory.scene.room import Room, room_of_row
 from rfgs_core.arrays import Shape, load_arrays
 from rfgs_core.dataset.mesh_ply import read_mesh
 from rfgs_core.errors import RfgsFormatError
-from rfgs_core.files import inside, read_json
+from rfgs_core.files import inside, sha256
 from rfgs_core.records import record
+from rfgs_core.seals import read_sealed_json
 from rfgs_core.simulate.surface.edges import SHARP, SMOOTH, UNSAID
 
-SCHEMA = "rfgs-bundle/1"
+SCHEMA = "rfgs-bundle/2"
 NUM_JOINTS = 17
 
 _REMEDY = "export the scene again"
@@ -130,15 +131,27 @@ class Bundle:
         """Box of the room around the people, else the scene's bounds [m], shape (2, 3)."""
         return self.bounds_m if self.room is None else self.room.box_m
 
+    def file(self, name: str) -> Path:
+        """A file of the bundle, as it was exported.
+
+        Raises:
+            RfgsFormatError: It is missing, has changed, or bundle.json does not name it.
+        """
+        return _unchanged(self.path, name, self.info["digests"])
+
+    def frame_file(self, frame: int) -> Path:
+        """The file of a frame, as it was exported; refused like `file`."""
+        return self.file(frame_file(Path(), frame).as_posix())
+
     def frame(self, frame: int) -> BundleFrame:
         """Reads what moves at one frame.
 
         Raises:
             RfgsFormatError: The file is missing, damaged or does not fit the topology.
         """
-        path = frame_file(self.path, frame)
+        path = self.frame_file(frame)
         unknown = ("joints", "segment_velocity")
-        arrays = load_arrays(path, _REMEDY, _FRAME, unknown, types=_TYPES)
+        arrays = load_arrays(path, _REMEDY, _FRAME, unknown, types=_TYPES, seal=False)
         vertices, people = arrays["vertices"], len(arrays["person_instance"])
         _expect(path, "vertices", vertices, self.topology.rest_vertices.shape)
         _expect(path, "action", arrays["action"], (people,))
@@ -175,7 +188,7 @@ class Bundle:
         meshes = []
         for row in self.objects:
             for name in row["files"]:
-                path = inside(self.path, name)
+                path = self.file(name)
                 # Material names may hold the separator themselves: the longest fit is meant.
                 fits = [known for known in by_name if path.stem.endswith(f"__{known}")]
                 if not fits:
@@ -221,12 +234,12 @@ def read_bundle(path: Path) -> Bundle:
     """
     path = Path(path)
     file = path / "bundle.json"
-    info = read_json(file)
+    info = read_sealed_json(file, _REMEDY)
     _check_info(file, info)
     bounds = np.asarray(info["bounds_m"], dtype=np.float64)
     if (bounds[1] < bounds[0]).any():
         raise RfgsFormatError(f"{file}: bounds_m: expected [[min xyz], [max xyz]], got {bounds}")
-    topology = _read_topology(path / "topology.npz", info)
+    topology = _read_topology(_unchanged(path, "topology.npz", info["digests"]), info)
     return Bundle(
         path=path,
         info=info,
@@ -243,17 +256,26 @@ def read_bundle(path: Path) -> Bundle:
     )
 
 
-def _check_info(file: Path, info: Any) -> None:
-    value = record(file, info, dict[str, Any])
-    if value.get("schema") != SCHEMA:
-        raise RfgsFormatError(f"{file}: expected schema {SCHEMA!r}, got {value.get('schema')!r}")
-    record(file, value, BundleRows)
+def _check_info(file: Path, info: dict[str, Any]) -> None:
+    if info.get("schema") != SCHEMA:
+        raise RfgsFormatError(f"{file}: expected schema {SCHEMA!r}, got {info.get('schema')!r}")
+    record(file, info, BundleRows)
+
+
+def _unchanged(bundle: Path, name: str, digests: dict[str, str]) -> Path:
+    """A file of a bundle that has the digest it was exported with."""
+    path = inside(bundle, name)
+    if name not in digests or not path.is_file():
+        what = "no such file" if name in digests else "bundle.json does not name it"
+        raise RfgsFormatError(f"{path}: {what}; {_REMEDY}")
+    if sha256(path) != digests[name]:
+        raise RfgsFormatError(f"{path}: changed or damaged since the export; {_REMEDY}")
+    return path
 
 
 def _read_topology(path: Path, info: dict[str, Any]) -> Topology:
-    arrays = load_arrays(path, _REMEDY, _TOPOLOGY, types=_TYPES, others=True)
+    arrays = load_arrays(path, _REMEDY, _TOPOLOGY, types=_TYPES, others=True, seal=False)
     faces, vertices = arrays["faces"], arrays["rest_vertices"]
-    # Bundles of earlier versions say nothing of edges.
     edges = arrays.get("edges", np.full((len(faces), 3), UNSAID))
     _expect(path, "edges", edges, (len(faces), 3))
     if not np.isin(edges, (UNSAID, SMOOTH, SHARP)).all():

@@ -79,5 +79,6 @@ class BundleRows(Struct):
     materials: list[Material]
     objects: list[SceneObject]
     instances: list[Instance]
+    digests: dict[str, str]
     room: RoomRow | None = None
     poses: list[Poses] = []

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from dataset_factory.scene.bundle import Bundle, frame_file
+from dataset_factory.scene.bundle import Bundle
 from rfgs_core.arrays import load_arrays
 from rfgs_core.errors import RfgsFormatError
 
@@ -54,10 +54,10 @@ def read_motion(bundle: Bundle, frame: int, span_s: float) -> Motion:
             f"{bundle.path}: holds no poses over {span_s:g} s after each frame; "
             f"export it with --span {span_s!r}"
         )
-    path = frame_file(bundle.path, frame)
+    path = bundle.frame_file(frame)
     poses = {"vertices": ("vertex", 3), "pose_offset_s": ("pose",)}
     poses["pose_vertices"] = ("pose", *poses["vertices"])
-    arrays = load_arrays(path, "export the scene again", poses)
+    arrays = load_arrays(path, "export the scene again", poses, seal=False)
     wanted = np.array(rows[0]["offset_s"], dtype=np.float64)
     index = np.searchsorted(arrays["pose_offset_s"], wanted)
     known = np.append(arrays["pose_offset_s"], np.inf)[index]
@@ -73,7 +73,7 @@ def read_velocity(bundle: Bundle, frame: int) -> np.ndarray:
     Raises:
         RfgsFormatError: The bundle holds none, or they do not fit its topology.
     """
-    path = frame_file(bundle.path, frame)
+    path = bundle.frame_file(frame)
     name, shape = "vertex_velocity", bundle.topology.rest_vertices.shape
     remedy = "export the scene again with --velocities"
-    return load_arrays(path, remedy, {name: shape})[name].astype(np.float64)
+    return load_arrays(path, remedy, {name: shape}, seal=False)[name].astype(np.float64)

@@ -13,7 +13,8 @@ from dataset_factory.scene.blender import Blender
 from dataset_factory.scene.overrides import overrides_file
 from dataset_factory.scene.radios import SCENE_RADIO
 from rfgs_core.radio import PRESETS, Radio
-from rfgs_core.records import read_record
+from rfgs_core.records import record
+from rfgs_core.seals import read_sealed_json
 
 #: Radio of devices that take part in any.
 ANY_RADIO = "any"
@@ -56,7 +57,18 @@ def read_outline(
     with TemporaryDirectory(prefix="rfgs-") as name, overrides_file(said, label) as more:
         file = Path(name) / "outline.json"
         blender.run("outline", "--out", str(file), *asked, *more)
-        return read_record(file, Outline)
+        return read_outline_file(file)
+
+
+def read_outline_file(file: Path) -> Outline:
+    """What Blender wrote of a file.
+
+    Raises:
+        RfgsError: There is no such file.
+        RfgsFormatError: It is damaged.
+    """
+    found: Outline = record(file, read_sealed_json(file, "read the scene again"), Outline)
+    return found
 
 
 def usual_radios(devices: Iterable[dict[str, Any]]) -> tuple[str, ...]:

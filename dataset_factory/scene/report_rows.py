@@ -11,6 +11,7 @@ from msgspec import Meta, Struct
 from rfgs_core.dataset.rows import Frame, Triple
 from rfgs_core.files import read_json
 from rfgs_core.records import record
+from rfgs_core.seals import read_sealed_json
 
 _REMEDY = "check or export the scene again"
 
@@ -94,19 +95,18 @@ def read_report(path: Path) -> dict[str, Any]:
         RfgsError: There is none.
         RfgsFormatError: It is damaged.
     """
-    value: dict[str, Any] = record(path, read_json(path), dict[str, Any], _REMEDY)
+    value = read_sealed_json(path, _REMEDY)
     record(path, value, _Report, _REMEDY)
     return value
 
 
 def read_guesses(path: Path) -> list[dict[str, Any]]:
-    """Everything that was guessed of a scene; nothing where there is no such file.
+    """Everything that was guessed of a scene.
 
     Raises:
+        RfgsError: There is no such file.
         RfgsFormatError: The file is damaged.
     """
-    if not path.is_file():
-        return []
     value: list[dict[str, Any]] = record(path, read_json(path), list[dict[str, Any]], _REMEDY)
     record(path, value, list[Guess], _REMEDY)
     return value

@@ -28,15 +28,17 @@ def read_topology(path: Path) -> dict[str, np.ndarray]:
         RfgsError: There is no such file.
         RfgsFormatError: It is damaged, or an array is not as it should be.
     """
-    return load_arrays(path, _REMEDY, _TOPOLOGY, types=dict.fromkeys(_TOPOLOGY, "i4"))
+    return load_arrays(path, _REMEDY, _TOPOLOGY, types=dict.fromkeys(_TOPOLOGY, "i4"), seal=False)
 
 
 def read_geometry(path: Path) -> dict[str, np.ndarray]:
     """Vertices, joints, instances and actions of a frame, refused like `read_topology`."""
-    return load_arrays(path, _REMEDY, _FRAME, ("joints",), types=_FRAME_TYPES)
+    return load_arrays(path, _REMEDY, _FRAME, ("joints",), types=_FRAME_TYPES, seal=False)
 
 
 def read_segment_velocity(path: Path) -> np.ndarray:
     """Velocity of each body segment's skin [m/s], refused like `read_topology`."""
     types = dict.fromkeys(_VELOCITY, "f4")
-    return load_arrays(path, _REMEDY, _VELOCITY, tuple(_VELOCITY), types=types)["segment_velocity"]
+    return load_arrays(path, _REMEDY, _VELOCITY, tuple(_VELOCITY), types=types, seal=False)[
+        "segment_velocity"
+    ]

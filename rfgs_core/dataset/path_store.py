@@ -40,7 +40,7 @@ def read_paths(path: Path) -> PathTable:
         RfgsFormatError: It is damaged, or an array has another shape or type.
     """
     types = {name: _TYPES.get(name, "f4") for name in _SHAPES}
-    arrays = load_arrays(path, _REMEDY, _SHAPES, types=types)
+    arrays = load_arrays(path, _REMEDY, _SHAPES, types=types, seal=False)
     if arrays["vertices"].shape[1] != arrays["kind"].shape[1] + 2:
         raise RfgsFormatError(f"{path}: vertices: expected two more than bounces")
     return PathTable(**arrays)

@@ -29,8 +29,7 @@ from rfgs_core.neural.fit import FittedField, StartPrior, fit_field
 from rfgs_core.neural.settings import FieldSettings
 from rfgs_core.radio.levels import decibels
 from rfgs_core.run import Run
-from rfgs_core.run.config import RunConfig
-from rfgs_core.run.folder import relative_dataset
+from rfgs_core.run.config import RunConfig, relative_dataset
 from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import TrainConfig
 from rfgs_core.threads import one_torch_thread

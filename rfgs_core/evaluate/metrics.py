@@ -27,10 +27,10 @@ from rfgs_core.evaluate.residual import GAUSSIANS_ALONE, Answer, with_residual
 from rfgs_core.evaluate.rf import RF_KEYS, frame_rf, pool_rf, rf_values
 from rfgs_core.evaluate.scene import EvaluatedRun, Scene
 from rfgs_core.evaluate.verdicts import verdicts
-from rfgs_core.files import write_json
 from rfgs_core.measure.observations import Kept
 from rfgs_core.past import timed
 from rfgs_core.render.view import pictures_of
+from rfgs_core.seals import write_sealed_json
 
 SCHEMA = "rfgs-metrics/2"
 #: Name of the evaluated method among the baselines while they are computed alike.
@@ -73,7 +73,7 @@ def evaluate_run(run: EvaluatedRun, *, oracle: bool = True) -> dict[str, Any]:
     metrics |= _circumstances(scene)
     metrics["verdicts"] = verdicts(metrics)
     metrics["eval_s"] = round(time.perf_counter() - start_s, 2)
-    write_json(run.path / "metrics.json", metrics)
+    write_sealed_json(run.path / "metrics.json", metrics)
     return metrics
 
 

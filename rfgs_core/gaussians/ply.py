@@ -7,6 +7,7 @@ logarithm of metres), rot_0..3 (w first), and optionally rf_power_db. All float3
 
 from __future__ import annotations
 
+import io
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -16,9 +17,10 @@ from jaxtyping import Float32
 from plyfile import PlyData, PlyElement
 
 from rfgs_core.errors import RfgsFormatError
-from rfgs_core.files import replacing
+from rfgs_core.files import write_bytes
 from rfgs_core.gaussians.model import FEATURE_DIM, Gaussians
 from rfgs_core.ply_file import count_rows, read_elements
+from rfgs_core.seals import BLANK, sealed
 
 #: Value of the zeroth spherical harmonic, 1 / (2 √π): rgb = 0.5 + SH_C0 · f_dc.
 SH_C0 = 0.28209479177387814
@@ -118,7 +120,7 @@ def cloud_of(
 
 
 def write_ply(path: Path, cloud: GaussianCloud) -> None:
-    """Writes a binary little-endian PLY in one step.
+    """Writes a binary little-endian PLY in one step, sealed in a comment.
 
     Raises:
         RfgsFormatError: An array has a wrong shape, a value is not finite or a quaternion is zero.
@@ -134,19 +136,24 @@ def write_ply(path: Path, cloud: GaussianCloud) -> None:
             table[column] = values[:, index]
     if cloud.rf_power_db is not None:
         table[POWER_PROPERTY] = cloud.rf_power_db
-    with replacing(path) as temporary:
-        PlyData([PlyElement.describe(table, "vertex")], byte_order="<").write(str(temporary))
+    stream, element = io.BytesIO(), PlyElement.describe(table, "vertex")
+    PlyData([element], byte_order="<", comments=[BLANK]).write(stream)
+    write_bytes(path, sealed(stream.getvalue()))
 
 
-def read_ply(path: Path) -> GaussianCloud:
+def read_ply(path: Path, seal: str | None = None) -> GaussianCloud:
     """Reads a PLY of Gaussians written here or by another program (f_rest_* is ignored).
+
+    Args:
+        path: The file.
+        seal: What to do about a file that is not as `write_ply` wrote it; None takes any.
 
     Raises:
         RfgsError: The file does not exist.
         RfgsFormatError: It is not a PLY of Gaussians, is cut short or holds values that are
             not finite.
     """
-    table = _vertex_table(path)
+    table = _vertex_table(path, seal)
     present = table.dtype.names or ()
     needed = [name for names in _REQUIRED.values() for name in names]
     missing = [name for name in needed if name not in present]
@@ -180,8 +187,8 @@ def count_ply(path: Path) -> int:
     return count_rows(path, "vertex", _WHAT)
 
 
-def _vertex_table(path: Path) -> np.ndarray:
-    data = read_elements(path, _WHAT)
+def _vertex_table(path: Path, seal: str | None) -> np.ndarray:
+    data = read_elements(path, _WHAT, seal=seal)
     if "vertex" not in data:
         raise RfgsFormatError(f"{path}: expected {_WHAT}, with an element 'vertex'")
     return data["vertex"].data

@@ -13,6 +13,7 @@ from rfgs_core.errors import RfgsFormatError
 from rfgs_core.files import write_bytes
 from rfgs_core.limbs.network import LimbNetwork
 from rfgs_core.limbs.tensor_file import read_tensors, refuse_misfit
+from rfgs_core.seals import BLANK, sealed
 
 #: What AdamW keeps of every parameter.
 _MOMENTS = ("step", "exp_avg", "exp_avg_sq")
@@ -38,7 +39,7 @@ def keep(
             state[f"{moment}.{name}"] = optimiser.state[parameter][moment]
     state["frames"] = torch.tensor(progress.frames)
     state["spent_s"] = torch.tensor(progress.spent_s, dtype=torch.float64)
-    write_bytes(path, save(state))
+    write_bytes(path, sealed(save(state, {"seal": BLANK})))
 
 
 def resume(path: Path, network: LimbNetwork, optimiser: torch.optim.Optimizer) -> Progress:

@@ -12,6 +12,7 @@ from torch import Tensor
 
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.links import refuse_link
+from rfgs_core.seals import check_seal
 
 #: Largest file that is read; networks have 2 MB, what a training keeps has 14 MB.
 _MOST_BYTES = 64 * 2**20
@@ -25,11 +26,13 @@ def read_tensors(path: Path, remedy: str) -> tuple[dict[str, Tensor], dict[str, 
         remedy: What to do about a damaged file, for the message.
 
     Raises:
-        RfgsFormatError: It is damaged, too large, or holds NaN or infinity.
+        RfgsFormatError: It is damaged, changed since it was sealed, too large, or holds NaN or
+            infinity.
     """
     refuse_link(path)
     if path.stat().st_size > _MOST_BYTES:
         raise RfgsFormatError(f"{path}: larger than any network of ours; {remedy}")
+    check_seal(path, path.read_bytes(), remedy)
     try:
         with safe_open(path, framework="pt") as file:
             texts = dict(file.metadata() or {})

@@ -18,6 +18,7 @@ from rfgs_core.limbs.network import LimbNetwork
 from rfgs_core.limbs.tensor_file import read_tensors, refuse_misfit
 from rfgs_core.radio import Radio
 from rfgs_core.records import record
+from rfgs_core.seals import BLANK, sealed
 
 #: Schema of the file.
 SCHEMA = "rfgs-limbs/1"
@@ -57,8 +58,8 @@ def save_network(path: Path, network: LimbNetwork, radio: Radio, card: dict[str,
         **card,
     }
     # One entry: the library writes several in an order of its own.
-    metadata = {"card": json.dumps({"schema": SCHEMA, **stated}, sort_keys=True)}
-    write_bytes(path, save(weights, metadata))
+    metadata = {"card": json.dumps({"schema": SCHEMA, "seal": BLANK, **stated}, sort_keys=True)}
+    write_bytes(path, sealed(save(weights, metadata)))
 
 
 def load_network(path: Path) -> Trained:
@@ -76,6 +77,7 @@ def load_network(path: Path) -> Trained:
     except (msgspec.DecodeError, UnicodeEncodeError, RecursionError) as error:
         raise RfgsFormatError(f"{path}: card: expected JSON ({error}); {_REMEDY}") from error
     card: dict[str, Any] = record(f"{path}: card", value, dict[str, Any], _REMEDY)
+    card.pop("seal", None)
     if card.get("schema") != SCHEMA:
         found = str(card.get("schema"))[:60]
         raise RfgsFormatError(f"{path}: expected schema {SCHEMA}, found {found}; {_REMEDY}")

@@ -102,7 +102,9 @@ def _points(path: Path) -> Float64[np.ndarray, "point 3"]:
 
 
 def _joints(path: Path) -> Float64[np.ndarray, "17 3"]:
-    stored = load_arrays(path, _REMEDY, {"joints": ("joint", 3)})["joints"].astype(np.float64)
+    stored = load_arrays(path, _REMEDY, {"joints": ("joint", 3)}, seal=False)["joints"].astype(
+        np.float64
+    )
     if len(stored) <= max(_SMPLX.values()):
         raise RfgsFormatError(f"{path}: expected 22 joints or more, found {len(stored)}; {_REMEDY}")
     return joints_of(stored, _SMPLX)

@@ -10,8 +10,8 @@ from msgspec import Struct
 
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.evaluate.metrics import SCHEMA
-from rfgs_core.files import read_json
 from rfgs_core.records import record
+from rfgs_core.seals import read_sealed_json
 
 #: Values by name; None where there is none, for a reason.
 Values = dict[str, float | None]
@@ -79,7 +79,7 @@ def read_metrics(run: Path) -> dict[str, Any]:
     if not file.is_file():
         raise RfgsError(f"{run}: not evaluated yet; run `rfgs eval {run}` first")
     remedy = f"run `rfgs eval {run}` again"
-    metrics = record(file, read_json(file), dict[str, Any], remedy)
+    metrics = read_sealed_json(file, remedy)
     if metrics.get("schema") != SCHEMA:
         raise RfgsFormatError(f"{file}: expected schema {SCHEMA}; {remedy}")
     record(file, metrics, _Metrics, remedy)

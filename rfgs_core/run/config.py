@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
 from rfgs_core.errors import RfgsError, RfgsFormatError
-from rfgs_core.files import read_json, write_json
 from rfgs_core.records import record
+from rfgs_core.seals import read_sealed_json, write_sealed_json
 from rfgs_core.settings import TrainConfig
 
 #: Schema of `config.json`.
@@ -57,7 +58,7 @@ class RunConfig:
 
     def write(self, run: Path) -> None:
         """Writes the file of a run."""
-        write_json(run / CONFIG_FILE, self.entries)
+        write_sealed_json(run / CONFIG_FILE, self.entries)
 
     @staticmethod
     def read(run: Path) -> RunConfig:
@@ -69,15 +70,13 @@ class RunConfig:
         """
         path = run / CONFIG_FILE
         try:
-            stored = read_json(path)
+            stored = read_sealed_json(path, _REMEDY)
         except RfgsFormatError:
             raise
         except RfgsError as error:
             raise RfgsError(
                 f"{run} is not a run: it has no {CONFIG_FILE}; `rfgs train` makes one"
             ) from error
-        if not isinstance(stored, dict):
-            stored = record(path, stored, dict[str, Any])
         if stored.get("schema") != SCHEMA:
             raise RfgsFormatError(
                 f"{path}: expected schema {SCHEMA}, found {stored.get('schema')}; "
@@ -85,9 +84,8 @@ class RunConfig:
             )
         _need_entries(path, stored)
         own = {name: stored[name] for name in (*_OWN, "train_s") if name in stored}
-        settings = {name: stored[name] for name in _SETTINGS}
         try:
-            config: RunConfig = record(path, {**own, "settings": settings}, RunConfig, _REMEDY)
+            config: RunConfig = record(path, {**own, "settings": stored}, RunConfig, _REMEDY)
         except RfgsFormatError as error:
             # In the file, everything stands on one level.
             raise RfgsFormatError(str(error).replace(": settings.", ": ", 1)) from error
@@ -101,11 +99,16 @@ class RunConfig:
         return config
 
 
+def relative_dataset(run: Path, dataset: Path) -> str:
+    """Path of the dataset as stored in a run: relative, so that both can move together."""
+    return Path(os.path.relpath(dataset.resolve(), run.resolve())).as_posix()
+
+
 _REMEDY = "train again"
 _OWN = tuple(field.name for field in fields(RunConfig) if field.name not in ("settings", "train_s"))
 _SETTINGS = tuple(field.name for field in fields(TrainConfig) if field.name not in _NOT_KEPT)
 
-_KNOWN = frozenset((*_OWN, *_SETTINGS))
+_KNOWN, _BESIDE = frozenset((*_OWN, *_SETTINGS)), frozenset(("schema", "train_s"))
 
 
 def _need_entries(path: Path, stored: dict[str, Any]) -> None:
@@ -114,9 +117,9 @@ def _need_entries(path: Path, stored: dict[str, Any]) -> None:
     Raises:
         RfgsFormatError: There are such; they are named.
     """
-    missing, unknown = _KNOWN - stored.keys(), stored.keys() - _KNOWN - {"schema", "train_s"}
-    if missing or unknown:
-        parts = (("missing", sorted(missing)), ("unknown", sorted(unknown)))
+    entries = stored.keys() - _BESIDE
+    if entries != _KNOWN:
+        parts = (("missing", sorted(_KNOWN - entries)), ("unknown", sorted(entries - _KNOWN)))
         found = "; ".join(f"{', '.join(names)} {word}" for word, names in parts if names)
         raise RfgsFormatError(
             f"{path}: expected the entries of this version of rfgs, found {found}; use the "

@@ -3,9 +3,7 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +12,7 @@ from jaxtyping import Complex64, Float64
 
 from rfgs_core.arrays import Shape, load_arrays
 from rfgs_core.bodies.body_prior import Bodies
-from rfgs_core.dataset import Sequence, open_dataset
+from rfgs_core.dataset import Sequence
 from rfgs_core.dataset.observed import Observed
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.gaussians import FEATURE_DIM, Gaussians
@@ -26,7 +24,8 @@ from rfgs_core.model.reflectivity import fitted_reflectivities
 from rfgs_core.model.unseen_pairs import levelled
 from rfgs_core.radio.levels import power_of
 from rfgs_core.run.calibration import read_calibration
-from rfgs_core.run.config import RunConfig
+from rfgs_core.run.config import RunConfig, relative_dataset
+from rfgs_core.run.data import trained_sequence
 from rfgs_core.run.static import static_gaussians
 from rfgs_core.threads import one_torch_thread
 
@@ -83,7 +82,14 @@ class Run:
         """
         config = self.config
         place = (self.path / config.dataset).resolve()
-        return _sequence(self.path, place, config.sequence, config.dataset_fingerprint)
+        return trained_sequence(self.path, place, config.sequence, config.dataset_fingerprint)
+
+    def with_dataset(self, place: Path) -> Run:
+        """The run, once it is written down that its dataset lies elsewhere now."""
+        config = replace(self.config, dataset=relative_dataset(self.path, place))
+        if config != self.config:
+            config.write(self.path)
+        return replace(self, config=config)
 
     @property
     def calibrated(self) -> bool:
@@ -178,7 +184,7 @@ class Run:
     def moving(self, frame: int) -> Gaussians:
         """Moving Gaussians of a frame with their features."""
         features = self.attributes(frame)["features"]
-        return read_ply(self.ply_path(frame)).to_gaussians(features)
+        return read_ply(self.ply_path(frame), _REMEDY).to_gaussians(features)
 
     def bodies(self, frame: int) -> Bodies | None:
         """Where the bodies of a frame are and how they hold themselves; None without checkpoint.
@@ -289,26 +295,9 @@ class Run:
         return (csi * turn).astype(np.complex64)
 
 
-@lru_cache(maxsize=8)
-def _sequence(run: Path, place: Path, name: str, fingerprint: str) -> Sequence:
-    dataset = open_dataset(place)
-    if dataset.fingerprint != fingerprint:
-        raise RfgsError(
-            f"{run} was trained on another dataset than {place} holds now (expected fingerprint "
-            f"{fingerprint[:12]}, found {dataset.fingerprint[:12]}); train again or restore that "
-            "dataset"
-        )
-    return dataset.sequence(name)
-
-
 def checkpoint_path(run: Path, frame: int) -> Path:
     """State of a fitted frame in a run's folder."""
     return run / "checkpoints" / f"{frame:06d}.npz"
-
-
-def relative_dataset(run: Path, dataset: Path) -> str:
-    """Path of the dataset as stored in a run: relative, so that both can move together."""
-    return Path(os.path.relpath(dataset.resolve(), run.resolve())).as_posix()
 
 
 def open_run(path: Path) -> Run:

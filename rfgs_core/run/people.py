@@ -18,11 +18,11 @@ from rfgs_core.background.learned import learned_background
 from rfgs_core.bodies.count import FEWEST_PAIRS, count_bodies
 from rfgs_core.dataset import Sequence
 from rfgs_core.errors import RfgsError, RfgsFormatError
-from rfgs_core.files import write_json
 from rfgs_core.measure.observations import observe
-from rfgs_core.records import read_record
+from rfgs_core.records import record
 from rfgs_core.run.config import CONFIG_FILE
 from rfgs_core.run.folder import Run
+from rfgs_core.seals import read_sealed_json, write_sealed_json
 from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import TrainConfig
 from rfgs_core.threads import one_torch_thread
@@ -62,7 +62,7 @@ class HeadCount:
 
     def write(self, run: Path) -> None:
         """Keeps it in a run."""
-        write_json(run / PEOPLE_FILE, asdict(self))
+        write_sealed_json(run / PEOPLE_FILE, asdict(self))
 
     @staticmethod
     def read(run: Path) -> HeadCount | None:
@@ -74,7 +74,7 @@ class HeadCount:
         path = run / PEOPLE_FILE
         if not path.exists():
             return None
-        kept = read_record(path, HeadCount, _REMEDY)
+        kept: HeadCount = record(path, read_sealed_json(path, _REMEDY), HeadCount, _REMEDY)
         if kept.votes and kept.count != voted(list(kept.votes.values())):
             raise RfgsFormatError(f"{path}: {kept.count} is not what most votes say; {_REMEDY}")
         return kept

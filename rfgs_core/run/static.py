@@ -101,7 +101,6 @@ def static_cloud(run: Path) -> GaussianCloud:
     path = static_ply(run)
     if not has_static_set(run):
         return read_ply(path) if path.exists() else cloud_of(Gaussians.none())
-    try:
-        return read_ply(path)
-    except RfgsError as error:
-        raise RfgsFormatError(f"{error}; {_REMEDY}") from error
+    if not path.exists():
+        raise RfgsFormatError(f"{path}: no such file; {_REMEDY}")
+    return read_ply(path, _REMEDY)

@@ -39,7 +39,7 @@ from rfgs_core.run.calibration import (
     write_calibration,
 )
 from rfgs_core.run.checkpoint import finished_frame, partial_path, store_frame
-from rfgs_core.run.config import CONFIG_FILE, RunConfig
+from rfgs_core.run.config import CONFIG_FILE, RunConfig, relative_dataset
 from rfgs_core.run.costs import CostBar, cost_bar, pose_stage, price_line
 from rfgs_core.run.encoders import (
     ENCODER_FILE,
@@ -51,7 +51,6 @@ from rfgs_core.run.folder import (
     BACKGROUND_FILE,
     Run,
     open_run,
-    relative_dataset,
 )
 from rfgs_core.run.limbs import (
     Limbs,
@@ -292,6 +291,8 @@ def _open_or_create(out: Path, config: RunConfig) -> Run:
         config.write(out)
         return Run(out, config)
     run = open_run(out)
+    if config.dataset_fingerprint == run.config.dataset_fingerprint:
+        run = run.with_dataset(out / config.dataset)
     differing = config.differing(run.config)
     if differing:
         raise RfgsError(

@@ -16,12 +16,12 @@ from rfgs_core.evaluate.field_run import Given, fit_fields
 from rfgs_core.evaluate.metrics import METHOD, evaluate_method, evaluate_run
 from rfgs_core.evaluate.provenance import hardware, now, versions
 from rfgs_core.evaluate.residual import GAUSSIANS_ALONE
-from rfgs_core.files import read_json, write_json
 from rfgs_core.links import refuse_link
 from rfgs_core.measure.observations import observe
 from rfgs_core.neural.settings import FieldSettings
 from rfgs_core.records import record
 from rfgs_core.run.training import train_sequence
+from rfgs_core.seals import read_sealed_json, write_sealed_json
 from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import TrainConfig, TrainOptions
 from rfgs_core.study.cases import SCENES
@@ -165,7 +165,7 @@ def stored(cell: Cell, out: Path, size: Size) -> dict[str, Any] | None:
     if not path.exists():
         return None
     remedy = "delete it to make it again"
-    found = record(path, read_json(path), dict[str, Any], remedy)
+    found = read_sealed_json(path, remedy)
     record(path, found, _Made, remedy)
     if (found["scene"], found["radio"], found["method"]) != (cell.scene, cell.radio, cell.method):
         raise RfgsFormatError(f"{path}: tells of another cell; {remedy}")
@@ -219,7 +219,7 @@ def make(cell: Cell, out: Path, size: Size) -> dict[str, Any]:
         "versions": versions(),
         "date": now(),
     }
-    write_json(out / "cells" / f"{cell.name}.json", result)
+    write_sealed_json(out / "cells" / f"{cell.name}.json", result)
     return result
 
 

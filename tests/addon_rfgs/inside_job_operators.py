@@ -10,7 +10,7 @@ from pathlib import Path
 
 import bpy
 import pytest
-from pretended_jobs import plan
+from pretended_jobs import plan, rewrite
 
 import addon_rfgs
 from addon_rfgs.cli import run
@@ -42,7 +42,7 @@ def test_resume_runs_the_blender_of_the_preferences(
     file = record_file(made)
     row = json.loads(file.read_text())
     row["settings"]["blender"] = "/evil/blender"
-    file.write_text(json.dumps(row))
+    rewrite(file, row)
     run(["resume", made.out, "--python", str(program("quick"))])
     assert following.QUEUE.jobs[-1].plan.blender == "/own/blender"
 

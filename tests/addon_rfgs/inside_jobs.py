@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 
 import pytest
-from pretended_jobs import plan
+from pretended_jobs import plan, rewrite
 
 from addon_rfgs.errors import AddonError
 from addon_rfgs.jobs import queue
@@ -173,7 +173,7 @@ def test_records_from_anywhere_are_refused_in_one_line(
 ) -> None:
     job = jobs.add(plan(tmp_path, "a"), program("quick"))
     file = record_file(job.plan)
-    file.write_text(json.dumps(damage(json.loads(file.read_text()))))
+    rewrite(file, damage(json.loads(file.read_text())))
     with pytest.raises(AddonError) as caught:
         read_record(file)
     assert "\n" not in str(caught.value) and str(file) in str(caught.value)
@@ -236,7 +236,7 @@ def test_a_record_of_an_adversary_starts_our_commands_alone(tmp_path: Path, kind
     rows += [{**sound, name: value} for name in (*sound, "python", "argv") for value in HOSTILE]
     accepted = 0
     for row in rows:
-        file.write_text(json.dumps(row))
+        rewrite(file, row)
         try:
             arguments = with_blender(read_record(file).plan, "/own/blender").arguments()
         except AddonError as error:

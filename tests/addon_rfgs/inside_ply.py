@@ -11,11 +11,22 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from splat_files import BARE, COLUMNS, FORMATS, REST, rows_of, write, write_run
+from splat_files import (
+    BARE,
+    COLUMNS,
+    FORMATS,
+    REST,
+    rows_of,
+    save_sealed,
+    write,
+    write_run,
+    write_sealed,
+)
 
 from addon_rfgs.errors import AddonError
 from addon_rfgs.gaussians import cloud_mesh, features, ply, splats
 from addon_rfgs.gaussians.clouds import Inspection, import_gaussians
+from addon_rfgs.seals import BLANK, sealed
 
 pytestmark = pytest.mark.usefixtures("registered")
 
@@ -222,13 +233,16 @@ def test_features_are_read_and_damaged_ones_refused(tmp_path: Path) -> None:
 
 
 def test_hostile_features_run_nothing_and_allocate_nothing(tmp_path: Path) -> None:
-    path = tmp_path / "a.features.npz"
-    np.savez(path, track_id=np.array([print] * 3, dtype=object))
+    cloud = write_sealed(tmp_path / "a.ply", rows_of(COLUMNS, 3))
+    path = save_sealed(tmp_path / "a.features.npz", track_id=np.array([print] * 3, dtype=object))
     with pytest.raises(AddonError, match="track_id"):
-        features.read_features(tmp_path / "a.ply", 3)
+        features.read_features(cloud, 3)
     header = np.lib.format.header_data_from_array_1_0(np.zeros((1, 1), np.float32))
     header["shape"] = (3, 2**40)
     with zipfile.ZipFile(path, "w") as archive, archive.open("features.npy", "w") as stream:
         np.lib.format.write_array_header_1_0(stream, header)
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.comment = BLANK.encode()
+    path.write_bytes(sealed(path.read_bytes()))
     with pytest.raises(AddonError, match="features has shape"):
-        features.read_features(tmp_path / "a.ply", 3)
+        features.read_features(cloud, 3)

@@ -3,10 +3,14 @@
 
 from __future__ import annotations
 
+import io
+import struct
 from pathlib import Path
 
 import numpy as np
 from plyfile import PlyData, PlyElement
+
+from addon_rfgs.seals import BLANK, sealed
 
 COLUMNS = [
     *("x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2", "opacity"),
@@ -41,21 +45,39 @@ def write(path: Path, rows: np.ndarray, form: str = "little", faces: int = 0) ->
     return path
 
 
+def save_sealed(path: Path, **arrays: np.ndarray) -> Path:
+    """Writes arrays as the trainer does, with a seal in the archive's comment."""
+    stream = io.BytesIO()
+    np.savez(stream, **arrays)
+    comment = struct.pack("<H", len(BLANK)) + BLANK.encode()
+    path.write_bytes(sealed(stream.getvalue()[:-2] + comment))
+    return path
+
+
+def write_sealed(path: Path, rows: np.ndarray) -> Path:
+    """Writes rows as the trainer does, with a seal in a comment."""
+    stream = io.BytesIO()
+    element = PlyElement.describe(rows, "vertex")
+    PlyData([element], byte_order="<", comments=[BLANK]).write(stream)
+    path.write_bytes(sealed(stream.getvalue()))
+    return path
+
+
 def write_run(folder: Path, frames: tuple[int, ...], count: int = 40, grey: bool = False) -> Path:
     """A run folder: a cloud and its features.npz per frame, and an empty static cloud."""
     clouds = folder / "gaussians"
     clouds.mkdir(parents=True)
-    write(clouds / "static.ply", rows_of(COLUMNS, 0))
+    write_sealed(clouds / "static.ply", rows_of(COLUMNS, 0))
     for frame in frames:
         rows = rows_of(COLUMNS, count, seed=frame)
         for index in range(3):
             rows[f"scale_{index}"] -= 4
             if grey:
                 rows[f"f_dc_{index}"] = 0
-        write(clouds / f"{frame:06d}.ply", rows)
+        write_sealed(clouds / f"{frame:06d}.ply", rows)
         rng = np.random.default_rng(frame)
         gamma = rng.normal(size=(count, 1)) + 1j * rng.normal(size=(count, 1))
-        np.savez(
+        save_sealed(
             clouds / f"{frame:06d}.features.npz",
             features=rng.normal(size=(count, 32)).astype(np.float32),
             gamma=gamma.astype(np.complex64),

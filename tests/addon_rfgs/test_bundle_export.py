@@ -57,7 +57,7 @@ def test_unit_scale_changes_nothing_in_metres(scenes: Path, room: Bundle) -> Non
 
 
 def test_golden_bundle(room: Bundle) -> None:
-    assert room.info["schema"] == "rfgs-bundle/1" and room.info["blend_name"] == "room"
+    assert room.info["schema"] == "rfgs-bundle/2" and room.info["blend_name"] == "room"
     assert (room.frames, room.fps) == ([1, 2, 3, 4, 5], 10.0)
     assert [row["name"] for row in room.objects] == ["body", "crate", "floor"]
     assert [row["moving"] for row in room.objects] == [True, False, False]

@@ -59,7 +59,7 @@ def attack(form: Format, count: int, seed: int) -> dict[str, Any]:
         outcome, why = _outcome(form, expected)
         slowest = max(slowest, time.perf_counter() - begin)
         counts[outcome] += 1
-        if outcome not in ("refused", "same", "found", "plausible"):
+        if outcome not in ("refused", "same", "found", "theirs"):
             keep = form.file.parent.parent / f"fault-{form.name.replace(' ', '-')}-{number}"
             faults.append(f"{outcome}: {why}")
             if os.environ.get("KEEP_FAULTS"):
@@ -75,9 +75,11 @@ def _outcome(form: Format, expected: str) -> tuple[str, str]:
         found = digest(form.read())
         if found == expected:
             return "same", ""
-        # Checksums tell what no reader can: another value that could be right.
+        if form.theirs:
+            return "theirs", ""
+        # Checksums of a dataset tell what no reader can: another value that could be right.
         if form.dataset is None:
-            return "plausible", ""
+            return "unnoticed", ""
         if form.name.endswith("manifest"):
             return "found", ""
         return ("found", "") if checksum_faults(form.dataset) else ("unnoticed", "")

@@ -14,6 +14,7 @@ from typing import Any
 
 import mutations
 import numpy as np
+from bundle_files import describe_bundle
 from mutations import Mutation
 from tiny_dataset import write_tiny_dataset
 
@@ -21,15 +22,18 @@ from dataset_factory.check.validate import checksum_faults
 from dataset_factory.make.impair import impair_dataset
 from dataset_factory.scene.bundle import read_bundle
 from dataset_factory.scene.overrides import SceneOptions, read_options
+from dataset_factory.scene.report_rows import read_guesses
+from rfgs_core.arrays import save_arrays
 from rfgs_core.dataset import open_dataset
 from rfgs_core.dataset.path_store import read_paths
+from rfgs_core.dataset.schema import read_dataset_info
 from rfgs_core.dataset.sequence import Sequence
-from rfgs_core.dataset.writer import MANIFEST, own_digest, write_arrays
+from rfgs_core.dataset.writer import MANIFEST, finish_dataset, own_digest, write_arrays
 from rfgs_core.encode.learned import load_encoder
 from rfgs_core.encode.learned.encoder import EncoderModel, LearnedEncoder
 from rfgs_core.encode.learned.signature import RadioSignature
 from rfgs_core.encode.learned.store import save_encoder
-from rfgs_core.files import sha256
+from rfgs_core.files import sha256, write_json
 from rfgs_core.radio import preset
 from rfgs_core.radio.files import radio_text, radio_values, read_radio
 from rfgs_core.radio.impairments import IMPAIRMENT_PRESETS, read_impairments
@@ -41,7 +45,11 @@ from rfgs_core.run.calibration import read_calibration
 from rfgs_core.run.checkpoint import finished_frame
 from rfgs_core.run.static import read_static_set
 from rfgs_core.run.training import train_sequence
+from rfgs_core.seals import write_sealed_json
 from rfgs_core.settings import TrainConfig
+
+#: Where a dataset of one frame keeps a table of paths.
+PATHS = Path("tiny/radio/wifi/paths/000001.npz")
 
 
 @dataclass(frozen=True)
@@ -56,6 +64,8 @@ class Format:
     """The dataset that the file belongs to, whose checksums then find every change."""
     seal: Callable[[], None] | None = None
     """Makes the dataset's digests fit the changed file, as somebody who wants to harm would."""
+    theirs: bool = False
+    """Whether people, radios or other programs write it: another sound value is their choice."""
 
 
 def digest(value: Any) -> str:
@@ -89,6 +99,7 @@ def make_all(folder: Path) -> list[Format]:
     """Writes sound files of all formats."""
     data = write_tiny_dataset(folder / "data")
     impair_dataset(data, IMPAIRMENT_PRESETS["commodity"])
+    add_path_table(data)
     plain = Path(shutil.copytree(data, folder / "plain"))
     run = _trained(plain, folder / "run")
     return [*_dataset(data), *_run(run), *_inputs(folder), *_bundle(folder / "bundle")]
@@ -121,7 +132,8 @@ def _dataset(data: Path) -> list[Format]:
         Format(name, file, mutate, lambda: _everything(data), data)
         for name, (file, mutate) in files.items()
     ]
-    manifest = data / MANIFEST
+    manifest, paths = data / MANIFEST, data / PATHS
+    made.append(Format("paths", paths, mutations.arrays_of, lambda: read_paths(paths), data))
 
     def seal() -> None:
         info = json.loads((data / "dataset.json").read_text())
@@ -170,14 +182,14 @@ def _trained(data: Path, out: Path) -> Path:
     )  # fmt: skip
     train_sequence(dataset, dataset.sequence(), "wifi", [1, 2], config, out)
     shape = {"W1": (HIDDEN, 32), "W2": (HIDDEN, HIDDEN), "W3": (3, HIDDEN)}
-    write_arrays(out / "shader.npz", **{name: np.ones(s, np.float32) for name, s in shape.items()})
+    save_arrays(out / "shader.npz", {name: np.ones(s, np.float32) for name, s in shape.items()})
     return out
 
 
 def _run(path: Path) -> list[Format]:
     from whole_metrics import whole_metrics
 
-    (path / "metrics.json").write_text(json.dumps(whole_metrics()))
+    write_sealed_json(path / "metrics.json", whole_metrics())
     ply = path / "gaussians/000001.ply"
 
     def frame() -> Any:
@@ -234,25 +246,32 @@ def _inputs(folder: Path) -> list[Format]:
         made = load_encoder(encoder)
         return [made.kind, made.radio, dict(made.model.state_dict())]
 
-    paths = folder / "paths.npz"
-    write_path_table(paths)
     scene = folder / "scene.yaml"
     options = SceneOptions(scene_config=scene)
     lab = [folder / name for name in ("lab.yaml", "lab.json", "worn.json")]
     return [
-        Format("radio yaml", lab[0], mutations.text_of, lambda: read_radio(lab[0])),
-        Format("radio json", lab[1], mutations.json_of, lambda: read_radio(lab[1])),
-        Format("impairments", lab[2], mutations.json_of, lambda: read_impairments(str(lab[2]))),
+        Format("radio yaml", lab[0], mutations.text_of, lambda: read_radio(lab[0]), theirs=True),
+        Format("radio json", lab[1], mutations.json_of, lambda: read_radio(lab[1]), theirs=True),
         Format(
-            "scene yaml", folder / "scene.yaml", mutations.text_of, lambda: read_options(options)
+            "impairments",
+            lab[2],
+            mutations.json_of,
+            lambda: read_impairments(str(lab[2])),
+            theirs=True,
+        ),
+        Format(
+            "scene yaml",
+            folder / "scene.yaml",
+            mutations.text_of,
+            lambda: read_options(options),
+            theirs=True,
         ),
         Format("encoder", encoder, mutations.arrays_of, weights),
-        Format("paths", paths, mutations.arrays_of, lambda: read_paths(paths)),
     ]
 
 
-def write_path_table(file: Path) -> None:
-    """Three paths of two corners."""
+def add_path_table(dataset: Path) -> Path:
+    """Gives a dataset a table of three paths of two corners."""
     columns = {
         **dict.fromkeys(("tx_site", "rx_site", "tx_device", "rx_device"), np.zeros(3, np.int32)),
         "delay_s": np.arange(3.0) * 1e-9,
@@ -269,7 +288,9 @@ def write_path_table(file: Path) -> None:
         "object": np.ones((3, 2), np.int32),
         "vertices": np.ones((3, 4, 3), np.float32),
     }
-    write_arrays(file, **columns)
+    write_arrays(dataset / PATHS, **columns)
+    finish_dataset(dataset, read_dataset_info(dataset / "dataset.json"))
+    return dataset / PATHS
 
 
 def _bundle(folder: Path) -> list[Format]:
@@ -280,7 +301,7 @@ def _bundle(folder: Path) -> list[Format]:
     camera |= dict.fromkeys(("fl_x", "fl_y", "cx", "cy"), 4.0)
     pose = {"position_m": [0.0, 0.0, 1.0], "quat_wxyz": [1.0, 0.0, 0.0, 0.0]}
     about = {
-        "schema": "rfgs-bundle/1", "blend_name": "a", "blend_sha256": "0", "blender_version": "5",
+        "schema": "rfgs-bundle/2", "blend_name": "a", "blend_sha256": "0", "blender_version": "5",
         "fps": 10.0, "frame_start": 1, "frame_end": 1, "frames": [1],
         "bounds_m": [[0, 0, 0], [1, 1, 1]], "cameras": [camera],
         "devices": [{"name": "d", "radio": "wifi", "role": "ACCESS_POINT", **pose}],
@@ -294,7 +315,6 @@ def _bundle(folder: Path) -> list[Format]:
         "instances": [{"id": 1, "name": "p", "class": "person", "person": True}],
         "room": {"box_m": [[0, 0, 0], [1, 1, 1]], "stand_m": [0, 0, 0], "seen_m": [[0, 0, 1]]},
     }  # fmt: skip
-    (folder / "bundle.json").write_text(json.dumps(about))
     one = np.zeros(1, np.int32)
     write_arrays(
         folder / "topology.npz", faces=np.array([[0, 1, 2]], np.int32), material=one,
@@ -308,13 +328,18 @@ def _bundle(folder: Path) -> list[Format]:
         segment_velocity=np.zeros((1, 17, 3), np.float32), person_instance=one + 1,
     )  # fmt: skip
 
+    guess = {"object": "o", "what": "material", "value": "skin", "why": "armature"}
+    write_json(folder / "guesses.json", [guess])
+    describe_bundle(folder, about)
+
     def read() -> Any:
         bundle = read_bundle(folder)
-        return [bundle, bundle.frame(bundle.frames[0])]
+        return [bundle, bundle.frame(bundle.frames[0]), read_guesses(bundle.file("guesses.json"))]
 
     files = {
         "bundle.json": (folder / "bundle.json", mutations.json_of),
         "bundle topology": (folder / "topology.npz", mutations.arrays_of),
         "bundle frame": (folder / "frames/000001.npz", mutations.arrays_of),
+        "guesses": (folder / "guesses.json", mutations.json_of),
     }
     return [Format(name, file, mutate, read) for name, (file, mutate) in files.items()]

@@ -11,21 +11,22 @@ from typing import Any
 
 import mutations
 import numpy as np
+from bundle_files import describe_bundle
 from formats import Format
 
 from dataset_factory.scene.bundle import read_bundle
 from dataset_factory.scene.motion import read_motion, read_velocity
-from dataset_factory.scene.outline import Outline
-from dataset_factory.scene.report_rows import read_guesses, read_report
+from dataset_factory.scene.outline import Outline, read_outline_file
+from dataset_factory.scene.report_rows import read_report
 from rfgs_core.arrays import save_arrays
 from rfgs_core.articulated.space import SHAPE_SPACE, read_shape_space
 from rfgs_core.capture.layout_file import read_layout
 from rfgs_core.errors import RfgsFormatError
-from rfgs_core.files import read_json, write_json
+from rfgs_core.files import read_json
 from rfgs_core.live.counts import Counts
 from rfgs_core.live.records import READERS, Packets, decode
-from rfgs_core.records import read_record
 from rfgs_core.run import open_run
+from rfgs_core.seals import write_sealed_json
 from rfgs_core.study.table1 import SIZES, cells, settings_of, stored
 from rfgs_core.study.table1_rows import method_rows, method_table
 
@@ -86,7 +87,7 @@ def make_others(folder: Path, run: Path, bundle: Path) -> list[Format]:
         _cell(folder),
         Format(
             "layout of a capture", folder / "layout.yaml", mutations.text_of,
-            lambda: read_layout(folder / "layout.yaml"),
+            lambda: read_layout(folder / "layout.yaml"), theirs=True,
         ),
         Format("shape space", space, mutations.arrays_of, lambda: read_shape_space(space)),
         *_packets(folder),
@@ -95,9 +96,8 @@ def make_others(folder: Path, run: Path, bundle: Path) -> list[Format]:
 
 def _background(run: Path) -> Format:
     """What a run has learned of the empty room."""
-    config = read_json(run / "config.json")
-    config["background"] = "learned"
-    write_json(run / "config.json", config)
+    file = run / "config.json"
+    write_sealed_json(file, {**read_json(file), "background": "learned"})
     seen = open_run(run).sequence.csi_static("wifi")
     save_arrays(run / "background.npz", {"empty": np.zeros(seen.shape[-3:], np.complex64)})
     return Format(
@@ -108,9 +108,6 @@ def _background(run: Path) -> Format:
 
 def _moving(bundle: Path) -> list[Format]:
     """Poses between frames, and velocities."""
-    about = read_json(bundle / "bundle.json")
-    about["poses"] = [{"span_s": 0.02, "offset_s": [0.01, 0.02]}]
-    write_json(bundle / "bundle.json", about)
     file = bundle / "frames/000001.npz"
     with np.load(file) as found:
         arrays = {name: found[name] for name in found.files}
@@ -120,7 +117,9 @@ def _moving(bundle: Path) -> list[Format]:
         "pose_vertices": np.stack([body, body]),
         "vertex_velocity": np.ones_like(body),
     }
-    save_arrays(file, {**arrays, **more})
+    np.savez(file, **{**arrays, **more})
+    poses = [{"span_s": 0.02, "offset_s": [0.01, 0.02]}]
+    describe_bundle(bundle, {**read_bundle(bundle).info, "poses": poses})
 
     def read() -> Any:
         opened = read_bundle(bundle)
@@ -136,15 +135,13 @@ def _moving(bundle: Path) -> list[Format]:
 
 def _reports(folder: Path) -> list[Format]:
     """What the add-on tells of a scene."""
-    guesses, check, outline = (folder / f"{name}.json" for name in ("guesses", "check", "outline"))
-    write_json(check, REPORT)
-    write_json(guesses, REPORT["guesses"])
+    check, outline = (folder / f"{name}.json" for name in ("check", "outline"))
+    write_sealed_json(check, REPORT)
     devices = [{"name": "d", "radio": "wifi", "role": "RECEIVER"}]
-    write_json(outline, asdict(Outline([1, 2], devices, 1, 0.75, 1, 10.0)))
+    write_sealed_json(outline, asdict(Outline([1, 2], devices, 1, 0.75, 1, 10.0)))
     return [
         Format("scene report", check, mutations.json_of, lambda: read_report(check)),
-        Format("guesses", guesses, mutations.json_of, lambda: read_guesses(guesses)),
-        Format("outline", outline, mutations.json_of, lambda: read_record(outline, Outline)),
+        Format("outline", outline, mutations.json_of, lambda: read_outline_file(outline)),
     ]
 
 
@@ -155,7 +152,7 @@ def _cell(folder: Path) -> Format:
     groups = {"geometry": {"f05": 0.5, "centroid_m": None}, "rf": {"element_snr_db": 3.0}}
     made = {**asdict(cell), "settings": settings_of(cell, size), "train_s": 1.5}
     file = folder / f"cells/{cell.name}.json"
-    write_json(file, {**made, "methods": {"rfgs": groups, "zero": groups}})
+    write_sealed_json(file, {**made, "methods": {"rfgs": groups, "zero": groups}})
 
     def read() -> Any:
         found = stored(cell, folder, size)
@@ -187,4 +184,4 @@ def _packet(file: Path, name: Packets, data: bytes) -> Format:
             raise RfgsFormatError("malformed")
         return heard[0].capture
 
-    return Format(f"packet of {name}", file, mutations.bytes_of, read)
+    return Format(f"packet of {name}", file, mutations.bytes_of, read, theirs=True)

@@ -161,4 +161,4 @@ def _recording(file: Path) -> Format:
                 raise
             raise RfgsFormatError(str(error)) from error
 
-    return Format("bvh", file, mutations.text_of, read)
+    return Format("bvh", file, mutations.text_of, read, theirs=True)

@@ -20,8 +20,8 @@ from whole_metrics import whole_metrics
 import dataset_factory.cli
 import rfgs_core.cli
 from rfgs_core.capture.layout_file import EXAMPLE
-from rfgs_core.files import write_json
-from rfgs_core.run import Run
+from rfgs_core.run import Run, open_run
+from rfgs_core.seals import write_sealed_json
 
 PROGRAMS: dict[str, Any] = {"rfgs": rfgs_core.cli, "rfgs-factory": dataset_factory.cli}
 #: Whatever takes longer waits for a pipe [s].
@@ -45,6 +45,7 @@ FOLDERS = {
     f"{_GENERATE} --frames 10:20:10 --no-images --out OUT": "log",
     f"{_GENERATE} --frames 20:30:10 --no-images --out OUT": ".work",
     "rfgs-factory preview DATA --out OUT": "index.html",
+    "rfgs-factory worlds --radio wifi --count 1 --frames 1 --out OUT": "worlds.json",
 }
 #: Commands of many parts: a dataset is there, and each part is refused.
 MANY = ("study", "table1")
@@ -133,10 +134,8 @@ def impatient() -> Iterator[None]:
 def places(tiny_dataset: Path, small_run: Run, tmp_path: Path) -> dict[str, Path]:
     """Words of the tables → what stands for them."""
     run = Path(shutil.copytree(small_run.path, tmp_path / "run"))
-    text = (run / "config.json").read_text()
-    place = os.path.relpath(tiny_dataset, run)
-    (run / "config.json").write_text(text.replace(small_run.config.dataset, place))
-    write_json(run / "metrics.json", whole_metrics())
+    open_run(run).with_dataset(tiny_dataset)
+    write_sealed_json(run / "metrics.json", whole_metrics())
     feitcsi_file(tmp_path / "capture.csi")
     (tmp_path / "layout.yaml").write_text(EXAMPLE)
     return {

@@ -48,7 +48,7 @@ def test_round_trip_and_equal_bytes(arrays, tmp_path: Path) -> None:
 )
 def test_what_does_not_fit_is_refused(arrays, tmp_path: Path, change: dict, message: str) -> None:
     changed = {name: value for name, value in (arrays | change).items() if value is not None}
-    np.savez(tmp_path / "a.npz", **changed)
+    save_arrays(tmp_path / "a.npz", changed)
     with pytest.raises(RfgsFormatError, match=rf"a\.npz: .*{message}.*; make it again"):
         load_arrays(tmp_path / "a.npz", "make it again", SHAPES)
 
@@ -62,17 +62,26 @@ def test_a_missing_file_and_a_single_array_are_refused(tmp_path: Path) -> None:
         load_arrays(tmp_path / "a.npz", "make it again")
 
 
-def test_no_damaged_byte_of_a_compressed_file_escapes(tmp_path: Path) -> None:
-    file = tmp_path / "a.npz"
-    np.savez_compressed(file, means=np.random.default_rng(0).random((20, 3)))
-    whole = file.read_bytes()
-    refused = 0
-    for position in range(0, len(whole), 3):
+def _refused(file: Path, *, seal: bool) -> float:
+    """Share of damaged bytes with which a file is refused."""
+    whole, refused = file.read_bytes(), 0
+    places = range(0, len(whole), 3)
+    for position in places:
         damaged = bytearray(whole)
         damaged[position] ^= 0xFF
         file.write_bytes(damaged)
         try:
-            load_arrays(file, "make it again", {"means": ("M", 3)})
+            load_arrays(file, "make it again", {"means": ("M", 3)}, seal=seal)
         except RfgsFormatError:
             refused += 1
-    assert refused > 0.5 * len(whole) / 3
+    return refused / len(places)
+
+
+def test_no_damaged_byte_of_a_compressed_file_escapes(tmp_path: Path) -> None:
+    arrays = {"means": np.random.default_rng(0).random((20, 3))}
+    save_arrays(tmp_path / "sealed.npz", arrays, packed=True)
+    np.savez_compressed(tmp_path / "plain.npz", **arrays)
+    with pytest.raises(RfgsFormatError, match=r"expected a seal .*found none.*; make it again"):
+        load_arrays(tmp_path / "plain.npz", "make it again")
+    assert _refused(tmp_path / "sealed.npz", seal=True) == 1.0
+    assert 0.5 < _refused(tmp_path / "plain.npz", seal=False) < 1.0

@@ -28,10 +28,7 @@ def data(tiny_dataset: Path, tmp_path: Path) -> Path:
 def run(small_run: Run, tiny_dataset: Path, tmp_path: Path) -> Path:
     """A copy that finds the dataset where it was."""
     copy = Path(shutil.copytree(small_run.path, tmp_path / "own_run"))
-    text = (copy / "config.json").read_text()
-    place = os.path.relpath(tiny_dataset, copy)
-    (copy / "config.json").write_text(text.replace(small_run.config.dataset, place))
-    return copy
+    return open_run(copy).with_dataset(tiny_dataset).path
 
 
 def elsewhere(tmp_path: Path) -> Path:

@@ -13,6 +13,7 @@ from rfgs_core.cli.calls import call
 from rfgs_core.cli.study import StudyArgs, run
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import write_json
+from rfgs_core.seals import write_sealed_json
 from rfgs_core.study import CONDITIONS, RADIOS, SCENES, Case, cases, study_table, summarise
 from rfgs_core.study.price import price_line, timed_work
 
@@ -138,8 +139,8 @@ def test_a_case_that_fails_is_named_and_the_others_go_on(
     """One dataset is damaged; another case was finished before."""
     damaged, finished = (Case("two_crossing", "clean", radio, 0) for radio in ("wifi", "mmwave"))
     write_json(tmp_path / damaged.dataset / "dataset.json", {})
-    write_json(tmp_path / finished.run / "config.json", {})
-    write_json(tmp_path / finished.run / "metrics.json", whole_metrics(metrics(0.8)))
+    write_sealed_json(tmp_path / finished.run / "config.json", {})
+    write_sealed_json(tmp_path / finished.run / "metrics.json", whole_metrics(metrics(0.8)))
     assert run(StudyArgs(tmp_path, ("two_crossing",), ("clean",), ("wifi", "mmwave"), 1)) == 1
     text = (tmp_path / "study.md").read_text()
     assert text in capsys.readouterr().out
@@ -159,14 +160,14 @@ def test_a_study_says_what_is_left_and_learns_how_long_it_takes(
     assert "usual speeds of two cores" in line and "fewer --seeds" in line
     write_json(tmp_path / chosen[0].dataset / "dataset.json", {})
     with timed_work("train", chosen[0], tmp_path):
-        write_json(tmp_path / chosen[0].run / "config.json", {})
+        write_sealed_json(tmp_path / chosen[0].run / "config.json", {})
     assert list(tmp_path.rglob("study-*.json")), "the time of this training is kept"
-    write_json(tmp_path / chosen[0].run / "metrics.json", {})
+    write_sealed_json(tmp_path / chosen[0].run / "metrics.json", {})
     line = price_line(chosen, tmp_path)
     assert "3 cases; 0 datasets, 2 trainings and 2 evaluations to make" in line
     assert "evaluate estimated from usual speeds of two cores" in line
     for case in chosen:
-        write_json(tmp_path / case.run / "metrics.json", {})
+        write_sealed_json(tmp_path / case.run / "metrics.json", {})
     assert "0 evaluations to make; at most 0.0 MB; about 0 s;" in price_line(chosen, tmp_path)
 
 
@@ -185,7 +186,7 @@ def test_work_that_failed_or_went_on_tells_no_time(
         raise RfgsError("no")
     (tmp_path / case.run).mkdir(parents=True)
     with timed_work("train", case, tmp_path):
-        write_json(tmp_path / case.run / "config.json", {})
+        write_sealed_json(tmp_path / case.run / "config.json", {})
     assert not list(tmp_path.rglob("study-*.json"))
 
 

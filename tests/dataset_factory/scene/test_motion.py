@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
+from bundle_files import describe_bundle
 
 from dataset_factory.scene.blender import Blender
 from dataset_factory.scene.bundle import Bundle, read_bundle
@@ -54,13 +56,19 @@ def test_a_span_ends_where_the_next_frame_begins(walk: Bundle) -> None:
 def test_unknown_spans_and_damaged_poses_are_named(walk: Bundle, tmp_path: Path) -> None:
     with pytest.raises(RfgsFormatError, match=r"--span 0\.03"):
         read_motion(walk, 20, 0.03)
-    path = walk.path / "frames" / "000021.npz"
+    bundle = Path(shutil.copytree(walk.path, tmp_path / "bundle"))
+    path = bundle / "frames" / "000021.npz"
     with np.load(path) as stored:
         arrays = dict(stored)
     np.savez(path, **{**arrays, "pose_offset_s": arrays["pose_offset_s"] + 1e-3})
-    with pytest.raises(RfgsFormatError, match="000021"):
-        read_motion(walk, 21, WHOLE_FRAME)
-    np.savez(path, **arrays)
+    with pytest.raises(RfgsFormatError, match=r"000021\.npz: changed or damaged since the export"):
+        read_motion(read_bundle(bundle), 21, WHOLE_FRAME)
+    describe_bundle(bundle)
+    with pytest.raises(RfgsFormatError, match=r"000021\.npz: poses differ"):
+        read_motion(read_bundle(bundle), 21, WHOLE_FRAME)
+    path.unlink()
+    with pytest.raises(RfgsFormatError, match=r"000021\.npz: no such file; export"):
+        read_motion(read_bundle(bundle), 21, WHOLE_FRAME)
 
 
 @pytest.mark.parametrize(

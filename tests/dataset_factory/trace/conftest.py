@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from bundle_files import describe_bundle
 
 from dataset_factory.scene.bundle import Bundle, read_bundle
 from dataset_factory.trace.setup import prepare
@@ -58,7 +59,7 @@ def _description(files: list[str], material: str, scattering: float) -> dict[str
     steel = {"name": "steel", "radio_material": "metal", "thickness_m": 0.002}
     common = {"color": [0.5, 0.5, 0.5], "guessed": False}
     return {
-        "schema": "rfgs-bundle/1",
+        "schema": "rfgs-bundle/2",
         "blend_name": "test",
         "blend_sha256": "0" * 64,
         "blender_version": "4.5.0",
@@ -122,7 +123,8 @@ def write_bundle(
             person_instance=np.array([1], np.int32),
             action=np.array(["walk"]),
         )
-    write_json(folder / "bundle.json", _description(files, material, scattering))
+    write_json(folder / "guesses.json", [])
+    describe_bundle(folder, _description(files, material, scattering))
     return read_bundle(folder)
 
 

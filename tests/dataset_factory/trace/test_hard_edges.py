@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import trimesh
 from box_meshes import mesh_of
+from bundle_files import describe_bundle
 
 from dataset_factory.scene.bundle import Bundle, read_bundle
 from dataset_factory.verify.physical_optics import Cuboid as Box
@@ -301,5 +302,6 @@ def test_damaged_edges_are_named(
         arrays = dict(stored)
     bad = np.full(arrays["faces"].shape, 5, np.int8) if wrong is None else wrong
     np.savez(folder / "topology.npz", **arrays, edges=bad)
+    describe_bundle(folder)
     with pytest.raises(RfgsFormatError, match=r"topology\.npz: edges: expected"):
         read_bundle(folder)

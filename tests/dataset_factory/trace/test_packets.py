@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from bundle_files import describe_bundle
 
 from dataset_factory.scene.bundle import Bundle, read_bundle
 from dataset_factory.verify.closed_forms import error_db
 from rfgs_core.errors import RfgsError
-from rfgs_core.files import read_json, write_json
 from rfgs_core.radio import DevicePose, Radio, frame_samples
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
@@ -30,9 +30,8 @@ def in_motion(bundle: Bundle, velocity: tuple[float, float, float], span_s: floa
         way = offsets[:, None, None] * np.asarray(velocity)
         poses = (arrays["vertices"] + way).astype(np.float32)
         np.savez(path, **{**arrays, "pose_offset_s": offsets, "pose_vertices": poses})
-    info = read_json(bundle.path / "bundle.json")
     row = {"span_s": span_s, "offset_s": offsets.tolist()}
-    write_json(bundle.path / "bundle.json", {**info, "poses": [row]})
+    describe_bundle(bundle.path, {**bundle.info, "poses": [row]})
     return read_bundle(bundle.path)
 
 

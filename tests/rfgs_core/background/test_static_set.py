@@ -94,9 +94,7 @@ def own_run(static_run: Run, walled: Path, tmp_path: Path) -> Run:
     """A copy that a test may damage."""
     shutil.copytree(walled, tmp_path / "dataset")
     shutil.copytree(static_run.path, tmp_path / "run")
-    config = tmp_path / "run" / "config.json"
-    config.write_text(config.read_text().replace(static_run.config.dataset, "../dataset"))
-    return open_run(tmp_path / "run")
+    return open_run(tmp_path / "run").with_dataset(tmp_path / "dataset")
 
 
 def error_db(got: np.ndarray, true: np.ndarray) -> float:

@@ -21,6 +21,7 @@ from rfgs_core.figures.shapes import colouring
 from rfgs_core.report import write_demo_report, write_run_report
 from rfgs_core.report.cards import WORDS, headline_cards, in_words
 from rfgs_core.report.tables import metric_tables, show, text_table
+from rfgs_core.seals import write_sealed_json
 
 HEADINGS = (
     "What the radio measures",
@@ -171,7 +172,7 @@ def test_compare_prints_and_writes_both_kinds(evaluated_run, tmp_path: Path, cap
     metrics = json.loads((other / "metrics.json").read_text())
     metrics["geometry"]["f10"] = 0.1
     metrics["conditions"]["radio"] = "mmwave"
-    (other / "metrics.json").write_text(json.dumps(metrics))
+    write_sealed_json(other / "metrics.json", metrics)
     for suffix in ("md", "html"):
         out = tmp_path / f"table.{suffix}"
         assert compare(CompareArgs(evaluated_run.path, other, out)) == 0
@@ -181,7 +182,7 @@ def test_compare_prints_and_writes_both_kinds(evaluated_run, tmp_path: Path, cap
     row = next(line for line in text.splitlines() if line.startswith("geometry.f10 "))
     assert row.endswith(evaluated_run.path.name)
     (other / "metrics.json").write_text("[]")
-    with pytest.raises(RfgsFormatError, match=r"metrics\.json: expected an object, found \[\]"):
+    with pytest.raises(RfgsFormatError, match=r"metrics\.json: expected an object"):
         compare(CompareArgs(evaluated_run.path, other))
 
 

@@ -54,9 +54,7 @@ def test_without_a_name_it_writes_into_the_run(
     shutil.copytree(small_run.path, tmp_path / "a" / "run")
     shutil.copytree(tiny_dataset, tmp_path / "a" / "dataset")
     run = tmp_path / "a" / "run"
-    config = run / "config.json"
-    config.write_text(config.read_text().replace(small_run.config.dataset, "../dataset"))
-    assert open_run(run).sequence.frames == [1, 2]
+    assert open_run(run).with_dataset(run.parent / "dataset").sequence.frames == [1, 2]
     assert main(["predict", str(run), "--tx", TX, "--rx", RX, "--also", str(run)]) == 0
     assert (run / "predictions/000001.npz").is_file()
     assert (run / "predictions/000001.png").is_file()

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import torch
 
+from rfgs_core.arrays import save_arrays
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.gaussians.ply import cloud_of, write_ply
@@ -66,10 +67,11 @@ def test_damaged_shader_files_are_refused(tmp_path: Path) -> None:
     with pytest.raises(RfgsFormatError, match=r"shader\.npz"):
         Shader.load(file)
     arrays = {"W1": np.zeros((64, 32)), "W2": np.zeros((64, 64)), "W3": np.zeros((3, 63))}
-    np.savez(file, **arrays)
+    save_arrays(file, arrays)
     with pytest.raises(RfgsFormatError, match="W3 has shape"):
         Shader.load(file)
-    np.savez(file, W1=np.array([{"pickled": 1}], dtype=object), W2=1, W3=1)
+    pickled = np.array([{"pickled": 1}], dtype=object)
+    save_arrays(file, {"W1": pickled, "W2": np.ones(1), "W3": np.ones(1)})
     with pytest.raises(RfgsFormatError, match=r"shader\.npz"):
         Shader.load(file)
 

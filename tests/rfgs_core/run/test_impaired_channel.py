@@ -14,10 +14,11 @@ from rfgs_core.dataset import open_dataset
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.evaluate.metrics import evaluate_run
 from rfgs_core.evaluate.scene import Scene
-from rfgs_core.files import read_json, write_json
+from rfgs_core.files import read_json
 from rfgs_core.measure.observations import observe
 from rfgs_core.radio.impairments import Impairments
 from rfgs_core.run import open_run
+from rfgs_core.seals import write_sealed_json
 
 
 def test_the_gain_that_receivers_report_is_taken_out(own_dataset: Path) -> None:
@@ -74,6 +75,8 @@ def test_a_run_of_an_unknown_channel_is_refused(
     own_dataset: Path, tmp_path: Path, train, quick_config
 ) -> None:
     run = train(own_dataset, tmp_path / "run", quick_config)
-    write_json(run.path / "config.json", {**read_json(run.path / "config.json"), "channel": "x"})
+    write_sealed_json(
+        run.path / "config.json", {**read_json(run.path / "config.json"), "channel": "x"}
+    )
     with pytest.raises(RfgsFormatError, match="channel: expected clean or impaired, found"):
         open_run(run.path)

@@ -12,8 +12,8 @@ import pytest
 from rfgs_core.arrays import load_arrays, save_arrays
 from rfgs_core.cli.pose import PoseArgs, run
 from rfgs_core.errors import RfgsError
-from rfgs_core.files import read_json, write_json
-from rfgs_core.run import Run
+from rfgs_core.files import read_json
+from rfgs_core.run import Run, open_run
 from rfgs_core.skeleton import JOINTS
 
 
@@ -21,9 +21,7 @@ from rfgs_core.skeleton import JOINTS
 def own_run(trained_run: Run, tiny_dataset: Path, tmp_path: Path) -> Path:
     """A copy of the run; `dataset` leads to the same data."""
     folder = Path(shutil.copytree(trained_run.path, tmp_path / "run"))
-    config = read_json(folder / "config.json")
-    write_json(folder / "config.json", {**config, "dataset": str(tiny_dataset)})
-    return folder
+    return open_run(folder).with_dataset(tiny_dataset).path
 
 
 def test_poses_errors_and_picture_are_written(own_run: Path, capsys) -> None:

@@ -23,15 +23,14 @@ from rfgs_core.measure import observations
 from rfgs_core.measure.observations import observe, visible_channel
 from rfgs_core.model.channel import Channel
 from rfgs_core.run import Run, open_run
+from rfgs_core.seals import write_sealed_json
 
 
 @pytest.fixture
 def own_run(trained_run: Run, own_dataset: Path) -> Path:
     """A copy of the run beside a copy of its dataset; both may be damaged."""
     folder = Path(shutil.copytree(trained_run.path, own_dataset.parent / "run"))
-    config = read_json(folder / "config.json")
-    write_json(folder / "config.json", {**config, "dataset": "../dataset"})
-    return folder
+    return open_run(folder).with_dataset(own_dataset).path
 
 
 def test_the_opened_run_is_the_trained_one(trained_run: Run) -> None:
@@ -184,14 +183,14 @@ def test_newer_and_damaged_settings_are_refused(tmp_path: Path, text: str) -> No
 def test_settings_without_a_needed_entry_are_refused(own_run: Path) -> None:
     config = read_json(own_run / "config.json")
     del config["frames"]
-    write_json(own_run / "config.json", config)
+    write_sealed_json(own_run / "config.json", config)
     with pytest.raises(RfgsFormatError, match=r"config\.json: .*frames"):
         open_run(own_run)
 
 
 def test_a_run_with_options_that_are_gone_is_refused_by_their_names(own_run: Path) -> None:
     old = {"power_trust": 0.0, "coarse_share": 0.0}
-    write_json(own_run / "config.json", {**read_json(own_run / "config.json"), **old})
+    write_sealed_json(own_run / "config.json", {**read_json(own_run / "config.json"), **old})
     expected = r"config\.json: .*found coarse_share, power_trust unknown; .*or train again"
     with pytest.raises(RfgsFormatError, match=expected):
         open_run(own_run)
@@ -212,7 +211,7 @@ def test_a_run_with_options_that_are_gone_is_refused_by_their_names(own_run: Pat
     ],
 )
 def test_settings_of_another_type_are_refused(own_run: Path, name: str, value: object) -> None:
-    write_json(own_run / "config.json", {**read_json(own_run / "config.json"), name: value})
+    write_sealed_json(own_run / "config.json", {**read_json(own_run / "config.json"), name: value})
     with pytest.raises(RfgsFormatError, match=rf"config\.json: {name}(\[0\])?: expected"):
         open_run(own_run)
 
@@ -250,7 +249,7 @@ def test_a_changed_dataset_is_refused(own_run: Path) -> None:
 
 def test_a_missing_dataset_is_refused(own_run: Path) -> None:
     shutil.rmtree(own_run.parent / "dataset")
-    with pytest.raises(RfgsError, match="no dataset there"):
+    with pytest.raises(RfgsError, match=r"is no longer at .*dataset; bring it back, or run"):
         _ = open_run(own_run).sequence
 
 
@@ -264,7 +263,7 @@ def test_a_frame_that_was_not_trained_is_refused(trained_run: Run) -> None:
 def test_damaged_arrays_are_refused(own_run: Path, name: str, size: int) -> None:
     file = own_run / name
     file.write_bytes(file.read_bytes()[:size])
-    with pytest.raises(RfgsFormatError, match=f"{Path(name).name}: damaged .*train this run again"):
+    with pytest.raises(RfgsFormatError, match=rf"{Path(name).name}: .*damaged.*train"):
         open_run(own_run).predict(1)
 
 

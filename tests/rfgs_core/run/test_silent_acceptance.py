@@ -16,6 +16,7 @@ import pytest
 from rfgs_core.arrays import load_arrays, save_arrays
 from rfgs_core.errors import RfgsError
 from rfgs_core.run import Run, open_run
+from rfgs_core.seals import BLANK, sealed
 
 
 @pytest.fixture
@@ -28,7 +29,8 @@ def copy(small_run: Run, tiny_dataset: Path, tmp_path: Path) -> Path:
 def edit(run: Path, **changes: Any) -> None:
     file = run / "config.json"
     # As Python writes infinity, which no JSON knows.
-    file.write_text(json.dumps({**json.loads(file.read_text()), **changes}))
+    entries = {**json.loads(file.read_text()), **changes, "seal": BLANK}
+    file.write_bytes(sealed(json.dumps(entries).encode()))
 
 
 @pytest.mark.parametrize(

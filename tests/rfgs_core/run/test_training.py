@@ -25,6 +25,7 @@ from rfgs_core.render.shader import ShaderConfig
 from rfgs_core.render.view import fit_run_shader
 from rfgs_core.run import Run, open_run
 from rfgs_core.run.training import train_sequence
+from rfgs_core.seals import write_sealed_json
 
 RESULTS = [
     "gaussians/000001.features.npz",
@@ -206,7 +207,7 @@ def test_a_run_of_a_newer_version_is_not_continued(
     trained_run: Run, tiny_dataset: Path, train, quick_config, tmp_path
 ) -> None:
     run = Path(shutil.copytree(trained_run.path, tmp_path / "run"))
-    write_json(run / "config.json", {**trained_run.config.entries, "schema": "rfgs-run/2"})
+    write_sealed_json(run / "config.json", {**trained_run.config.entries, "schema": "rfgs-run/2"})
     with pytest.raises(RfgsFormatError, match="expected schema rfgs-run/1, found rfgs-run/2"):
         train(tiny_dataset, run, quick_config)
 
@@ -217,10 +218,9 @@ def test_a_damaged_finished_frame_says_what_to_do(
     run = Path(shutil.copytree(trained_run.path, tmp_path / "run"))
     file = run / "checkpoints/000002.npz"
     file.write_bytes(file.read_bytes()[:3000])
-    config = read_json(run / "config.json")
+    # Where the dataset lies now is found out by the training.
     place = Path(shutil.copytree(tiny_dataset, tmp_path / "dataset"))
-    write_json(run / "config.json", {**config, "dataset": "../dataset"})
-    with pytest.raises(RfgsFormatError, match=r"checkpoints/000002\.npz: damaged.*delete it"):
+    with pytest.raises(RfgsFormatError, match=r"checkpoints/000002\.npz: .*damaged.*delete it"):
         train(place, run, quick_config)
     file.unlink()
     assert result_bytes(train(place, run, quick_config)) == result_bytes(trained_run)
@@ -247,9 +247,7 @@ def test_the_shader_changes_colours_only(trained_run: Run, tiny_dataset: Path, t
     root = tmp_path / "both"
     shutil.copytree(tiny_dataset, root / "dataset")
     shutil.copytree(trained_run.path, root / "run")
-    config = read_json(root / "run/config.json")
-    write_json(root / "run/config.json", {**config, "dataset": "../dataset"})
-    colored = open_run(root / "run")
+    colored = open_run(root / "run").with_dataset(root / "dataset")
     fit_run_shader(colored, ShaderConfig(1e-2, steps=3, pictures_per_step=1))
     for name in RESULTS + CHECKPOINTS:
         after, before = root / "run" / name, trained_run.path / name

@@ -14,8 +14,7 @@ from rfgs_core.gaussians import FEATURE_DIM, Gaussians
 from rfgs_core.gaussians.ply import cloud_of, write_ply
 from rfgs_core.model.head import RadioHead
 from rfgs_core.render.shader import Shader
-from rfgs_core.run.config import RunConfig
-from rfgs_core.run.folder import relative_dataset
+from rfgs_core.run.config import RunConfig, relative_dataset
 from rfgs_core.settings import TrainConfig
 
 #: Static Gaussians, which have no radio values of their own.

@@ -271,9 +271,7 @@ def test_wrong_runs_are_one_line(
     broken = tmp_path / "run"
     shutil.copytree(known_run.path, broken)
     (broken / "gaussians/000001.ply").write_text("ply")
-    text = (broken / "config.json").read_text()
-    place = (known_run.path / known_run.config.dataset).resolve()
-    (broken / "config.json").write_text(text.replace(known_run.config.dataset, str(place)))
+    open_run(broken).with_dataset(known_run.path / known_run.config.dataset)
     assert "000001.ply" in error_line([str(broken), "--port", "0"], capsys)
 
 

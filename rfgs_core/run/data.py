@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The data that a run was trained on."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+from rfgs_core.dataset import Sequence, open_dataset
+from rfgs_core.errors import RfgsError
+
+
+@lru_cache(maxsize=8)
+def trained_sequence(run: Path, place: Path, name: str, fingerprint: str) -> Sequence:
+    """The sequence of a run, out of the dataset at `place`.
+
+    Raises:
+        RfgsError: The dataset is gone, or is not the one of training.
+    """
+    if not place.exists():
+        raise RfgsError(
+            f"{run}: the dataset it was trained on is no longer at {place}; bring it back, or run "
+            "the same `rfgs train` with its new place"
+        )
+    dataset = open_dataset(place)
+    if dataset.fingerprint != fingerprint:
+        raise RfgsError(
+            f"{run} was trained on another dataset than {place} holds now (expected fingerprint "
+            f"{fingerprint[:12]}, found {dataset.fingerprint[:12]}); train again or restore that "
+            "dataset"
+        )
+    return dataset.sequence(name)

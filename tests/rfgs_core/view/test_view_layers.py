@@ -26,11 +26,11 @@ def boxed(tiny_dataset: Path) -> Sequence:
 
 @pytest.fixture
 def walled(tiny_dataset: Path, tmp_path: Path) -> Sequence:
-    """The same box, cut in two at x = 1.5 m, up to the ceiling."""
+    """The same box, cut in two at x = 1.52 m, up to the ceiling."""
     shutil.copytree(tiny_dataset, tmp_path / "walled")
     sequence = open_dataset(tmp_path / "walled").sequence()
     vertices, faces = sequence.static_mesh()
-    wall = np.array([[1.5, y, z] for y in (0.0, 3.0) for z in (0.0, 2.5)], np.float32)
+    wall = np.array([[1.52, y, z] for y in (0.0, 3.0) for z in (0.0, 2.5)], np.float32)
     more = np.array([[0, 1, 2], [1, 3, 2]], np.int32) + len(vertices)
     write_mesh(
         sequence.files.static_mesh, np.concatenate([vertices, wall]), np.concatenate([faces, more])

@@ -13,6 +13,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "plan": ("plan", "PlanArgs"),
     "radios": ("radios", "RadiosArgs"),
     "generate": ("generate", "GenerateArgs"),
+    "worlds": ("worlds", "WorldsArgs"),
     "validate": ("validate", "ValidateArgs"),
     "preview": ("preview", "PreviewArgs"),
     "impair": ("impair", "ImpairArgs"),

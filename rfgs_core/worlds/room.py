@@ -72,7 +72,7 @@ class Sight:
         kind = replace(kind, heights_m=tuple(heights))
         devices = place_devices(kind, room.bounds_m)
         if count > 4 or rng.random() > IN_CORNERS:
-            devices = _anywhere(rng, room, person, count)
+            devices = anywhere(rng, room.bounds_m, person[None], count)
         if not devices:
             return None
         placed = layout(kind, devices)
@@ -90,19 +90,29 @@ class Sight:
         return Sight(placed, links, subcarriers, radio.freq_hz, above_m)
 
 
-def _anywhere(
-    rng: np.random.Generator, room: Room, person: np.ndarray, count: int
+def anywhere(
+    rng: np.random.Generator,
+    bounds_m: Float64[np.ndarray, "2 3"],
+    apart_m: Float64[np.ndarray, "n 2"],
+    count: int,
 ) -> list[DevicePose]:
-    """Devices anywhere in a room, facing its middle roughly; none if they find no place."""
-    low, high = room.bounds_m[0, :2] + 0.1, room.bounds_m[1, :2] - 0.1
+    """Devices anywhere in a room, facing its middle roughly; none if they find no place.
+
+    Args:
+        rng: Where chance comes from.
+        bounds_m: The room [m].
+        apart_m: Where people are from above [m]; devices keep away from there and each other.
+        count: How many.
+    """
+    low, high = bounds_m[0, :2] + 0.1, bounds_m[1, :2] - 0.1
     devices: list[DevicePose] = []
     for _ in range(1000):
         x, y = rng.uniform(low, high)
-        others = np.array([person, *(device.position_m[:2] for device in devices)])
+        others = np.array([*apart_m, *(device.position_m[:2] for device in devices)])
         if np.linalg.norm(others - (x, y), axis=1).min() < _NEAREST_M:
             continue
         yaw = np.arctan2(-y, -x) + rng.normal(0.0, 0.4)
-        z = float(rng.uniform(_LOWEST_M, min(_HIGHEST_M, room.bounds_m[1, 2] - 0.1)))
+        z = float(rng.uniform(_LOWEST_M, min(_HIGHEST_M, bounds_m[1, 2] - 0.1)))
         quat = (float(np.cos(yaw / 2)), 0.0, 0.0, float(np.sin(yaw / 2)))
         devices.append(DevicePose(str(len(devices)), (float(x), float(y), z), quat))
         if len(devices) == count:

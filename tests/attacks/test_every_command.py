@@ -45,6 +45,7 @@ FOLDERS = {
     f"{_GENERATE} --frames 10:20:10 --no-images --out OUT": "log",
     f"{_GENERATE} --frames 20:30:10 --no-images --out OUT": ".work",
     "rfgs-factory preview DATA --out OUT": "index.html",
+    "rfgs-factory worlds --radio wifi --count 1 --frames 1 --out OUT": "worlds.json",
 }
 #: Commands of many parts: a dataset is there, and each part is refused.
 MANY = ("study", "table1")

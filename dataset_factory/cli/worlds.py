@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`rfgs-factory worlds`."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+from rfgs_core.errors import RfgsError
+
+
+@dataclass(frozen=True)
+class WorldsArgs:
+    """Makes small datasets of random worlds: rooms, furniture, devices and people who move.
+
+    Every world is a dataset of its own, OUT/world_0000012, with channels of the fast tracer,
+    meshes and joints, without Blender and without pictures. The same seed and number give the
+    same world, whoever makes it; run the same command again to continue where it stopped.
+    In Python, `rfgs_core.worlds.world.soundings` gives the same without writing anything.
+    """
+
+    out: Path
+    """Folder of the worlds."""
+    radio: str
+    """Radio to trace: a preset (see `rfgs-factory radios`) or a file like my_radio.yaml; how many
+    devices there are and where they stand is drawn for every world."""
+    count: int = 10
+    """How many worlds there shall be, all shards together."""
+    shard: str = "1/1"
+    """Which share of them this process makes, K/N: start one on every core or machine."""
+    frames: int = 8
+    """Frames of each world."""
+    fps: float = 10.0
+    """Frames per second."""
+    people: str = "1:2"
+    """Fewest and most people, up to 4."""
+    motion: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
+    """What people do, as in walk, sit, fall or gesture; repeat the option for several; default:
+    anything that needs no stairs."""
+    depth: int = 2
+    """Interactions of a path that meets a person: 1 the person alone, 2 also one wall, 3 two."""
+    seed: int = 0
+    """Root seed; 0 is a seed like any other."""
+
+
+def run(args: WorldsArgs) -> int:
+    """Makes what is missing; exit code 0."""
+    from tqdm import tqdm
+
+    from dataset_factory.make.worlds import MOST, make_worlds, missing, parse_shard
+    from dataset_factory.scene.radios import SCENE_RADIO, chosen_radios
+    from rfgs_core.files import refuse_place
+    from rfgs_core.links import filled
+    from rfgs_core.worlds.cast import FAMILIES_ON_FLOORS
+    from rfgs_core.worlds.world import WorldSettings
+
+    if not 1 <= args.count <= MOST:
+        raise RfgsError(f"--count {args.count}: expected 1 to {MOST}")
+    number, shards = parse_shard(args.shard)
+    (radio,) = chosen_radios((args.radio,)).values()
+    if radio.name == SCENE_RADIO:
+        raise RfgsError(f"--radio {SCENE_RADIO}: random worlds have no Empties; name another")
+    settings = WorldSettings(
+        frames=args.frames,
+        fps=args.fps,
+        people=parse_people(args.people),
+        depth=args.depth,
+        families=args.motion or FAMILIES_ON_FLOORS,
+    )
+    settings.check()
+    refuse_place(args.out)
+    indices = range(number - 1, args.count, shards)
+    with filled(args.out):
+        left = len(missing(args.out, indices))
+        with tqdm(total=left, desc="worlds", unit="world", disable=not left) as bar:
+            for _ in make_worlds(args.out, radio, settings, args.seed, indices):
+                bar.update()
+    sys.stdout.write(f"{args.out}: {len(indices)} worlds, {left} of them new\n")
+    return 0
+
+
+def parse_people(text: str) -> tuple[int, int]:
+    """Fewest and most people of `FEWEST:MOST` or of one number.
+
+    Raises:
+        RfgsError: The text is of another form.
+    """
+    fewest, _, most = text.partition(":")
+    if not fewest.isdecimal() or not (most or fewest).isdecimal():
+        raise RfgsError(f"--people {text!r}: expected FEWEST:MOST or one number, as in 1:2")
+    return int(fewest), int(most or fewest)

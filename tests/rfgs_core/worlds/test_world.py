@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whole random worlds: everybody has room, beds are under sleepers, channels tell of people."""
+
+from __future__ import annotations
+
+from itertools import islice
+
+import numpy as np
+import pytest
+
+from rfgs_core.errors import RfgsError
+from rfgs_core.radio.presets import preset
+from rfgs_core.worlds.cast import segment_centres
+from rfgs_core.worlds.world import World, WorldSettings, random_world, soundings
+
+SETTINGS = WorldSettings(frames=3, people=(1, 3))
+
+
+@pytest.fixture(scope="module")
+def worlds() -> list[World]:
+    """Worlds of two radios."""
+    return [random_world(preset(n), SETTINGS, 4, i) for n in ("wifi", "mmwave") for i in range(12)]
+
+
+def test_number_and_seed_are_a_world() -> None:
+    one, again = (random_world(preset("wifi"), SETTINGS, 4, 7) for _ in range(2))
+    np.testing.assert_array_equal(one.vertices(0.2), again.vertices(0.2))
+    np.testing.assert_array_equal(one.setting.mesh()[0], again.setting.mesh()[0])
+    assert one.devices == again.devices
+    for seed, index in ((4, 8), (5, 7)):
+        other = random_world(preset("wifi"), SETTINGS, seed, index)
+        assert not np.array_equal(one.setting.bounds_m, other.setting.bounds_m)
+
+
+def test_people_stay_within_their_room_and_out_of_all_that_stands_there(worlds) -> None:
+    beds = 0
+    for world in worlds:
+        low, high = world.setting.bounds_m
+        boxes = [part.triangles.reshape(-1, 3) for part in world.setting.parts[6:]]
+        beds += sum(part.name.startswith("bed") for part in world.setting.parts)
+        for time_s in (0.0, 0.25):
+            skin = world.vertices(time_s)
+            assert (skin > low - 0.02).all() and (skin < high).all()
+            for corners in boxes:
+                inside = (skin > corners.min(axis=0)) & (skin < corners.max(axis=0))
+                assert not inside.all(axis=1).any()
+    assert beds, "somebody lies on a bed"
+
+
+def test_devices_stand_in_the_room_and_out_of_furniture(worlds) -> None:
+    counts = set()
+    for world in worlds:
+        low, high = world.setting.bounds_m
+        counts.add(len(world.devices))
+        for device in world.devices:
+            place = np.array(device.position_m)
+            assert (place > low).all() and (place < high).all() and place[2] <= 2.4 + 1e-9
+            for part in world.setting.parts[6:]:
+                corners = part.triangles.reshape(-1, 3)
+                assert not ((place > corners.min(axis=0)) & (place < corners.max(axis=0))).all()
+    assert {3, 6} <= counts
+
+
+def test_segments_move_with_their_joints(worlds) -> None:
+    actor, segment = worlds[0].actors[0], worlds[0].segment[0]
+    joints = actor.body.joints17(actor.pose(0.1))
+    centres = segment_centres(actor, segment, 0.1)
+    assert np.linalg.norm(centres - joints, axis=1).max() < 0.35
+    still, moved = worlds[0].joints(0.1)[0], worlds[0].joints(0.2)[0]
+    speed = worlds[0].segment_velocity(0.15, 0.1)[0]
+    np.testing.assert_allclose(speed[0], (moved - still)[0] / 0.1, atol=0.15)
+
+
+def test_a_stream_hears_people_and_its_workers_share_it() -> None:
+    settings = WorldSettings(frames=1, depth=1)
+    every = list(islice(soundings(preset("wifi_commodity"), settings, seed=1), 3))
+    (third,) = islice(soundings(preset("wifi_commodity"), settings, seed=1, first=2, step=3), 1)
+    np.testing.assert_array_equal(every[2].csi, third.csi)
+    for heard in every:
+        links = heard.csi_static.shape
+        assert heard.csi.shape == (1, *links) and np.isfinite(heard.csi).all()
+        change = np.abs(heard.csi[0] - heard.csi_static) ** 2
+        share = change.sum() / (np.abs(heard.csi_static) ** 2).sum()
+        assert 1e-7 < share < 1.0
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        (WorldSettings(people=(2, 1)), "people 2:1"),
+        (WorldSettings(people=(1, 9)), "people 1:9"),
+        (WorldSettings(frames=0), "frames 0"),
+        (WorldSettings(fps=float("nan")), "fps nan"),
+        (WorldSettings(depth=4), "depth 4"),
+        (WorldSettings(families=("fly",)), "motion 'fly'"),
+    ],
+)
+def test_worlds_that_cannot_be_are_refused(settings: WorldSettings, said: str) -> None:
+    with pytest.raises(RfgsError, match=said):
+        random_world(preset("wifi"), settings, 0, 0)
+
+
+def test_radios_that_move_or_fit_no_room_are_refused() -> None:
+    with pytest.raises(RfgsError, match="antennas move"):
+        random_world(preset("sar"), SETTINGS, 0, 0)
+    from dataclasses import replace
+
+    coarse = replace(preset("mmwave"), num_subcarriers=16)
+    with pytest.raises(RfgsError, match="more subcarriers"):
+        random_world(coarse, SETTINGS, 0, 0)

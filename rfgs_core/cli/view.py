@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from rfgs_core.view.selection import ColorMode
+from rfgs_core.view.selection import ColorMode, Layer
 
 if TYPE_CHECKING:
     from rfgs_core.run import Run
@@ -44,12 +44,17 @@ class ViewArgs:
     color: ColorMode | None = None
     """Colours to begin with; if not given, error (distance to the true surface) where that is
     known, else power."""
+    show: tyro.conf.UseAppendAction[tuple[Layer, ...]] = ()
+    """Also show links, ray paths, coverage or cameras from the beginning; repeat the option for
+    several."""
     play: bool = True
     """Let frames follow each other from the beginning."""
     wait: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Wait for the first fitted frame of a run in training, instead of refusing one without."""
     picture: Path | None = None
     """Write a picture of the page to this .png with a headless Chromium, and end."""
+    width: int = 1280
+    """Width of that picture [px]; 420 is what a phone shows."""
     record: Path | None = None
     """Write a video to this .mp4 (ffmpeg must be installed) or .webp with a headless Chromium, and
     end: all frames in their own time, seen by a camera that swings around the people."""
@@ -64,11 +69,13 @@ def run(args: ViewArgs) -> int:
     from rfgs_core.view.browser import find_chromium
     from rfgs_core.view.recording import record
     from rfgs_core.view.server import running_server
-    from rfgs_core.view.snapshot import take_picture
+    from rfgs_core.view.snapshot import NARROWEST_PX, WIDEST_PX, take_picture
     from rfgs_core.view.viewer import Viewer
 
     if args.picture is not None and args.picture.suffix.lower() != ".png":
         raise RfgsError(f"{args.picture}: expected a file name ending in .png")
+    if not NARROWEST_PX <= args.width <= WIDEST_PX:
+        raise RfgsError(f"--width {args.width}: expected {NARROWEST_PX} to {WIDEST_PX} pixels")
     if args.record is not None:
         check_video(args.record)
     files = [file for file in (args.picture, args.record) if file is not None]
@@ -77,12 +84,14 @@ def run(args: ViewArgs) -> int:
     path = chosen_run(args.run, args.example)
     trained = _first_frame(path) if args.wait else open_run(path)
     with running_server(args.host, args.port) as server:
-        viewer = Viewer(trained, server, args.frame, args.color, play=args.play and not files)
+        viewer = Viewer(
+            trained, server, args.frame, args.color, args.show, play=args.play and not files
+        )
         if not files:
             return _serve(viewer, server, args.open)
         sys.stderr.write("drawing the page; a minute or two without a GPU\n")
         if args.picture is not None:
-            take_picture(server, args.picture)
+            take_picture(server, args.picture, args.width)
         if args.record is not None:
             record(viewer, server, args.record)
     for file in files:

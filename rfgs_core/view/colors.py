@@ -95,7 +95,7 @@ def legend_html(mode: ColorMode, scale: Scale) -> str:
             '<div style="font-size:0.8em;opacity:0.75;padding:0 0.8em">Colour '
             "cannot come from radio: fitted to pictures afterwards, for display.</div>"
         )
-    stops = ", ".join(_hex(rgb) for rgb in _map(mode, np.linspace(0.0, 1.0, _LEGEND_STOPS)))
+    stops = ", ".join(hex_color(rgb) for rgb in _map(mode, np.linspace(0.0, 1.0, _LEGEND_STOPS)))
     ends = ends_of(mode, scale)
     return (
         '<div style="padding:0 0.8em">'
@@ -133,6 +133,7 @@ def _map(mode: ColorMode, shares: Float[np.ndarray, "M"]) -> Float32[np.ndarray,
     return rgb.astype(np.float32)
 
 
-def _hex(rgb: np.ndarray) -> str:
+def hex_color(rgb: Float[np.ndarray, "3"]) -> str:
+    """A colour, sRGB in [0, 1], as web pages write it."""
     red, green, blue = (np.asarray(rgb) * 255 + 0.5).astype(int)
     return f"#{red:02x}{green:02x}{blue:02x}"

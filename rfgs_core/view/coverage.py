@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float32, Float64, Int32
+from jaxtyping import Float64
 
 from rfgs_core.dataset import Sequence
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
@@ -19,8 +19,8 @@ from rfgs_core.simulate.sight.free import free_segments
 HEIGHT_M, DRAWN_M = 1.0, 0.02
 #: Side of a cell, and cells along a side at most [m].
 _CELL_M, _MOST_CELLS = 0.2, 120
-#: Colours end this far below the strongest place [dB].
-SPAN_DB = 30.0
+#: Colours are spread between these percentiles of the places, over at least so much [dB].
+PERCENTILES, LEAST_SPAN_DB = (4.0, 94.0), 3.0
 #: Places this near to a device are as strong as those at this distance [m].
 _NEAREST_M = 0.3
 
@@ -38,29 +38,23 @@ class Coverage:
     """Against what is sent [dB]; minus infinity where no link reaches."""
 
     @property
-    def top_db(self) -> float:
-        """Power at the first colour [dB]: the strongest but a hundredth of the places."""
-        known = self.power_db[np.isfinite(self.power_db)]
-        return float(np.percentile(known, 99.0)) if len(known) else 0.0
+    def edges_m(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Where the map begins and ends along x and y [m]."""
+        return _ends(self.x_m), _ends(self.y_m)
 
-    def mesh(
-        self,
-    ) -> tuple[
-        Float32[np.ndarray, "corner 3"],
-        Int32[np.ndarray, "triangle 3"],
-        Float64[np.ndarray, "corner"],
-    ]:
-        """Two triangles per cell that some link reaches, and the power at their corners [dB]."""
-        rows, columns = np.nonzero(np.isfinite(self.power_db))
-        half = 0.5 * float(self.x_m[1] - self.x_m[0]), 0.5 * float(self.y_m[1] - self.y_m[0])
-        square = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half
-        middle = np.stack([self.x_m[rows], self.y_m[columns]], axis=1)
-        flat = (middle[:, None] + square).reshape(-1, 2)
-        height = np.full((len(flat), 1), self.floor_m + DRAWN_M)
-        first = 4 * np.arange(len(rows))[:, None, None]
-        faces = (first + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3)
-        power = np.repeat(self.power_db[rows, columns], 4)
-        return np.hstack([flat, height]).astype(np.float32), faces.astype(np.int32), power
+    @property
+    def scale_db(self) -> tuple[float, float]:
+        """Powers of the first and the last colour [dB]: most places lie between them."""
+        known = self.power_db[np.isfinite(self.power_db)]
+        if not len(known):
+            return -1.0, 0.0
+        low, high = np.percentile(known, PERCENTILES)
+        return float(low), float(max(high, low + LEAST_SPAN_DB))
+
+
+def _ends(middles_m: Float64[np.ndarray, "cell"]) -> tuple[float, float]:
+    half = 0.5 * float(middles_m[1] - middles_m[0])
+    return float(middles_m[0]) - half, float(middles_m[-1]) + half
 
 
 def coverage_of(sequence: Sequence, radio: str) -> Coverage | None:

@@ -52,6 +52,8 @@ class Offer:
     """Whether there is a mesh of what stands still."""
     has_links: bool
     """Whether some devices measure each other."""
+    has_layers: bool
+    """Whether devices stand still, so that their rays and coverage can be drawn."""
 
 
 class Panel:
@@ -147,6 +149,10 @@ class Panel:
         self._shown.content = shown
         self._legend.content = legend
 
+    def tell_layers(self, legend: str) -> None:
+        """Says what the layers of rays and coverage mean."""
+        self._layers.content = legend
+
     def show_picture(self, shown: ComparedPicture) -> None:
         """Replaces the rendered picture and its caption."""
         self._picture.image = shown.picture
@@ -169,6 +175,7 @@ class Panel:
             "Ground truth", tuple(_TRUTH_CALLED), initial_value=_called(start.truth),
             disabled=not offer.has_truth, hint="What really moved; never an output of the radio",
         )  # fmt: skip
+        self._layers = gui.add_html("")
 
     def _add_gaussians(self, gui: Any, offer: Offer, start: Selection) -> None:
         top = math.ceil(100.0 * offer.max_opacity) / 100.0
@@ -196,6 +203,8 @@ class Panel:
             ("room", "Room", offer.has_room),
             ("radios", "Antennas", True),
             ("links", "Links", offer.has_links),
+            ("rays", "Ray paths", offer.has_layers),
+            ("coverage", "Coverage", offer.has_layers),
             ("cameras", "Cameras", bool(offer.cameras)),
         ):
             ticked = getattr(start, name) and there

@@ -14,8 +14,9 @@ from rfgs_core.radio.sites import centres, measured_pairs
 from rfgs_core.simulate.geometry import Sight, specular_paths
 from rfgs_core.simulate.geometry.faces import faces_of
 
-#: Walls that a way may meet where it was not traced, and ways that are drawn at most.
-WALLS, MOST = 2, 400
+#: Walls that a way may meet where it was not traced, and ways that are drawn at most: more of
+#: either hide the room.
+WALLS, MOST = 1, 150
 #: Traced ways this much weaker than the strongest are left out [dB].
 SPAN_DB = 50.0
 #: Colours: straight, by one wall, by more, and by way of whoever moves.
@@ -66,7 +67,7 @@ def _traced(sequence: Sequence, radio: str, frame: int) -> Rays:
 
 
 def _mirrored(sequence: Sequence, radio: str) -> Rays:
-    """Straight ways, and those that one or two faces of the room mirror; no wall is passed."""
+    """Straight ways, and those that one face of the room mirrors or lets through."""
     triangles = np.zeros((0, 3, 3))
     if sequence.files.static_mesh.is_file():
         vertices, faces = sequence.static_mesh()

@@ -14,7 +14,9 @@ TruthDrawing = Literal["hidden", "outline", "surface"]
 #: Everything that changes how Gaussians look.
 GAUSSIAN_FIELDS = ("frame", "mode", "drawn_as", "min_opacity", "below_peak_db", "brightness")
 #: Ticks of what stands in the scene beside Gaussians and truth.
-SCENE_TICKS = ("skeleton", "room", "radios", "links", "cameras")
+SCENE_TICKS = ("skeleton", "room", "radios", "links", "rays", "coverage", "cameras")
+#: Those that are hidden at first.
+Layer = Literal["links", "rays", "coverage", "cameras"]
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,10 @@ class Selection:
     """Show antenna elements and boresights."""
     links: bool = False
     """Show lines between devices that measure each other."""
+    rays: bool = False
+    """Show the ways of the waves between devices."""
+    coverage: bool = False
+    """Show how strongly each place would be heard."""
     cameras: bool = False
     """Show the dataset's cameras."""
 

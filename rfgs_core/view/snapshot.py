@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 #: Size of the page [px].
 WIDTH_PX, HEIGHT_PX = 1280, 840
+NARROWEST_PX, WIDEST_PX = 320, 4096
 #: Without a GPU a page takes a minute; on a busy machine, longer.
 LIMIT_S = 300.0
 
@@ -26,14 +27,19 @@ LIMIT_S = 300.0
 DISMISS = "document.querySelectorAll('.mantine-Notification-closeButton').forEach(e => e.click())"
 
 
-def take_picture(server: PageServer, file: Path) -> None:
+def take_picture(server: PageServer, file: Path, width_px: int = WIDTH_PX) -> None:
     """Writes what the page of a server looks like, PNG.
+
+    Args:
+        server: The server.
+        file: The picture.
+        width_px: Width of the page [px].
 
     Raises:
         MissingToolError: Chromium is not installed.
         RfgsError: The page does not connect or does not come to rest.
     """
-    with open_page(address(server), WIDTH_PX, HEIGHT_PX) as page:
+    with open_page(address(server), width_px, HEIGHT_PX) as page:
         wait_for_page(server, page)
         settled_picture(page, LIMIT_S)
         page.evaluate(DISMISS)

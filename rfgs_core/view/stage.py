@@ -6,12 +6,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, UInt8
 
 from rfgs_core.render.cameras import Camera
+from rfgs_core.view.coverage import DRAWN_M, Coverage
 from rfgs_core.view.frame import Mesh, ShownFrame
+from rfgs_core.view.layer_colors import coverage_picture
 from rfgs_core.view.outline import level_lines
 from rfgs_core.view.radios import RadioShapes
+from rfgs_core.view.rays import Rays
 from rfgs_core.view.room import Room
 from rfgs_core.view.selection import SCENE_TICKS, Selection
 
@@ -19,8 +22,8 @@ if TYPE_CHECKING:
     from viser import ClientHandle, ViserServer
 
 _BACKGROUND = (24, 26, 31)
-_TRUTH = (235, 200, 170)
-_BONE = (255, 255, 255)
+_TRUTH, _OUTLINE = (235, 200, 170), (170, 138, 110)
+_BONE = (255, 20, 130)
 _ROOM, _EDGE = (46, 48, 54), (70, 74, 84)
 _TX, _RX = (255, 90, 80), (90, 160, 255)
 _LINK, _HELD_OUT = (20, 150, 60), (255, 110, 0)
@@ -32,9 +35,9 @@ _BONE_PX = 4.0
 #: The page looks along this from what it shows.
 _AHEAD = np.array([0.5, 0.6, -0.4]) / np.linalg.norm([0.5, 0.6, -0.4])
 #: Space around people that is in view [m].
-_AROUND_M = 2.6
+_AROUND_M = 2.2
 #: Narrower pages have the controls below: what is shown stands higher there, and farther away.
-_NARROW_PX, _LOWER_M, _FARTHER = 576, 0.8, 1.25
+_NARROW_PX, _LOWER_M, _FARTHER = 576, 1.1, 1.4
 
 
 class Stage:
@@ -94,7 +97,7 @@ class Stage:
         if truth is None:
             return
         lines = self._scene.add_line_segments(
-            "/truth/outline", level_lines(truth), _TRUTH, thickness=_THIN_PX,
+            "/truth/outline", level_lines(truth), _OUTLINE, thickness=_THIN_PX,
             thickness_units="screen",
         )  # fmt: skip
         body = self._scene.add_mesh_simple(
@@ -161,6 +164,28 @@ class Stage:
             )  # fmt: skip
             self._groups["links"] = [lines]
 
+    def draw_rays(self, rays: Rays) -> None:
+        """Replaces the ways of the waves."""
+        for old in self._groups.pop("rays", []):
+            old.remove()
+        if len(rays.segments):
+            handle = self._scene.add_line_segments(
+                "/rays", rays.segments, np.repeat(_linear(rays.colors)[:, None], 2, axis=1),
+                thickness=_THIN_PX, thickness_units="screen",
+            )  # fmt: skip
+            self._groups["rays"] = [handle]
+
+    def draw_coverage(self, coverage: Coverage) -> None:
+        """Draws how strongly each place would be heard, on the floor."""
+        (west, east), (south, north) = coverage.edges_m
+        middle = (west + east) / 2.0, (south + north) / 2.0, coverage.floor_m + DRAWN_M
+        # Exact colours: pictures are drawn without light, and rows of pixels run along y.
+        handle = self._scene.add_image(
+            "/coverage", coverage_picture(coverage), east - west, north - south,
+            position=middle, cast_shadow=False, receive_shadow=False,
+        )  # fmt: skip
+        self._groups["coverage"] = [handle]
+
     def draw_cameras(self, cameras: list[Camera]) -> None:
         """Draws a frustum per camera; a click looks through it."""
         self._groups["cameras"] = []
@@ -206,6 +231,11 @@ class Stage:
 def _fov_rad(camera: Camera) -> float:
     """Vertical field of view."""
     return float(2.0 * np.arctan2(camera.height / 2.0, camera.fl_y))
+
+
+def _linear(rgb: UInt8[np.ndarray, "n 3"]) -> UInt8[np.ndarray, "n 3"]:
+    """Colours of lines that look like these: the page takes them for light, not for sRGB."""
+    return (255.0 * (rgb / 255.0) ** 2.2 + 0.5).astype(np.uint8)
 
 
 def _wxyz(camera: Camera) -> Float[np.ndarray, "4"]:

@@ -6,6 +6,8 @@ from __future__ import annotations
 import logging
 import threading
 import time
+from collections.abc import Collection
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,13 +16,16 @@ from rfgs_core.errors import RfgsError
 from rfgs_core.render.cameras import Camera
 from rfgs_core.run import Run
 from rfgs_core.view.colors import PREFERRED, colors_of, legend_html, scales_of
+from rfgs_core.view.coverage import Coverage, coverage_of
 from rfgs_core.view.frame import ShownFrame
 from rfgs_core.view.frames import Frames, where_people_are
+from rfgs_core.view.layer_colors import layers_html
 from rfgs_core.view.panel import Offer, Panel
 from rfgs_core.view.pictures import rendered_and_true
 from rfgs_core.view.radios import RadioShapes, radio_shapes
+from rfgs_core.view.rays import Rays, follows_frames, rays_of
 from rfgs_core.view.room import Room, room_of
-from rfgs_core.view.selection import GAUSSIAN_FIELDS, ColorMode, Selection
+from rfgs_core.view.selection import GAUSSIAN_FIELDS, ColorMode, Layer, Selection
 from rfgs_core.view.stage import Stage
 
 if TYPE_CHECKING:
@@ -41,6 +46,7 @@ class Viewer:
         server: ViserServer,
         frame: int | None = None,
         mode: ColorMode | None = None,
+        show: Collection[Layer] = (),
         *,
         play: bool = False,
     ) -> None:
@@ -52,6 +58,7 @@ class Viewer:
             frame: Frame to begin with; the first if not given.
             mode: Colours to begin with; if not given, how far each Gaussian is from the truth, or
                 else what it reflects.
+            show: What is shown beside Gaussians, truth, room and antennas.
             play: Whether frames follow each other from the beginning.
 
         Raises:
@@ -83,11 +90,15 @@ class Viewer:
             has_skeletons=self.frames.has_skeletons,
             has_room=room is not None,
             has_links=len(radio.links) > 0,
+            has_layers=not run.sequence.radio_spec(run.config.radio).antennas_move,
         )
         start = Selection(frame=begin, mode=mode, camera=next(iter(self._cameras), None))
+        start = replace(start, **dict.fromkeys(show, True))
         self.stage = Stage(server, where_people_are(samples, run.sequence.bounds_m))
         self.panel = Panel(server, offer, start, play=play)
         self._drawn: Selection | None = None
+        self._rays: Rays | None = None
+        self._coverage: Coverage | None = None
         self._changed = threading.Event()
         self._due_s = 0.0
         self._draw_fixed(room, radio)
@@ -136,6 +147,7 @@ class Viewer:
             if selection.differs(before, "frame"):
                 self.stage.draw_truth(frame.truth)
                 self.stage.draw_skeletons(self.frames.bones(selection.frame))
+            self._show_layers(selection, before)
             self.stage.set_visible(selection)
         if selection.camera is not None and selection.differs(before, "frame", "camera"):
             self.panel.show_picture(rendered_and_true(self._run, selection.camera, selection.frame))
@@ -149,6 +161,23 @@ class Viewer:
             f"{self.time_s(selection.frame):.2f} s, {rows.sum():,} of {len(frame):,} Gaussians",
             legend_html(selection.mode, scale),
         )
+
+    def _show_layers(self, selection: Selection, before: Selection | None) -> None:
+        """Draws rays and coverage when they are first asked for, and says what they mean."""
+        sequence, radio = self._run.sequence, self._run.config.radio
+        new = selection.differs(before, "frame") and follows_frames(sequence, radio)
+        if selection.rays and (new or self._rays is None):
+            self._rays = rays_of(sequence, radio, selection.frame)
+            if self._rays is not None:
+                self.stage.draw_rays(self._rays)
+        if selection.coverage and self._coverage is None:
+            self._coverage = coverage_of(sequence, radio)
+            if self._coverage is not None:
+                self.stage.draw_coverage(self._coverage)
+        if selection.differs(before, "rays", "coverage"):
+            rays = self._rays if selection.rays else None
+            coverage = self._coverage if selection.coverage else None
+            self.panel.tell_layers(layers_html(rays, coverage))
 
     def _advance(self) -> float:
         """Moves to the next frame; returns how long it lasts [s]."""

@@ -55,6 +55,15 @@ def change(page: tuple[Viewer, Client], **chosen: object) -> None:
         assert time.monotonic() - begin < LIMIT_S, f"{label}: nobody told the viewer"
 
 
+def test_layers_are_drawn_when_they_are_asked_for(page: tuple[Viewer, Client]) -> None:
+    _, client = page
+    assert not {"/rays", "/coverage"} & set(client.nodes)
+    change(page, Ray_paths=True, Coverage=True)
+    client.read(lambda: {"/rays", "/coverage"} <= set(client.nodes))
+    change(page, Ray_paths=False, Coverage=False)
+    client.read(lambda: client.nodes["/rays"]["visible"] is False)
+
+
 @pytest.fixture
 def foggy(page: tuple[Viewer, Client]) -> Iterator[tuple[Viewer, Client]]:
     """The same with splats, which say exactly what each Gaussian is."""

@@ -29,6 +29,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "live": ("live", "LiveArgs"),
     "addon": ("addon", "AddonArgs"),
     "bench": ("bench", "BenchArgs"),
+    "selftest": ("selftest", "SelftestArgs"),
 }
 
 

@@ -59,6 +59,7 @@ FILES = [
     "rfgs room DATA --json OUT.json",
     "rfgs encode DATA --radio wifi --steps 1 --out OUT.npz",
     "rfgs-factory check living_room_walk --json OUT.json",
+    "rfgs selftest --json OUT.json",
 ]
 #: Folders that are made anew and must not be there, whatever they are.
 FRESH = [

@@ -3,6 +3,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, TypeVar
+
+import numba
 import numpy as np
 from jaxtyping import Float64
 
@@ -14,6 +19,8 @@ from rfgs_core.limbs.evidence.kernel import log_evidence
 from rfgs_core.limbs.evidence.library import about_z
 from rfgs_core.measure.observations import Observations
 from rfgs_core.worlds.figure import Figure
+
+Found = TypeVar("Found")
 
 
 def evidence_table(
@@ -55,6 +62,28 @@ def evidence_table(
                     for alpha in alphas
                 ]
     return table
+
+
+def in_frames(work: Callable[[int], Found], count: int, on_frame: Callable[[], Any]) -> list[Found]:
+    """What some work finds in each of so many frames, as many at a time as numba has threads.
+
+    Args:
+        work: Given the place of a frame; its kernels let other threads run.
+        count: Frames.
+        on_frame: Called as frames are done, in their order.
+    """
+    with ThreadPoolExecutor(numba.get_num_threads()) as pool:
+        begun = [pool.submit(work, frame) for frame in range(count)]
+        found = []
+        try:
+            for each in begun:
+                found.append(each.result())
+                on_frame()
+            return found
+        finally:
+            # Whoever stops does not wait for frames that nobody has begun.
+            for each in begun:
+                each.cancel()
 
 
 def stacked(

@@ -26,7 +26,7 @@ from rfgs_core.limbs.evidence.library import (
     strides,
     upright,
 )
-from rfgs_core.limbs.evidence.table import evidence_table, stacked
+from rfgs_core.limbs.evidence.table import evidence_table, in_frames, stacked
 from rfgs_core.limbs.evidence.track import Way, way_of
 from rfgs_core.limbs.propose import Joints
 from rfgs_core.measure.observations import Observations
@@ -96,14 +96,13 @@ class _Case:
         on_frame: Callable[[], Any] = lambda: None,
     ) -> Float64[np.ndarray, "frame pose shift alpha pair"]:
         """Evidence of poses that face the way, in all frames."""
-        tables = []
-        for frame, one in enumerate(self.seen):
+
+        def table(frame: int) -> dict[tuple[int, int], np.ndarray]:
             place = self.way.xy[frame], float(self.way.heading[frame])
-            tables.append(
-                evidence_table(one, self.figure, poses, place, shifts, alphas or (self.alpha,))
-            )
-            on_frame()
-        return stacked(tables)
+            one, tried = self.seen[frame], alphas or (self.alpha,)
+            return evidence_table(one, self.figure, poses, place, shifts, tried)
+
+        return stacked(in_frames(table, len(self.seen), on_frame))
 
 
 def long_enough(time_s: Float64[np.ndarray, "frame"]) -> bool:
@@ -214,16 +213,16 @@ def _settled(
     case: _Case, stride: Stride, path: Path, on_frame: Callable[[], Any]
 ) -> Float64[np.ndarray, "frame 3"]:
     """How far from the places of the likeliest walk its poses are likelier still [m]."""
-    moves = np.zeros((len(case.seen), 3))
-    for frame, one in enumerate(case.seen):
+
+    def move(frame: int) -> Float64[np.ndarray, "3"]:
         pose = stride.poses[int(np.round(path.phase[frame] * PHASES)) % PHASES]
         place = case.way.xy[frame], float(case.way.heading[frame])
         shifts = _NEAR[path.shift[frame]] + _FINE
-        table = evidence_table(one, case.figure, [pose], place, shifts, (case.alpha,))
+        table = evidence_table(case.seen[frame], case.figure, [pose], place, shifts, (case.alpha,))
         likely = sum(found[0, :, 0] for found in table.values())
-        moves[frame] = _FINE[int(np.argmax(likely - off_track(shifts)))]
-        on_frame()
-    return moves
+        return _FINE[int(np.argmax(likely - off_track(shifts)))]
+
+    return np.array(in_frames(move, len(case.seen), on_frame))
 
 
 def _joints(

@@ -67,7 +67,7 @@ def contents(run: Path) -> dict[str, Any]:
     for name, timed in (("config.json", ("train_s",)), ("metrics.json", ("eval_s", "date"))):
         if name in found:
             value = json.loads(found[name])
-            found[name] = {key: part for key, part in value.items() if key not in timed}
+            found[name] = {key: part for key, part in value.items() if key not in (*timed, "seal")}
     return found
 
 

@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whether compiled kernels say what their plain twins say on this machine, and how fast."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, replace
+from typing import Any, TypeVar
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from rfgs_core.bench import CloudAndLinks, PropagationBench, cloud_and_links
+from rfgs_core.device import Device, finish_device, on_device
+from rfgs_core.propagation import Backend, Subcarriers, propagate
+from rfgs_core.render.bench import random_cloud
+from rfgs_core.render.rasterizer import splat
+from rfgs_core.render.reference import splat_plain
+
+#: Gaussians, links and subcarriers: single ones, and none that fills a block.
+SIZES = ((1, 1, 1), (2, 3, 5), (129, 2, 33), (1000, 65, 61))
+#: Gaussians and edges of pictures [px].
+PICTURES = ((1, 17), (300, 33), (2000, 96))
+#: The size at which speed is measured.
+SPEED = (20_000, 64, 64)
+#: Largest errors: of channels and gradients in float32 against double, relative; of pictures in
+#: shares of full brightness.
+CHANNEL, GRADIENT, PICTURE = 1e-4, 1e-4, 1e-4
+#: Additions and multiplications of one Gaussian, link and subcarrier: one step of the recurrence
+#: (`rfgs_core.propagation.kernels_scatter`) and two sums.
+OPERATIONS = 12
+#: Edge of the matrices whose product shows the chip's ceiling.
+_EDGE: dict[Device, int] = {"cpu": 1536, "cuda": 4096}
+#: Distance of the far cloud [m], and its carrier [Hz]: 10,000 wavelengths.
+_FAR_M, _FAR_HZ = 50.0, 60e9
+_GRADIENTS = ("means", "quats", "scales_rf", "gamma", "alpha")
+
+_Value = TypeVar("_Value")
+
+
+@dataclass(frozen=True)
+class Check:
+    """One comparison of a kernel with its twin."""
+
+    what: str
+    """Kernel and size, in words."""
+    error: float
+    """Largest error found."""
+    bound: float
+    """Largest error allowed."""
+
+    @property
+    def holds(self) -> bool:
+        """Whether they agree; an error that is no number does not."""
+        return self.error <= self.bound
+
+
+@dataclass(frozen=True)
+class Throughput:
+    """How fast the propagation model is, against what the chip can do at most."""
+
+    forward_s: float
+    """Time of the scattered channel of `SPEED` [s]."""
+    rate: float
+    """Additions and multiplications per second [1/s]."""
+    ceiling: float
+    """The most that was measured in the same run, of a product of matrices [1/s]."""
+
+
+def checks(device: Device) -> Iterator[Check]:
+    """Compares every kernel of a device with its twin, in double on the CPU.
+
+    Args:
+        device: Where the kernels run.
+    """
+    for size in SIZES:
+        yield from _propagation(f"{size[0]} x {size[1]} x {size[2]}", _scene(*size), device)
+    yield from _propagation("60 GHz at 50 m", _far(), device)
+    if device == "cpu":
+        yield from (_picture(*size) for size in PICTURES)
+
+
+def _scene(gaussians: int, links: int, subcarriers: int) -> CloudAndLinks:
+    size = PropagationBench(
+        num_gaussians=gaussians, num_links=links, num_subcarriers=subcarriers, seed=gaussians
+    )
+    return cloud_and_links(size)
+
+
+def _far() -> CloudAndLinks:
+    """A cloud so many wavelengths away that phases take more digits than float32 has."""
+    scene = cloud_and_links(PropagationBench(200, 8, 32, center_hz=_FAR_HZ, seed=5))
+    away = torch.tensor([_FAR_M, 0.0, 0.0])
+    moved = replace(scene.gaussians, means=scene.gaussians.means + away)
+    subcarriers = Subcarriers(_FAR_HZ, 12.5e6, 32)
+    return replace(scene, gaussians=moved, subcarriers=subcarriers)
+
+
+def _propagation(name: str, scene: CloudAndLinks, device: Device) -> Iterator[Check]:
+    """What a scene scatters, what its Gaussians leave of the environment, and all gradients."""
+    here, exact = on_device(scene, device), _in_double(scene)
+    for what, paths in (("scattered", False), ("with shadows", True)):
+        found, slopes = _with_gradients(here, paths, None)
+        plain, true_slopes = _with_gradients(exact, paths, "torch")
+        yield Check(f"channel {what}, {name}", _relative(found, plain), CHANNEL)
+        worst = max(_relative(slopes[key], true_slopes[key]) for key in _GRADIENTS)
+        yield Check(f"gradients {what}, {name}", worst, GRADIENT)
+
+
+def _with_gradients(
+    scene: CloudAndLinks, shadows: bool, backend: Backend | None
+) -> tuple[Tensor, dict[str, Tensor]]:
+    leaves = {
+        key: getattr(scene.gaussians, key).detach().clone().requires_grad_(True)
+        for key in _GRADIENTS
+    }
+    gaussians = replace(scene.gaussians, **leaves)
+    paths = scene.paths if shadows else None
+    csi = propagate(gaussians, scene.links, scene.subcarriers, paths, backend=backend)
+    torch.autograd.backward(csi, scene.grad.to(csi.dtype))
+    slopes = {
+        key: torch.zeros_like(leaf) if leaf.grad is None else leaf.grad
+        for key, leaf in leaves.items()
+    }
+    return csi.detach(), slopes
+
+
+def _in_double(value: _Value) -> _Value:
+    """The same tensors in double precision, on the CPU."""
+    if isinstance(value, Tensor):
+        wide = {torch.float32: torch.float64, torch.complex64: torch.complex128}
+        return value.cpu().to(wide.get(value.dtype, value.dtype))  # type: ignore[return-value]
+    if not hasattr(value, "__dataclass_fields__"):
+        return value
+    parts = {spec.name: _in_double(getattr(value, spec.name)) for spec in fields(value)}  # type: ignore[arg-type]
+    return replace(value, **parts)  # type: ignore[type-var]
+
+
+def _relative(found: Tensor, true: Tensor) -> float:
+    """Norm of the difference over the norm of what is true."""
+    size = float(true.norm())
+    return float((found.cpu().to(true.dtype) - true).norm()) / (size if size > 0.0 else 1.0)
+
+
+def _picture(gaussians: int, edge_px: int) -> Check:
+    """The tiled rasteriser beside the one that visits every Gaussian at every pixel."""
+    cloud, rgb, camera = random_cloud(gaussians, edge_px, seed=gaussians)
+    tiled, plain = splat(cloud, rgb, camera), splat_plain(cloud, rgb, camera, (0, edge_px))
+    both = ((tiled.rgb, plain.rgb), (tiled.alpha, plain.alpha))
+    worst = max(float((a - b).abs().max()) for a, b in both)
+    return Check(f"picture, {gaussians} at {edge_px} px", worst, PICTURE)
+
+
+def throughput(device: Device, repeats: int = 5) -> Throughput:
+    """Measures the forward model, and the chip's ceiling in the same run."""
+    scene = on_device(_scene(*SPEED), device)
+
+    def forward() -> None:
+        with torch.no_grad():
+            propagate(scene.gaussians, scene.links, scene.subcarriers)
+        finish_device()
+
+    forward()
+    best_s = min(_seconds(forward) for _ in range(repeats))
+    rate = OPERATIONS * float(np.prod(SPEED)) / best_s
+    return Throughput(best_s, rate, _ceiling(device, repeats))
+
+
+def _ceiling(device: Device, repeats: int) -> float:
+    """Additions and multiplications per second of a product of float32 matrices [1/s]."""
+    edge = _EDGE[device]
+    left = torch.rand(edge, edge, device=device)
+    torch.backends.cuda.matmul.allow_tf32 = False
+
+    def multiply() -> None:
+        torch.mm(left, left)
+        finish_device()
+
+    multiply()
+    return 2.0 * edge**3 / min(_seconds(multiply) for _ in range(repeats))
+
+
+def _seconds(work: Any) -> float:
+    begin = time.perf_counter()
+    work()
+    return time.perf_counter() - begin

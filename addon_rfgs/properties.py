@@ -6,6 +6,7 @@ from bpy.app.handlers import persistent
 
 from .channels.settings import RFGS_PG_channels
 from .check.settings import RFGS_PG_check
+from .coverage.settings import RFGS_PG_coverage
 from .devices.properties import RFGS_PG_radio, search_radios
 from .devices.settings import RFGS_PG_devices
 from .export.settings import RFGS_PG_export
@@ -73,6 +74,7 @@ class RFGS_PG_scene(bpy.types.PropertyGroup):
     export: bpy.props.PointerProperty(type=RFGS_PG_export)
     gaussians: bpy.props.PointerProperty(type=RFGS_PG_gaussians)
     channels: bpy.props.PointerProperty(type=RFGS_PG_channels)
+    coverage: bpy.props.PointerProperty(type=RFGS_PG_coverage)
     jobs: bpy.props.PointerProperty(type=RFGS_PG_jobs)
     live: bpy.props.PointerProperty(type=RFGS_PG_live)
     paths: bpy.props.PointerProperty(type=RFGS_PG_paths)

@@ -10,7 +10,13 @@ from .removal.stored import prune_properties
 
 #: Modules that hold classes for Blender; panels appear in this order.
 _MODULES = (
-    *("channels.settings", "check.settings", "devices.properties", "devices.settings"),
+    *(
+        "channels.settings",
+        "check.settings",
+        "coverage.settings",
+        "devices.properties",
+        "devices.settings",
+    ),
     *("export.settings", "gaussians.settings", "jobs.settings", "live.settings"),
     *("materials.properties", "paths.settings", "properties"),
     *("devices.operators", "devices.chosen_operators", "devices.recorded"),
@@ -20,6 +26,7 @@ _MODULES = (
     *("gaussians.operators", "gaussians.file_menu", "gaussians.view_operators", "gaussians.panel"),
     *("live.operators", "live.panel"),
     *("channels.operators", "channels.panel", "paths.operators", "paths.panel"),
+    *("coverage.operators", "coverage.panel"),
     *("removal.operators", "removal.panel"),
 )
 

@@ -121,11 +121,10 @@ def encoded_colors(mesh: bpy.types.Mesh) -> np.ndarray:
 
 
 def _chosen(meshes: Sequence[bpy.types.Mesh]) -> str:
-    """Display colours where some were fitted, else power where it is known."""
-    spreads = [float(np.ptp(encoded_colors(mesh))) for mesh in meshes if len(mesh.vertices)]
+    """Power where it is known: what the radio says; else display colours."""
     powers = [attributes.get(mesh, "rf_power_db") for mesh in meshes]
     known = any(values is not None and np.isfinite(values).any() for values in powers)
-    return "POWER" if known and max(spreads, default=0.0) < 1e-4 else "DISPLAY"
+    return "POWER" if known else "DISPLAY"
 
 
 def _needed(meshes: Sequence[bpy.types.Mesh], name: str, remedy: str) -> list[np.ndarray]:

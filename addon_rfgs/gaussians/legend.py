@@ -12,6 +12,7 @@ import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 
+from ..ownership import found_collection
 from . import color_maps
 from .clouds import clouds_here
 from .coloring import SCALE, Scale
@@ -25,10 +26,15 @@ _MODES: dict[str, tuple[str, tuple[float, int, str] | None]] = {
     "FEATURES": ("Features: first three principal components", None),
     "TRACK": ("Tracks: a hue for each Gaussian", None),
     "ATTRIBUTE": ("Attribute", (1.0, 3, "")),
+    "COVERAGE": ("Path gain to an isotropic antenna", (1.0, 0, "dB")),
 }
 _STEPS = 48
 #: Place and size of the bar, from the lower left corner [px].
 _LEFT_PX, _BOTTOM_PX, _WIDTH_PX, _HEIGHT_PX, _TEXT_PX = 24, 40, 220, 12, 12
+#: How far one legend stands above another [px].
+_UP_PX = 60
+#: Collection of maps of coverage, whose colours are told here too.
+COVERAGE = "RF-GS Coverage"
 
 _handles: list[Any] = []
 
@@ -86,14 +92,18 @@ def _draw() -> None:
         return
     if space.shading.type == "SOLID" and space.shading.color_type != "VERTEX":
         return  # Nothing that is seen has these colours.
-    seen = [item for item in clouds_here(context.scene) if item.visible_get(viewport=space)]
-    scale = next((Scale.of(item.data) for item in seen if SCALE in item.data), None)
-    if scale is not None:
-        _draw_legend(legend_of(scale), context.preferences.system.ui_scale)
+    maps = found_collection(context.scene, COVERAGE)
+    row = 0
+    for items in (clouds_here(context.scene), maps.objects if maps else ()):
+        seen = [item for item in items if item.data and item.visible_get(viewport=space)]
+        scale = next((Scale.of(item.data) for item in seen if SCALE in item.data), None)
+        if scale is not None:
+            _draw_legend(legend_of(scale), context.preferences.system.ui_scale, row)
+            row += 1
 
 
-def _draw_legend(legend: Legend, pixel: float) -> None:
-    left, bottom = _LEFT_PX * pixel, _BOTTOM_PX * pixel
+def _draw_legend(legend: Legend, pixel: float, row: int) -> None:
+    left, bottom = _LEFT_PX * pixel, (_BOTTOM_PX + row * _UP_PX) * pixel
     width, height = _WIDTH_PX * pixel, _HEIGHT_PX * pixel
     if legend.colors is not None and legend.ends is not None:
         x = np.repeat(np.linspace(left, left + width, len(legend.colors)), 2)

@@ -21,9 +21,9 @@ _IN_THE_WAY = 0.05
 #: No more than so many things are taken away, one behind the other.
 _MOST_HIDDEN = 12
 #: Faces whose edges stand for a true mesh.
-_TRUTH_FACES = 500
+_TRUTH_FACES = 240
 #: Colour of the true mesh's lines.
-_TRUTH = (0.92, 0.78, 0.66, 1.0)
+_TRUTH = (0.5, 0.42, 0.36, 1.0)
 #: The sidebar is there once it was drawn: so often and after so long it is asked [s].
 _TRIES, _PAUSE_S = 40, 0.25
 
@@ -145,7 +145,7 @@ def _turn_to_tab(region: Any) -> bool:
     """Whether the tab could be turned to: a sidebar that was not drawn yet has none."""
     try:
         region.active_panel_category = "RF-GS"
-    except TypeError:
+    except (TypeError, AttributeError):  # Blender 5.2 calls it read-only until then.
         return False
     region.tag_redraw()
     return bool(region.active_panel_category == "RF-GS")

@@ -8,6 +8,7 @@ from typing import Any
 import bpy
 
 from ..channels.image import remove_images
+from ..coverage.surface import clear_coverage
 from ..devices.empties import COLLECTION as DEVICES
 from ..gaussians.clouds import COLLECTION as CLOUDS
 from ..gaussians.nodes import GROUP
@@ -20,7 +21,7 @@ from .stored import remove_properties
 
 
 def remove_data() -> tuple[int, int]:
-    """Removes devices, Gaussians, paths, images of channels and every property of this add-on.
+    """Removes devices, Gaussians, paths, coverage, images of channels and all our properties.
 
     What a user put into collections of ours stays, and so do Empties of their own that were made
     devices: they lose their radio.
@@ -28,7 +29,7 @@ def remove_data() -> tuple[int, int]:
     Returns:
         How many objects went, and how many things lost a property.
     """
-    count, _ = clear_paths()
+    count = clear_paths()[0] + clear_coverage()
     restore()
     remove_images()
     for item in _objects():

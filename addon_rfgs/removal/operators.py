@@ -9,7 +9,7 @@ from .contents import remove_data
 
 
 class RFGS_OT_remove_data(Undoable, bpy.types.Operator):
-    """Remove devices, Gaussians, ray paths and every RF-GS setting from this file."""
+    """Remove devices, Gaussians, ray paths, coverage and every RF-GS setting from this file."""
 
     bl_label = "Remove RF-GS Data from File"
     command = Command("remove-data", saves=True)

@@ -22,6 +22,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "bench": ("bench", "BenchArgs"),
     "tracers": ("tracers", "TracersArgs"),
     "verify": ("verify", "VerifyArgs"),
+    "coverage": ("coverage", "CoverageArgs"),
 }
 
 _FIRST_STEPS = r"""A first dataset, about two minutes on two cores:

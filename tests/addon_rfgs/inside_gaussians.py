@@ -257,6 +257,13 @@ def test_the_legend_says_what_the_colours_mean_with_a_unit(settings) -> None:
     assert legend_of(Scale.of(cloud(5).data)).ends is None
 
 
+def test_colours_tell_of_the_radio_unless_others_are_chosen(settings) -> None:
+    settings.color_by = "DISPLAY"
+    assert np.ptp(colors(5)) > 0.1, "display colours are there, too"
+    settings.color_by = "AUTO"
+    assert Scale.of(cloud(5).data).mode == "POWER"
+
+
 def test_a_comparison_is_kept_until_other_gaussians_come(settings) -> None:
     scene = bpy.context.scene
     assert kept_result(scene) == []

@@ -172,6 +172,11 @@ def use(folder: Path) -> None:
     ops.update_display()
     scene.rfgs.paths.dataset = str(folder / "dataset")
     ops.show_paths()
+    info = {"radio": "wifi", "cell_m": 0.5, "corner_m": [0.0, 0.0, 1.0], "devices": ["ap"]}
+    map_file = folder / "coverage.json"
+    map_file.write_text(json.dumps({**info, "gain_db": [[[-40.0, -50.0]] * 2]}))
+    scene.rfgs.coverage.path = str(map_file)
+    ops.show_coverage()
     follow_live(scene)
     scene.frame_set(5)
     scene.frame_set(1)

@@ -72,6 +72,7 @@ SLOW = {
     ("rfgs", "bench", "json"), ("rfgs-factory", "bench", "json"), ("rfgs-factory", "verify", "out"),
     ("rfgs-factory", "verify", "markdown"), ("rfgs-factory", "tracers", "json"),
     ("rfgs-factory", "tracers", "markdown"), ("rfgs-factory", "plan", "out"),
+    ("rfgs-factory", "coverage", "out"),
 }  # fmt: skip
 #: A pipe in place of each file and folder that a command reads.
 PIPES = [
@@ -98,7 +99,10 @@ PIPES = [
     "rfgs bench real --data PIPE",
     "rfgs bench blender --blender PIPE",
     *(f"rfgs-factory {name} PIPE" for name in ("check", "validate", "preview", "stats", "bench")),
-    *(f"rfgs-factory {name} PIPE --radio wifi --out OUT" for name in ("plan", "generate")),
+    *(
+        f"rfgs-factory {name} PIPE --radio wifi --out OUT"
+        for name in ("plan", "generate", "coverage")
+    ),
     "rfgs-factory tracers PIPE",
     "rfgs-factory impair PIPE --impairments lab",
     "rfgs-factory impair DATA --impairments PIPE",

@@ -123,6 +123,8 @@ def steps() -> list[Step]:
         Step("import_result", prepare=finish_job),
         Step("show_paths"),
         Step("clear_paths"),
+        Step("show_coverage", prepare=write_map),
+        Step("clear_coverage"),
         Step("remove_data"),
         Step("import_ply", {"filepath": "{folder}/cloud.ply"}),
         Step("import_devices", {"directory": "{folder}/dataset"}),
@@ -162,6 +164,13 @@ def send_an_update(stage: Any, _folder: Path) -> None:
             reader.recv(1)  # Until the reader goes.
 
     threading.Thread(target=answer, daemon=True).start()
+
+
+def write_map(_stage: Any, folder: Path) -> None:
+    """A map of four cells and one transmitter."""
+    info = {"radio": "wifi", "cell_m": 0.5, "corner_m": [0.0, 0.0, 1.0], "devices": ["ap"]}
+    bpy.context.scene.rfgs.coverage.path = str(folder / "coverage.json")
+    (folder / "coverage.json").write_text(json.dumps({**info, "gain_db": [[[-40.0, -50.0]] * 2]}))
 
 
 def find_something(_stage: Any, _folder: Path) -> None:

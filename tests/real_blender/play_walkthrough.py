@@ -6,6 +6,7 @@ Arguments: Python program of the environment, Blender program.
 
 from __future__ import annotations
 
+import subprocess
 from collections.abc import Iterator
 from typing import Any
 
@@ -27,6 +28,7 @@ def play(stage: Any) -> Iterator[float]:
     yield from jobs(stage)
     yield from gaussians(stage)
     yield from paths(stage)
+    yield from coverage(stage)
     yield from channels(stage)
 
 
@@ -119,6 +121,20 @@ def paths(stage: Any) -> Iterator[float]:
     said.tx_device, said.rx_device, said.count, said.radius_m = 0, 2, 40, 0.012
     bpy.ops.rfgs.show_paths()
     yield from stage.shoot("paths", "VIEW")
+
+
+def coverage(stage: Any) -> Iterator[float]:
+    """How loud the loudest access point is at the height of a hand."""
+    bpy.ops.rfgs.clear_paths()
+    yield from tab(stage, "RFGS_PT_gaussians", "RFGS_PT_coverage")
+    command = (stage.arguments[0], "-m", "dataset_factory", "coverage", bpy.data.filepath)
+    out = bpy.path.abspath("//coverage.json")
+    more = ("--blender", stage.arguments[1], "--frame", str(FRAME), "--out", out)
+    subprocess.run([*command, *more], check=True)
+    with stage.override():
+        bpy.ops.rfgs.show_coverage()
+    yield from stage.shoot("coverage", "VIEW")
+    bpy.ops.rfgs.clear_coverage()
 
 
 def channels(stage: Any) -> Iterator[float]:

@@ -39,7 +39,7 @@ def test_the_walkthrough_can_be_walked(
     assert "Traceback" not in done.stdout + done.stderr
     pictures = sorted(made.glob("*.png"))
     assert {file.stem for file in pictures} >= {
-        *("overview", "materials", "check", "jobs", "gaussians", "paths", "channels")
+        *("overview", "materials", "check", "jobs", "gaussians", "paths", "coverage", "channels")
     }
     kept = os.environ.get("PICTURES")
     for file in pictures:

@@ -51,3 +51,22 @@ def test_buttons_colour_and_undo(blender, python, tmp_path: Path) -> None:
     assert seen["ply"] == [["FINISHED", 1, False], ["RUNNING_MODAL", 1, True]]
     assert saturated(out / "points.png") > 0.02, "coloured at once, with a legend"
     assert saturated(out / "solid.png") > 0.02
+
+
+def test_a_file_that_shows_its_gaussians_opens_on_them(
+    blender, tiny_blend: Path, tmp_path: Path
+) -> None:
+    from splat_files import write_run
+
+    saved, out = tmp_path / "inspect.blend", tmp_path / "out"
+    made = blender.rfgs(
+        tiny_blend, "import", write_run(tmp_path / "run", (2, 3), 3000), "--out", saved
+    )
+    assert made.returncode == 0, made.stdout + made.stderr
+    done = play(blender, HERE / "play_opening.py", saved, out, size=(1280, 720))
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
+    assert "Traceback" not in done.stdout + done.stderr
+    seen = json.loads((out / "told.json").read_text())
+    assert seen["shading"] == ["SOLID", "VERTEX"] and seen["through"] == "CAMERA"
+    assert seen["frame"] in (2, 3) and seen["truth"]
+    assert saturated(out / "opened.png") > 0.005

@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel of coverage, below that of Gaussians."""
+
+import bpy
+
+from ..tab import Tab
+
+
+class RFGS_PT_coverage(Tab, bpy.types.Panel):
+    """How loud transmitters are over a plane."""
+
+    bl_parent_id = "RFGS_PT_gaussians"
+    bl_label = "Coverage"
+    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Shows file, transmitter and the two buttons."""
+        layout, settings = self.columns(), context.scene.rfgs.coverage
+        layout.prop(settings, "path")
+        self.automatic(layout, settings, "tx_device", "the loudest one", number=-1)
+        layout.operator("rfgs.show_coverage", icon="MESH_GRID")
+        layout.operator("rfgs.clear_coverage", icon="TRASH")

@@ -12,10 +12,13 @@ import pytest
 
 from rfgs_core.dataset import Sequence, open_dataset
 from rfgs_core.dataset.mesh_ply import write_mesh
+from rfgs_core.dataset.path_store import write_paths
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.radio.images import SCATTERING, SPECULAR
+from rfgs_core.radio.path_table import PathTable
 from rfgs_core.view.coverage import HEIGHT_M, coverage_of
 from rfgs_core.view.layer_colors import coverage_picture, layers_html
-from rfgs_core.view.rays import ONE, STRAIGHT, follows_frames, rays_of
+from rfgs_core.view.rays import MORE, ONE, PEOPLE, STRAIGHT, follows_frames, rays_of
 
 
 @pytest.fixture
@@ -98,3 +101,36 @@ def test_legends_say_what_is_shown(boxed: Sequence) -> None:
     assert "found by mirrors" in layers_html(rays, None)
     text = layers_html(None, coverage)
     assert "echo of 1 m²" in text and text.count("dB") == 2 and "Ray paths" not in text
+
+
+def test_stored_paths_are_drawn_by_what_they_met(tiny_dataset: Path, tmp_path: Path) -> None:
+    """Straight, by a wall, by two, by a person, and one too weak to be drawn."""
+    shutil.copytree(tiny_dataset, tmp_path / "traced")
+    sequence = open_dataset(tmp_path / "traced").sequence()
+    kind = np.zeros((5, 2), np.uint8)
+    kind[1:3, 0], kind[2, 1], kind[3, 0] = SPECULAR, SPECULAR, SCATTERING
+    met = (kind != 0).sum(axis=1)
+    corner = np.minimum(np.arange(4), met[:, None] + 1)
+    vertices = np.stack([np.arange(5)[:, None] + 0.0 * corner, corner, 0 * corner], axis=2)
+    gain = np.array([1.0, 0.5, 0.25, 0.1, 1e-4])
+    angles = ("departure_zenith", "departure_azimuth", "arrival_zenith", "arrival_azimuth")
+    where = ("tx_site", "rx_site", "tx_device", "rx_device")
+    table = PathTable(
+        **dict.fromkeys(where, np.zeros(5, np.int32)),
+        **dict.fromkeys([f"{name}_rad" for name in angles], np.zeros(5, np.float32)),
+        delay_s=np.zeros(5), doppler_hz=np.zeros(5, np.float32), kind=kind,
+        amplitude=gain[:, None, None].astype(np.complex64), node_hz=np.array([5.8e9]),
+        object=np.zeros((5, 2), np.int32), vertices=vertices.astype(np.float32),
+    )  # fmt: skip
+    write_paths(sequence.files.paths("wifi", 1), table)
+    found = rays_of(sequence, "wifi", 1)
+    assert found is not None and found.traced and follows_frames(sequence, "wifi")
+    drawn = [
+        (colour, int(x), int(y))
+        for colour, x, y in zip(
+            map(tuple, found.colors.tolist()), *found.segments[:, 0, :2].T, strict=True
+        )
+    ]
+    two, person = [(MORE, 2, k) for k in range(3)], [(PEOPLE, 3, k) for k in range(2)]
+    assert drawn == [(STRAIGHT, 0, 0), (ONE, 1, 0), (ONE, 1, 1), *two, *person]
+    assert (found.segments[:, 1, 1] - found.segments[:, 0, 1] == 1.0).all()

@@ -46,15 +46,12 @@ class Stages:
     """Runs stages once, remembers how long each took, and says which are already done."""
 
     def __init__(self, out: Path) -> None:
-        from rfgs_core.records import read_record
-
         self._path = out / "timings.json"
-        known = self._path.exists()
-        self.seconds = read_record(self._path, dict[str, float]) if known else {}
+        self.seconds: dict[str, float] = _kept(self._path, dict[str, float]) or {}
 
     def run(self, name: str, done: Path, work: Callable[[], None]) -> None:
         """Runs `work` unless `done` exists and the stage was timed, that is, finished."""
-        from rfgs_core.files import write_json
+        from rfgs_core.seals import write_sealed_json
 
         if done.exists() and name in self.seconds:
             sys.stderr.write(f"[{name}] done before ({self.seconds[name]:.0f} s)\n")
@@ -63,14 +60,28 @@ class Stages:
         begin = time.perf_counter()
         work()
         self.seconds[name] = round(time.perf_counter() - begin, 1)
-        write_json(self._path, self.seconds)
+        write_sealed_json(self._path, self.seconds)
 
 
 def keep_settings(args: DemoArgs) -> None:
     """Remembers what a demo was asked for, once its dataset shows that it can be had."""
-    from rfgs_core.files import write_json
+    from rfgs_core.seals import write_sealed_json
 
-    write_json(args.out / _SETTINGS, _asked(args))
+    write_sealed_json(args.out / _SETTINGS, _asked(args))
+
+
+def _kept(path: Path, kind: Any) -> Any:
+    """What an earlier call has kept in a file; None where there was none.
+
+    Raises:
+        RfgsFormatError: The file has changed since.
+    """
+    from rfgs_core.records import record
+    from rfgs_core.seals import read_sealed_json
+
+    if not path.exists():
+        return None
+    return record(path, read_sealed_json(path, "delete it"), kind)
 
 
 def _asked(args: DemoArgs) -> dict[str, Any]:
@@ -84,10 +95,9 @@ def refuse_other_settings(args: DemoArgs) -> None:
         RfgsError: The folder holds such a demo.
     """
     from rfgs_core.errors import RfgsError
-    from rfgs_core.records import read_record
 
-    path, asked = args.out / _SETTINGS, _asked(args)
-    found = read_record(path, dict[str, Any]) if path.exists() else asked
+    asked = _asked(args)
+    found = _kept(args.out / _SETTINGS, dict[str, Any]) or asked
     differing = [name for name, value in asked.items() if found.get(name) != value]
     if differing:
         raise RfgsError(

@@ -205,7 +205,7 @@ def color_run_files(run: TrainedRun, shader: Shader | None) -> None:
         path = run.path / name
         if not path.is_file():
             continue
-        stored = read_ply(path)
+        stored = read_ply(path, "train this run again")
         if len(stored) != len(gaussians):
             raise RfgsFormatError(
                 f"{path}: holds {len(stored)} Gaussians, the run {len(gaussians)}"

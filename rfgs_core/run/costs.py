@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass
 from tqdm import tqdm
 
 from rfgs_core.dataset import Sequence
-from rfgs_core.past import Speed, Stage, forecast, in_words, note_speed, size_in_words
+from rfgs_core.past import Clock, Speed, Stage, forecast, in_words, note_speed, size_in_words
 from rfgs_core.run.config import RunConfig
 from rfgs_core.run.folder import Run
 
@@ -40,6 +40,8 @@ USUAL = Costs(find_s=1.3, solve_s=0.77, step_s=0.049)
 USUAL_GAUSSIANS = 6000
 #: Looks at a frame there while people are posed [s].
 USUAL_LOOK_S = 0.5
+#: Counting people in a frame there [s].
+USUAL_COUNT_S = 6.0
 #: PLY, features and checkpoint of a Gaussian of a frame [B].
 BYTES_PER_GAUSSIAN = 420.0
 
@@ -70,6 +72,31 @@ def pose_stage(run: Run, looks: int) -> Stage:
     """Posing people before frames are fitted, in so many looks at frames."""
     what = [run.config.radio, run.sequence.layout(run.config.radio).measured.shape]
     return Stage("pose", "train-pose", what, looks, Speed(0.0, USUAL_LOOK_S))
+
+
+def count_stage(sequence: Sequence, radio: str, votes: int) -> Stage:
+    """Counting people before anything is fitted, in so many frames."""
+    what = [radio, sequence.layout(radio).measured.shape]
+    return Stage("count", "train-count", what, votes, Speed(0.0, USUAL_COUNT_S))
+
+
+def count_price(stage: Stage) -> str:
+    """One line before people are counted: in how many frames, how long, and what does without."""
+    found = forecast([stage])
+    return (
+        f"counting people in {stage.steps} frames first: about {in_words(found.total_s)}, "
+        f"{found.source}; --people told, or their number, does without"
+    )
+
+
+@contextmanager
+def speed_noted(stage: Stage) -> Iterator[Clock]:
+    """A clock whose speed is kept for later estimates, once enough steps have ended."""
+    clock = Clock()
+    yield clock
+    speed = clock.speed()
+    if speed is not None:
+        note_speed(stage, speed)
 
 
 def price_line(run: Run, looks: int = 0) -> str:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import logging
+import sys
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
@@ -21,6 +22,7 @@ from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.measure.observations import observe
 from rfgs_core.records import record
 from rfgs_core.run.config import CONFIG_FILE
+from rfgs_core.run.costs import count_price, count_stage, speed_noted
 from rfgs_core.run.folder import Run
 from rfgs_core.seals import read_sealed_json, write_sealed_json
 from rfgs_core.seeds import sub_seed
@@ -134,11 +136,21 @@ def counted(
         kept = HeadCount(told(sequence), "told")
     if kept is not None and people in ("auto", kept.source):
         return kept
+    stage = count_stage(sequence, radio, votes_of(frames))
     with (
-        tqdm(total=votes_of(frames), desc="counting people", delay=1.0) as bar,
+        tqdm(total=stage.steps, desc="counting people", delay=1.0) as bar,
+        speed_noted(stage) as clock,
         one_torch_thread(),
     ):
-        heads = head_count(sequence, radio, frames, config, people, bar.update)
+
+        def step(done: int) -> None:
+            if done == 0:
+                sys.stderr.write(f"{count_price(stage)}\n")
+            else:
+                clock.step()
+                bar.update()
+
+        heads = head_count(sequence, radio, frames, config, people, step)
     if heads.source == "sensed" and heads.count == 0:
         if people == "auto":
             _LOG.warning("%s senses nobody; taken to be there: %d, told", radio, told(sequence))
@@ -156,7 +168,7 @@ def head_count(
     frames: list[int],
     config: TrainConfig,
     asked: People = "auto",
-    on_frame: Callable[[], Any] = lambda: None,
+    on_frame: Callable[[int], Any] = lambda _done: None,
 ) -> HeadCount:
     """How many people there are: what most of some frames say, spread over all.
 
@@ -166,7 +178,8 @@ def head_count(
         frames: Which frames.
         config: What of the channel is read.
         asked: How to know.
-        on_frame: Called when a frame is counted.
+        on_frame: Called with the number of frames that are counted: 0 before the first, and not
+            at all where nobody is sensed.
 
     Raises:
         RfgsError: They shall be sensed where that cannot be, or be fewer than one.
@@ -186,13 +199,14 @@ def head_count(
     if config.background == "learned":
         empty = learned_background(sequence, radio, config.channel, config.observe, config.packets)
     votes = {}
+    on_frame(0)
     for frame in (frames[index] for index in spread):
         seen = observe(
             sequence, radio, frame, config.channel, config.observe, empty, config.packets
         )
         seed = sub_seed(config.seed, sequence.name, radio, frame, "people")
         votes[str(frame)] = len(count_bodies(seen, config, seed))
-        on_frame()
+        on_frame(len(votes))
     return HeadCount(voted(list(votes.values())), "sensed", votes)
 
 

@@ -306,5 +306,7 @@ def _write_point_cloud(run: Run) -> None:
     """Static Gaussians and those of the first frame in one file, for any splat viewer."""
     write_ply(
         run.path / "point_cloud.ply",
-        GaussianCloud.join(static_cloud(run.path), read_ply(run.ply_path(run.frames[0]))),
+        GaussianCloud.join(
+            static_cloud(run.path), read_ply(run.ply_path(run.frames[0]), "train this run again")
+        ),
     )

@@ -12,7 +12,7 @@ from rfgs_core.dataset import open_dataset
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.evaluate.head_count import empty_room_anew, head_count_table, noise_alone
 from rfgs_core.measure.observations import observe
-from rfgs_core.run.people import PEOPLE_FILE, HeadCount, People, head_count, told, voted
+from rfgs_core.run.people import PEOPLE_FILE, HeadCount, People, counted, head_count, told, voted
 from rfgs_core.run.training import train_sequence
 from rfgs_core.settings import TrainConfig
 
@@ -45,6 +45,17 @@ def test_people_are_sensed_told_or_asked_for(tiny_dataset: Path) -> None:
     assert head_count(sequence, "wifi", [1], config, "sensed") == HeadCount(1, "sensed", {"1": 1})
     assert head_count(sequence, "wifi", [1], config, "told") == HeadCount(told(sequence), "told")
     assert head_count(sequence, "wifi", [1], config, 4) == HeadCount(4, "asked")
+
+
+def test_counting_says_its_price_first_and_only_where_people_are_sensed(
+    tiny_dataset: Path, tmp_path: Path, capsys
+) -> None:
+    sequence, config = open_dataset(tiny_dataset).sequence(), TrainConfig()
+    for asked, lines in (("told", 0), (2, 0), ("sensed", 1)):
+        counted(tmp_path / "run", sequence, "wifi", sequence.frames, config, asked)
+        said = capsys.readouterr().err
+        assert said.count("counting people in 2 frames first: about ") == lines
+    assert "does without" in said
 
 
 def test_without_phases_people_are_told(tiny_dataset: Path) -> None:

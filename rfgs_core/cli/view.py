@@ -112,14 +112,20 @@ def _first_frame(path: Path) -> Run:
 
 
 def _serve(viewer: Viewer, server: PageServer, open_page: bool) -> int:
+    import os
     import webbrowser
 
+    from rfgs_core.interrupts import CALLED
     from rfgs_core.view.server import address
 
     where = address(server)
     # Ctrl-C counts from the first word on: whoever reads it may answer at once.
     try:
-        sys.stdout.write(f"{where} shows the run; Ctrl-C ends\n")
+        called = bool(os.environ.get(CALLED))
+        # The bar of a training that is watched stands on a line of its own.
+        sys.stderr.write("\n" if called else "")
+        ends = "ends with the training" if called else "Ctrl-C ends"
+        sys.stdout.write(f"{where} shows the run; {ends}\n")
         sys.stdout.flush()
         if open_page and not webbrowser.open(where):
             sys.stderr.write("no browser was found; open the address yourself\n")

@@ -68,6 +68,9 @@ def import_run(
             f"{file_label()}: no camera {picture.camera!r}; it has "
             f"{', '.join(sorted(cameras_of(scene))) or 'none'}"
         )
+    if compare and wanted.coloring.mode == "ERROR":
+        # Distances are known only after the import; until then any colours will do.
+        wanted = replace(wanted, coloring=replace(wanted.coloring, mode="AUTO"))
     imported = import_gaussians(scene, path, wanted)
     if frame is not None and frame not in imported.frames:
         raise AddonError(

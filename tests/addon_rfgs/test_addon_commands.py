@@ -168,7 +168,17 @@ def test_an_inspection_opens_in_colour_through_a_camera_past_the_walls(
         "bpy.ops.wm.save_as_mainfile(filepath=sys.argv[2])"
     )
     python("-c", wall, scenes / "room.blend", walled, must_work=True)
-    more = ("--compare", "--out", blend, "--picture", tmp_path / "a.png", "--camera", "eye")
+    more = (
+        "--compare",
+        "--color-by",
+        "error",
+        "--out",
+        blend,
+        "--picture",
+        tmp_path / "a.png",
+        "--camera",
+        "eye",
+    )
     more += ("--resolution", "32", "--samples", "1")
     done = addon(walled, "import", tmp_path / "run", *more)
     assert done.returncode == 0, done.stderr

@@ -22,7 +22,7 @@ ROOT = HERE.parents[1]
 LIVING_ROOM = ROOT / "blender_scenes" / "living_room_walk.blend"
 STATES = ("loaded", "checked", "generating", "done", "imported", "compared", "error")
 #: States whose panels stand side by side in the docs, and the size of window they come from.
-STRIP, TALL = ("fresh", "checked", "generating", "done", "error"), (1920, 1080)
+STRIP, TALL = ("fresh", "checked", "generating", "done"), (1920, 1080)
 _GAP_PX, _COLOURS = 12, 160
 
 
@@ -57,17 +57,12 @@ def _picture(file: Path) -> np.ndarray:
 
 
 def _keep(made: Path, size: tuple[int, int]) -> None:
-    """Puts the pictures of the docs where $PICTURES says: panels of the tall window, and a view."""
+    """Puts the picture of the docs where $PICTURES says: panels of the tall window."""
     kept = os.environ.get("PICTURES")
-    if not kept:
+    if not kept or size != TALL:
         return
     folder = ROOT / kept
     folder.mkdir(parents=True, exist_ok=True)
-    if size != TALL:
-        # A palette would take the colours of Gaussians for others.
-        with Image.open(made / "compared.png") as image:
-            image.convert("RGB").save(folder / "compared.webp", quality=85, method=6)
-        return
     panels = [Image.open(made / f"{name}_panel.png") for name in STRIP]
     width = sum(panel.width for panel in panels) + _GAP_PX * (len(panels) - 1)
     strip = Image.new("RGB", (width, panels[0].height), "white")

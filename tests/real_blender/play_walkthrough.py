@@ -130,7 +130,9 @@ def coverage(stage: Any) -> Iterator[float]:
     command = (stage.arguments[0], "-m", "dataset_factory", "coverage", bpy.data.filepath)
     out = bpy.path.abspath("//coverage.json")
     more = ("--blender", stage.arguments[1], "--frame", str(FRAME), "--out", out)
-    subprocess.run([*command, *more], check=True)
+    # As jobs are started: Blender's own Python would be taken for that of the environment.
+    outside = stage.part("jobs.environment").child_environment()
+    subprocess.run([*command, *more], check=True, env=outside)
     with stage.override():
         bpy.ops.rfgs.show_coverage()
     yield from stage.shoot("coverage", "VIEW")

@@ -26,6 +26,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests/attacks")]
 import rfgs_core  # noqa: E402, F401
 
 # isort: split
+from bundle_formats import make_bundle  # noqa: E402
 from formats import Format, digest, make_all  # noqa: E402
 from other_formats import make_others  # noqa: E402
 from people_formats import make_people  # noqa: E402
@@ -100,7 +101,8 @@ def _hang(*_: Any) -> NoReturn:
 
 def _formats(folder: Path, names: list[str]) -> list[Format]:
     if names != ["add-on"]:
-        made = [*make_all(folder), *make_people(folder / "people")]
+        made = [*make_all(folder), *make_bundle(folder / "bundle")]
+        made += make_people(folder / "people")
         return [*made, *make_others(folder / "others", folder / "run", folder / "bundle")]
     from addon_formats import make_addon
 

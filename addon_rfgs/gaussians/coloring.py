@@ -24,6 +24,9 @@ RAMPED = {
 }
 
 
+#: Powers within this span tell nothing apart: bodies whose limbs were told reflect alike [dB].
+_LEAST_SPAN_DB = 0.5
+
 #: What the colours of a cloud say is kept with it, for the legend.
 SCALE = "rfgs_scale"
 
@@ -121,10 +124,13 @@ def encoded_colors(mesh: bpy.types.Mesh) -> np.ndarray:
 
 
 def _chosen(meshes: Sequence[bpy.types.Mesh]) -> str:
-    """Power where it is known: what the radio says; else display colours."""
+    """Power where it tells Gaussians apart: what the radio says; else display colours."""
     powers = [attributes.get(mesh, "rf_power_db") for mesh in meshes]
-    known = any(values is not None and np.isfinite(values).any() for values in powers)
-    return "POWER" if known else "DISPLAY"
+    known = np.concatenate([[], *(values for values in powers if values is not None)])
+    known = known[np.isfinite(known)]
+    differs = len(known) > 0 and float(np.ptp(known)) >= _LEAST_SPAN_DB
+    plain = all(float(np.ptp(encoded_colors(mesh))) < 1e-4 for mesh in meshes if mesh.vertices)
+    return "POWER" if differs or (len(known) and plain) else "DISPLAY"
 
 
 def _needed(meshes: Sequence[bpy.types.Mesh], name: str, remedy: str) -> list[np.ndarray]:

@@ -33,7 +33,12 @@ INTERPOLATIONS = [
 ]
 
 COLOR_MODES = [
-    ("AUTO", "Automatic", "Reflected power where it is known, else display colours", 0),
+    (
+        "AUTO",
+        "Automatic",
+        "Reflected power where it differs, else display colours",
+        0,
+    ),
     ("DISPLAY", "Display RGB", "Colours fitted to pictures, for display alone", 1),
     ("POWER", "Reflected power", "Power that each Gaussian reflects [dB]", 2),
     ("PHASE", "Phase", "Phase of the reflectivity on a circle of hues", 3),

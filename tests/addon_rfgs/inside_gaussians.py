@@ -264,6 +264,16 @@ def test_colours_tell_of_the_radio_unless_others_are_chosen(settings) -> None:
     assert Scale.of(cloud(5).data).mode == "POWER"
 
 
+def test_power_that_is_the_same_everywhere_is_no_colour(settings) -> None:
+    for item in (cloud(frame) for frame in FRAMES):
+        values = item.data.attributes["rf_power_db"].data
+        values.foreach_set("value", np.full(len(values), 30.0, np.float32))
+    settings.color_by = "DISPLAY"
+    settings.color_by = "AUTO"
+    assert Scale.of(cloud(5).data).mode == "DISPLAY"
+    assert np.ptp(colors(5)) > 0.1
+
+
 def test_a_comparison_is_kept_until_other_gaussians_come(settings) -> None:
     scene = bpy.context.scene
     assert kept_result(scene) == []

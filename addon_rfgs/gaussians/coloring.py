@@ -124,13 +124,13 @@ def encoded_colors(mesh: bpy.types.Mesh) -> np.ndarray:
 
 
 def _chosen(meshes: Sequence[bpy.types.Mesh]) -> str:
-    """Power where it tells Gaussians apart: what the radio says; else display colours."""
+    """Power where it tells Gaussians of a frame apart, or nothing does; else display colours."""
     powers = [attributes.get(mesh, "rf_power_db") for mesh in meshes]
-    known = np.concatenate([[], *(values for values in powers if values is not None)])
-    known = known[np.isfinite(known)]
-    differs = len(known) > 0 and float(np.ptp(known)) >= _LEAST_SPAN_DB
-    plain = all(float(np.ptp(encoded_colors(mesh))) < 1e-4 for mesh in meshes if mesh.vertices)
-    return "POWER" if differs or (len(known) and plain) else "DISPLAY"
+    known = [values[np.isfinite(values)] for values in powers if values is not None]
+    spans_db = [float(np.ptp(values)) for values in known if len(values)]
+    colours = [float(np.ptp(encoded_colors(mesh))) for mesh in meshes if len(mesh.vertices)]
+    plain = max(colours, default=0.0) < 1e-4
+    return "POWER" if spans_db and (max(spans_db) >= _LEAST_SPAN_DB or plain) else "DISPLAY"
 
 
 def _needed(meshes: Sequence[bpy.types.Mesh], name: str, remedy: str) -> list[np.ndarray]:

@@ -265,9 +265,9 @@ def test_colours_tell_of_the_radio_unless_others_are_chosen(settings) -> None:
 
 
 def test_power_that_is_the_same_everywhere_is_no_colour(settings) -> None:
-    for item in (cloud(frame) for frame in FRAMES):
-        values = item.data.attributes["rf_power_db"].data
-        values.foreach_set("value", np.full(len(values), 30.0, np.float32))
+    for frame in FRAMES:
+        values = cloud(frame).data.attributes["rf_power_db"].data
+        values.foreach_set("value", np.full(len(values), 30.0 + frame, np.float32))
     settings.color_by = "DISPLAY"
     settings.color_by = "AUTO"
     assert Scale.of(cloud(5).data).mode == "DISPLAY"

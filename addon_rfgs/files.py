@@ -72,10 +72,16 @@ def write_json(path: Path, value: Any) -> None:
         temporary.write_text(json_text(value), "utf-8")
 
 
+def sha256(path: Path) -> str:
+    """Hexadecimal SHA-256 of a file's bytes."""
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
 def sha256_below(folder: Path) -> dict[str, str]:
     """Digest of every file below a folder, by its name from there."""
     return {
-        file.relative_to(folder).as_posix(): hashlib.sha256(file.read_bytes()).hexdigest()
+        file.relative_to(folder).as_posix(): sha256(file)
         for file in sorted(folder.rglob("*"))
         if file.is_file()
     }

@@ -3,17 +3,16 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from rfgs_core.bench import CloudAndLinks, PropagationBench, cloud_and_links
-from rfgs_core.device import Device, finish_device, on_device
+from rfgs_core.bench import CloudAndLinks, PropagationBench, cloud_and_links, fastest
+from rfgs_core.device import Device, on_device
 from rfgs_core.propagation import Backend, Subcarriers, propagate
 from rfgs_core.render.bench import random_cloud
 from rfgs_core.render.rasterizer import splat
@@ -157,13 +156,12 @@ def throughput(device: Device, repeats: int = 5) -> Throughput:
     """Measures the forward model, and the chip's ceiling in the same run."""
     scene = on_device(_scene(*SPEED), device)
 
-    def forward() -> None:
+    def forward() -> Tensor:
         with torch.no_grad():
-            propagate(scene.gaussians, scene.links, scene.subcarriers)
-        finish_device()
+            return propagate(scene.gaussians, scene.links, scene.subcarriers)
 
     forward()
-    best_s = min(_seconds(forward) for _ in range(repeats))
+    best_s, _ = fastest(forward, repeats)
     rate = OPERATIONS * float(np.prod(SPEED)) / best_s
     return Throughput(best_s, rate, _ceiling(device, repeats))
 
@@ -174,15 +172,5 @@ def _ceiling(device: Device, repeats: int) -> float:
     left = torch.rand(edge, edge, device=device)
     torch.backends.cuda.matmul.allow_tf32 = False
 
-    def multiply() -> None:
-        torch.mm(left, left)
-        finish_device()
-
-    multiply()
-    return 2.0 * edge**3 / min(_seconds(multiply) for _ in range(repeats))
-
-
-def _seconds(work: Any) -> float:
-    begin = time.perf_counter()
-    work()
-    return time.perf_counter() - begin
+    torch.mm(left, left)
+    return 2.0 * edge**3 / fastest(lambda: torch.mm(left, left), repeats)[0]

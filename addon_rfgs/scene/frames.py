@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 import bpy
 
 from ..errors import AddonError
+from ..files import sha256
 from ..naming import closest
 
 _PATTERN = re.compile(r"\s*(-?\d+)\s*:\s*(-?\d+)\s*(?::\s*(\d+)\s*)?")
@@ -80,8 +80,7 @@ def file_sha256() -> str:
     """
     if not bpy.data.filepath:
         raise AddonError("the scene was never saved; save it first")
-    with Path(bpy.data.filepath).open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
+    return sha256(Path(bpy.data.filepath))
 
 
 def seconds_per_frame(scene: bpy.types.Scene) -> float:

@@ -41,6 +41,12 @@ def main(arguments: list[str] | None = None) -> int:
     record.add_argument("--person", default="emma", help="who plays it (emma)")
     record.add_argument("--fps", type=int, default=10, help="frames per second (10)")
     record.add_argument("--up", choices=("y", "z"), default="y", help="axis that is up (y)")
+    world = commands.add_parser(
+        "world", help="build a random world of `rfgs-factory worlds` as a scene to look at"
+    )
+    world.add_argument("settings", type=Path, help="the worlds.json of the worlds' folder")
+    world.add_argument("--index", type=int, default=0, help="which world (0)")
+    world.add_argument("--out", type=Path, required=True, help="the .blend to write")
     args = parser.parse_args(arguments)
     known = scenes()
     if args.command == "list":
@@ -54,6 +60,8 @@ def main(arguments: list[str] | None = None) -> int:
         return _bodies(args.out)
     if args.command == "recording":
         return _recording(args)
+    if args.command == "world":
+        return _world(args.settings, args.index, args.out)
     if args.command == "sheet":
         return _sheet(args.out, args.size, args.samples)
     if args.name not in known:
@@ -108,6 +116,23 @@ def _recording(args: argparse.Namespace) -> int:
     try:
         return _write(work, args.out)
     except ValueError as error:
+        sys.stderr.write(f"error: {error}\n")
+        return 2
+
+
+def _world(settings: Path, index: int, out: Path) -> int:
+    from rfgs_core.errors import RfgsError
+
+    def work(path: Path) -> None:
+        from blender_scenes.random_world import build
+
+        build(settings, index, path)
+
+    try:
+        if index < 0:
+            raise RfgsError(f"--index {index}: expected 0 or more")
+        return _write(work, out)
+    except RfgsError as error:
         sys.stderr.write(f"error: {error}\n")
         return 2
 

@@ -49,9 +49,9 @@ def key_poses(
             world[name] = pose.turns.get(name, above)
             if name in pose.turns:
                 keys.rotate(name, rest[name].T @ above.T @ world[name] @ rest[name], frame)
-        bone = armature.pose.bones["root"]
-        bone.location = rest["root"].T @ (pose.root - np.array(bone.bone.head_local))
-        bone.keyframe_insert("location", frame=frame, group="root")
+        bone = armature.pose.bones[order[0]]
+        bone.location = rest[bone.name].T @ (pose.root - np.array(bone.bone.head_local))
+        bone.keyframe_insert("location", frame=frame, group=bone.name)
     _mark(action, labels, first_frame)
     return action
 

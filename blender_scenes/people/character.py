@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import bmesh
@@ -43,22 +44,43 @@ def build_character(
     Returns:
         The armature object; the mesh `<name>_body` is its child.
     """
-    armature = _armature(name, body, collection)
+    armature = add_armature(name, body, collection)
+    worn = [material(slot) if look is None else _own_material(name, slot, look) for slot in SLOTS]
+    skinned = add_skin(name, body, worn, collection)
+    _reduce(skinned)
+    _paint(skinned, body, look or Look())
+    follow(armature, skinned)
+    return armature
+
+
+def add_skin(
+    name: str,
+    body: Body,
+    materials: Sequence[bpy.types.Material],
+    collection: bpy.types.Collection,
+    least_weight: float = 1e-3,
+) -> bpy.types.Object:
+    """Adds the mesh `<name>_body` of a person, with weights; all of it has the first material.
+
+    Weights up to `least_weight` are left out.
+    """
     mesh = bpy.data.meshes.new(f"{name}_body")
     mesh.from_pydata(body.vertices.tolist(), [], body.faces.tolist())
-    for slot in SLOTS:
-        mesh.materials.append(material(slot) if look is None else _own_material(name, slot, look))
+    for each in materials:
+        mesh.materials.append(each)
     skinned = bpy.data.objects.new(f"{name}_body", mesh)
     skinned.rfgs.object_class, skinned.rfgs.instance = "PERSON", name
     collection.objects.link(skinned)
-    _add_weights(skinned, body.bones, body.weights)
-    _reduce(skinned)
-    _paint(skinned, body, look or Look())
+    _add_weights(skinned, body.bones, body.weights, least_weight)
+    return skinned
+
+
+def follow(armature: bpy.types.Object, skinned: bpy.types.Object) -> None:
+    """Makes a smooth skin the child of an armature, whose bones move it."""
     skinned.data.shade_smooth()
     skinned.parent = armature
     modifier = skinned.modifiers.new("Armature", "ARMATURE")
     modifier.object = armature
-    return armature
 
 
 def add_breath(skinned: bpy.types.Object, body: Body, depth_m: float) -> None:
@@ -79,7 +101,8 @@ def add_breath(skinned: bpy.types.Object, body: Body, depth_m: float) -> None:
     block.data.foreach_set("co", moved.astype(np.float32).ravel())
 
 
-def _armature(name: str, body: Body, collection: bpy.types.Collection) -> bpy.types.Object:
+def add_armature(name: str, body: Body, collection: bpy.types.Collection) -> bpy.types.Object:
+    """Adds the armature of a body at rest; its bones turn by quaternions."""
     armature = bpy.data.objects.new(name, bpy.data.armatures.new(f"{name}_rig"))
     collection.objects.link(armature)
     bpy.context.view_layer.objects.active = armature
@@ -107,7 +130,7 @@ def _tail(body: Body, index: int) -> np.ndarray:
         return body.head(_NEXT[name])
     if len(children) == 1 and np.linalg.norm(body.heads[children[0]] - head) > 1e-3:
         return body.heads[children[0]]
-    if name in ("root", "head"):
+    if name == "head" or body.parents[index] < 0:
         return head + np.array([0.0, 0.0, 0.15])
     if name.startswith("toe"):
         return head + np.array([0.0, -0.06, 0.0])
@@ -116,9 +139,11 @@ def _tail(body: Body, index: int) -> np.ndarray:
     return head + direction / length * min(max(length, 0.02), 0.08)
 
 
-def _add_weights(skinned: bpy.types.Object, bones: tuple[str, ...], weights: np.ndarray) -> None:
+def _add_weights(
+    skinned: bpy.types.Object, bones: tuple[str, ...], weights: np.ndarray, least: float
+) -> None:
     for column, bone in enumerate(bones):
-        rows = np.flatnonzero(weights[:, column] > 1e-3)
+        rows = np.flatnonzero(weights[:, column] > least)
         group = skinned.vertex_groups.new(name=bone)
         for row in rows.tolist():
             group.add([row], float(weights[row, column]), "REPLACE")

@@ -3,13 +3,19 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import tyro
 
+from dataset_factory.plan.tracers import TracerName
 from rfgs_core.errors import RfgsError
+
+if TYPE_CHECKING:
+    from rfgs_core.worlds.settings_file import Pictures
 
 
 @dataclass(frozen=True)
@@ -17,7 +23,8 @@ class WorldsArgs:
     """Makes small datasets of random worlds: rooms, furniture, devices and people who move.
 
     Every world is a dataset of its own, OUT/world_0000012, with channels of the fast tracer,
-    meshes and joints, without Blender and without pictures. The same seed and number give the
+    meshes and joints. With --images Blender renders it too, and its scene is kept as
+    OUT/scenes/world_0000012.blend; without, no Blender is needed. The same seed and number give the
     same world, whoever makes it; run the same command again to continue where it stopped.
     In Python, `rfgs_core.worlds.world.soundings` gives the same without writing anything.
     """
@@ -44,6 +51,17 @@ class WorldsArgs:
     """Interactions of a path that meets a person: 1 the person alone, 2 also one wall, 3 two."""
     seed: int = 0
     """Root seed; 0 is a seed like any other."""
+    images: bool = False
+    """Also make a scene of Blender of every world, and render pictures, depth and masks of it."""
+    cameras: int = 2
+    """Cameras of each world that is rendered, 1 to 12."""
+    resolution: int = 128
+    """Side of the pictures [px]."""
+    samples: int = 16
+    """Light samples per pixel; more is less noisy and slower."""
+    tracer: TracerName = "fast"
+    """What traces the channels: the fast tracer, or Sionna RT, some hundred times slower and
+    through a scene of Blender as well."""
 
 
 def run(args: WorldsArgs) -> int:
@@ -55,6 +73,7 @@ def run(args: WorldsArgs) -> int:
     from rfgs_core.files import refuse_place
     from rfgs_core.links import filled
     from rfgs_core.worlds.cast import FAMILIES_ON_FLOORS
+    from rfgs_core.worlds.settings_file import WorldsFile
     from rfgs_core.worlds.world import WorldSettings
 
     if not 1 <= args.count <= MOST:
@@ -71,15 +90,32 @@ def run(args: WorldsArgs) -> int:
         families=args.motion or FAMILIES_ON_FLOORS,
     )
     settings.check()
+    shared = WorldsFile(radio, settings, args.seed, _pictures(args), args.tracer)
+    if shared.in_blender and settings.fps != round(settings.fps):
+        raise RfgsError(f"--fps {args.fps}: expected a whole number for a scene of Blender")
     refuse_place(args.out)
     indices = range(number - 1, args.count, shards)
+    # What is in each of many scenes would bury the bar.
+    logging.getLogger("dataset_factory.make.generate").setLevel(logging.WARNING)
     with filled(args.out):
         left = len(missing(args.out, indices))
         with tqdm(total=left, desc="worlds", unit="world", disable=not left) as bar:
-            for _ in make_worlds(args.out, radio, settings, args.seed, indices):
+            for _ in make_worlds(args.out, shared, args.radio, indices):
                 bar.update()
     sys.stdout.write(f"{args.out}: {len(indices)} worlds, {left} of them new\n")
     return 0
+
+
+def _pictures(args: WorldsArgs) -> Pictures | None:
+    from rfgs_core.worlds.settings_file import Pictures
+
+    if not args.images:
+        return None
+    limits = {"cameras": (1, 12), "resolution": (16, 8192), "samples": (1, 65536)}
+    for name, (low, high) in limits.items():
+        if not low <= getattr(args, name) <= high:
+            raise RfgsError(f"--{name} {getattr(args, name)}: expected {low} to {high}")
+    return Pictures(args.cameras, args.resolution, args.samples)
 
 
 def parse_people(text: str) -> tuple[int, int]:

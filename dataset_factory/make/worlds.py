@@ -13,7 +13,9 @@ from typing import Any
 import numpy as np
 
 from dataset_factory.make.sequence import instance_row
-from dataset_factory.plan.contents import versions
+from dataset_factory.plan.contents import make_plan, versions
+from dataset_factory.scene.builder import build_scene
+from dataset_factory.scene.catalogue import find_scene
 from rfgs_core.dataset.csi_store import create_csi, write_csi
 from rfgs_core.dataset.mesh_ply import write_mesh
 from rfgs_core.dataset.names import SequenceFiles
@@ -24,9 +26,10 @@ from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json, replacing_folder, write_json
 from rfgs_core.links import refuse_link
 from rfgs_core.locks import alone_in
-from rfgs_core.radio import Radio, layout
+from rfgs_core.radio import layout
 from rfgs_core.radio.files import radio_values
 from rfgs_core.radio.materials import MATERIALS
+from rfgs_core.worlds.settings_file import SETTINGS_FILE, WorldsFile
 from rfgs_core.worlds.world import (
     Sounding,
     World,
@@ -36,8 +39,8 @@ from rfgs_core.worlds.world import (
     sounded,
 )
 
-#: What all worlds of a folder were made with.
-SETTINGS_FILE = "worlds.json"
+#: Folder of the worlds' scenes, where they are rendered or traced by Sionna RT.
+SCENES = "scenes"
 #: Worlds of one folder at most.
 MOST = 10_000_000
 _SHARD = re.compile(r"(\d{1,6})/(\d{1,6})", re.ASCII)
@@ -60,33 +63,22 @@ def parse_shard(text: str) -> tuple[int, int]:
     return number, count
 
 
-def claim(out: Path, radio: Radio, settings: WorldSettings, seed: int) -> None:
+def claim(out: Path, shared: WorldsFile) -> None:
     """Makes the folder, or checks that its worlds are of the same settings.
 
     Raises:
         RfgsError: The folder holds something else, or worlds made with other settings.
     """
-    asked: dict[str, Any] = {
-        "radio": radio_values(radio), "settings": asdict(settings), "seed": seed,
-        "rfgs": versions()["rfgs"],
-    }  # fmt: skip
+    asked = {**shared.as_json(), "rfgs": versions()["rfgs"]}
     file = out / SETTINGS_FILE
     refuse_link(file)
     if file.is_file():
-        found = read_json(file)
-        # As JSON has it: tuples are lists there.
-        if found != _as_json(asked):
+        if read_json(file) != asked:
             raise RfgsError(f"{file}: made with other settings; choose another --out")
         return
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise RfgsError(f"{out}: not empty and no worlds; choose another --out")
     write_json(file, asked)
-
-
-def _as_json(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _as_json(item) for key, item in value.items()}
-    return [_as_json(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 def missing(out: Path, indices: range) -> list[int]:
@@ -106,16 +98,13 @@ def name_of(index: int) -> str:
     return f"world_{index:07d}"
 
 
-def make_worlds(
-    out: Path, radio: Radio, settings: WorldSettings, seed: int, indices: range
-) -> Iterator[World]:
+def make_worlds(out: Path, shared: WorldsFile, named: str, indices: range) -> Iterator[World]:
     """Makes the worlds that are missing, each a dataset of its own below a folder.
 
     Args:
         out: The folder.
-        radio: Radio to trace.
-        settings: What the worlds have in common.
-        seed: Root seed.
+        shared: What the worlds have in common.
+        named: How `--radio` names their radio.
         indices: Which worlds.
 
     Yields:
@@ -125,19 +114,63 @@ def make_worlds(
         RfgsError: The folder holds something else, somebody else makes the same worlds, or a
             radio cannot be traced in such rooms.
     """
-    settings.check()
-    refuse_radio(radio)
-    claim(out, radio, settings, seed)
+    shared.settings.check()
+    refuse_radio(shared.radio)
+    claim(out, shared)
     lock = out / f".lock-{indices.start}-{indices.step}"
     refuse_link(lock)
     lock.touch()
     with alone_in(lock, out, "rfgs-factory worlds"):
         _tidy(out, indices)
         for index in missing(out, indices):
-            world = random_world(radio, settings, seed, index)
+            world = random_world(shared.radio, shared.settings, shared.seed, index)
             with replacing_folder(out / name_of(index)) as folder:
-                _write(folder, sounded(world, settings, seed), settings, seed)
+                if shared.in_blender:
+                    _generate(folder, _scene(out, index), shared, named)
+                else:
+                    heard = sounded(world, shared.settings, shared.seed)
+                    _write(folder, heard, shared.settings, shared.seed)
             yield world
+
+
+def _scene(out: Path, index: int) -> Path:
+    """Builds a world as a scene of Blender."""
+    scenes = out / SCENES
+    refuse_link(scenes)
+    scenes.mkdir(exist_ok=True)
+    blend = scenes / f"{name_of(index)}.blend"
+    refuse_link(blend)
+    source = str(out / SETTINGS_FILE)
+    build_scene("a world", "world", source, "--index", str(index), "--out", str(blend))
+    return blend
+
+
+def _generate(folder: Path, blend: Path, shared: WorldsFile, named: str) -> None:
+    """Makes the dataset of a world's scene."""
+    # Worlds without Blender do without what traces and renders scenes, Dask among it.
+    from dataset_factory.make.generate import generate
+    from dataset_factory.plan.job import Job
+    from dataset_factory.scene.blender import Blender
+
+    settings, pictures = shared.settings, shared.pictures
+    plan = make_plan(
+        find_scene(str(blend)),
+        (named,),
+        f"1:{settings.frames}",
+        cameras=pictures.cameras if pictures else 0,
+        resolution=pictures.resolution_px if pictures else 16,
+        samples=pictures.samples if pictures else 1,
+        depth=min(settings.depth, shared.radio.deepest),
+        seed=shared.seed,
+        shadow="kirchhoff",
+        tracer=shared.tracer,
+        images=pictures is not None,
+        impairments=None,
+        packets_per_frame=1,
+        paths=False,
+        overrides={},
+    )
+    generate(Job(folder, plan, Blender(blend, None), workers=1))
 
 
 def _write(folder: Path, heard: Sounding, settings: WorldSettings, seed: int) -> None:

@@ -5,19 +5,15 @@ from __future__ import annotations
 
 import hashlib
 import json
-import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dataset_factory.children import child_environment, end_with_parent
 from dataset_factory.plan.tracers import TracerName
 from dataset_factory.scene.blender import Blender
 from dataset_factory.scene.bundle import Bundle, read_bundle
 from dataset_factory.scene.devices import choose_devices
 from dataset_factory.verify.description import Description
-from rfgs_core.errors import RfgsError
 from rfgs_core.files import write_json
 from rfgs_core.radio import DevicePose, Radio
 
@@ -64,21 +60,7 @@ class Workshop:
             return out
         write_json(source, description.as_json())
         fresh = self.folder / f"{stem}.new.blend"
-        module = [sys.executable, "-m", "blender_scenes", "shapes"]
-        done = subprocess.run(
-            [*module, str(source), "--out", str(fresh)],
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            errors="replace",
-            env=child_environment(),
-            start_new_session=True,
-            preexec_fn=end_with_parent,
-        )
-        if done.returncode:
-            said = [line for line in done.stderr.splitlines() if line.strip()]
-            reason = said[-1] if said else f"code {done.returncode}"
-            raise RfgsError(f"a scene of the card could not be built: {reason}")
+        build_scene("a scene of the card", "shapes", str(source), "--out", str(fresh))
         fresh.rename(out)
         return out
 

@@ -15,6 +15,7 @@ from rfgs_core import open_dataset
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import sha256
 from rfgs_core.radio.presets import preset
+from rfgs_core.worlds.settings_file import WorldsFile
 from rfgs_core.worlds.world import WorldSettings, random_world
 
 ASKED = ("worlds", "--radio", "wifi_commodity", "--frames", "2", "--depth", "1", "--count", "3")
@@ -75,11 +76,11 @@ def test_other_settings_and_other_folders_are_refused(made: Path, tmp_path, caps
 
 
 def test_a_world_is_made_by_one_process_at_a_time(made: Path) -> None:
-    settings = WorldSettings(frames=2, depth=1)
-    first = make_worlds(made, preset("wifi_commodity"), settings, 0, range(0, 4))
+    shared = WorldsFile(preset("wifi_commodity"), WorldSettings(frames=2, depth=1), 0)
+    first = make_worlds(made, shared, "wifi_commodity", range(0, 4))
     next(first)
     with pytest.raises(RfgsError, match="another rfgs-factory worlds"):
-        next(make_worlds(made, preset("wifi_commodity"), settings, 0, range(0, 4)))
+        next(make_worlds(made, shared, "wifi_commodity", range(0, 4)))
 
 
 def test_shards_have_one_form() -> None:

@@ -16,6 +16,7 @@ from .live.settings import RFGS_PG_live
 from .materials.coloring import restore
 from .materials.properties import RFGS_PG_guesses, RFGS_PG_material, RFGS_PG_materials
 from .paths.settings import RFGS_PG_paths
+from .steps import RFGS_PG_steps, fold_by_themselves
 
 ROLES = [
     ("NONE", "None", "Not a radio device", 0),
@@ -86,6 +87,7 @@ class RFGS_PG_window(bpy.types.PropertyGroup):
 
     check: bpy.props.PointerProperty(type=RFGS_PG_check)
     guesses: bpy.props.PointerProperty(type=RFGS_PG_guesses)
+    steps: bpy.props.PointerProperty(type=RFGS_PG_steps)
 
 
 @persistent
@@ -94,6 +96,7 @@ def _forget(_path: object) -> None:
     window = bpy.context.window_manager.rfgs
     for name in ("check", "guesses"):
         window.property_unset(name)
+    fold_by_themselves()
 
 
 def register() -> None:
@@ -109,6 +112,7 @@ def unregister() -> None:
     """Takes everything back that `register` added."""
     restore()
     bpy.app.handlers.load_post.remove(_forget)
+    fold_by_themselves()
     del bpy.types.WindowManager.rfgs
     del bpy.types.Scene.rfgs
     del bpy.types.Material.rfgs

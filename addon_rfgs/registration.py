@@ -18,7 +18,7 @@ _MODULES = (
         "devices.settings",
     ),
     *("export.settings", "gaussians.settings", "jobs.settings", "live.settings"),
-    *("materials.properties", "paths.settings", "properties"),
+    *("materials.properties", "paths.settings", "steps", "properties"),
     *("devices.operators", "devices.chosen_operators", "devices.recorded"),
     *("devices.captured", "devices.panel"),
     *("check.operators", "check.panel", "materials.operators", "materials.panel"),

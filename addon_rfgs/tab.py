@@ -31,11 +31,12 @@ class Tab:
             row.label(text="")
             row.label(text=text)
 
-    def columns(self) -> bpy.types.UILayout:
-        """The layout, with names beside values."""
-        self.layout.use_property_split = True
-        self.layout.use_property_decorate = False
-        return self.layout
+    def columns(self, below: bpy.types.UILayout | None = None) -> bpy.types.UILayout:
+        """The layout, or the one `below` a step's header, with names beside values."""
+        layout = self.layout if below is None else below
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        return layout
 
 
 def paragraph(layout: bpy.types.UILayout, text: str, icon: str) -> None:

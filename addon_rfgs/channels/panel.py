@@ -3,15 +3,14 @@
 
 import bpy
 
-from ..tab import Tab
+from ..steps import PartOfStep
 
 
-class RFGS_PT_channels(Tab, bpy.types.Panel):
+class RFGS_PT_channels(PartOfStep, bpy.types.Panel):
     """Measured and predicted channels of a link."""
 
     bl_parent_id = "RFGS_PT_gaussians"
     bl_label = "Channels"
-    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows the link and the button."""

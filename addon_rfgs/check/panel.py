@@ -7,7 +7,8 @@ from typing import Any
 
 import bpy
 
-from ..tab import Tab, paragraph
+from ..steps import Step
+from ..tab import paragraph
 from .settings import RFGS_PG_finding
 
 _ICONS = {"ERROR": "CANCEL", "WARNING": "ERROR", "INFO": "INFO"}
@@ -32,14 +33,20 @@ class RFGS_UL_findings(bpy.types.UIList):
         row.label(text=item.message)
 
 
-class RFGS_PT_check(Tab, bpy.types.Panel):
+class RFGS_PT_check(Step, bpy.types.Panel):
     """What would go wrong."""
 
     bl_label = "2 Check"
+    step, icon = "check", "VIEWZOOM"
 
-    def draw(self, context: bpy.types.Context) -> None:
+    @classmethod
+    def waits_for(cls, scene: bpy.types.Scene) -> str:
+        """Something that can be checked."""
+        return "" if scene.objects else "an empty scene"
+
+    def draw_step(self, context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
         """Shows the button, the list, and the active finding in full."""
-        layout, check = self.layout, context.window_manager.rfgs.check
+        check = context.window_manager.rfgs.check
         layout.operator("rfgs.check_scene", icon="VIEWZOOM")
         if check.outdated:
             layout.label(text="Out of date: check again", icon="ERROR")

@@ -3,15 +3,14 @@
 
 import bpy
 
-from ..tab import Tab
+from ..steps import PartOfStep
 
 
-class RFGS_PT_coverage(Tab, bpy.types.Panel):
+class RFGS_PT_coverage(PartOfStep, bpy.types.Panel):
     """How loud transmitters are over a plane."""
 
     bl_parent_id = "RFGS_PT_gaussians"
     bl_label = "Coverage"
-    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows file, transmitter and the two buttons."""

@@ -7,7 +7,8 @@ from typing import Any
 
 import bpy
 
-from ..tab import Tab, paragraph
+from ..steps import PartOfStep, Step
+from ..tab import paragraph
 from .empties import OWN_RADIOS, is_device
 from .fields import draw_fields
 
@@ -59,14 +60,15 @@ class RFGS_UL_devices(bpy.types.UIList):
         return shown, bpy.types.UI_UL_list.sort_items_by_name(items, "name")
 
 
-class RFGS_PT_devices(Tab, bpy.types.Panel):
+class RFGS_PT_devices(Step, bpy.types.Panel):
     """Radio devices of the scene."""
 
     bl_label = "1 Radios"
+    step, icon = "radios", "OUTLINER_OB_EMPTY"
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw_step(self, context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
         """Shows buttons that add, the list, and buttons for what is selected."""
-        layout, settings = self.layout, context.scene.rfgs.devices
+        settings = context.scene.rfgs.devices
         row = layout.row(align=True)
         for role, text in (("TRANSMITTER", "TX"), ("RECEIVER", "RX"), ("ACCESS_POINT", "AP")):
             row.operator("rfgs.add_device", text=text, icon=_ICONS[role]).role = role
@@ -94,16 +96,18 @@ class RFGS_PT_devices(Tab, bpy.types.Panel):
         part.prop(settings, "names", toggle=True)
 
 
-class RFGS_PT_device(Tab, bpy.types.Panel):
+class RFGS_PT_device(PartOfStep, bpy.types.Panel):
     """The radio of the active Empty."""
 
     bl_label = "Active Device"
     bl_parent_id = "RFGS_PT_devices"
+    bl_options = set()  # noqa: RUF012
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Whether the active object can be a device."""
-        return context.object is not None and context.object.type == "EMPTY"
+        there = context.object is not None and context.object.type == "EMPTY"
+        return there and super().poll(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows its role, and what applies to it."""
@@ -116,18 +120,18 @@ class RFGS_PT_device(Tab, bpy.types.Panel):
                 layout.operator("rfgs.match_devices", icon="PASTEDOWN").device = item.name
 
 
-class RFGS_PT_object(Tab, bpy.types.Panel):
+class RFGS_PT_object(PartOfStep, bpy.types.Panel):
     """What the active object counts as."""
 
     bl_label = "Active Object"
     bl_parent_id = "RFGS_PT_devices"
-    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Whether the active object can scatter."""
         item = context.object
-        return item is not None and item.type in _MEANINGFUL and not is_device(item)
+        there = item is not None and item.type in _MEANINGFUL and not is_device(item)
+        return there and super().poll(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows class, instance and surface."""

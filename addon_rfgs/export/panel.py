@@ -3,15 +3,14 @@
 
 import bpy
 
-from ..tab import Tab
+from ..steps import PartOfStep
 
 
-class RFGS_PT_dataset(Tab, bpy.types.Panel):
+class RFGS_PT_dataset(PartOfStep, bpy.types.Panel):
     """Bundle and ground truth."""
 
     bl_label = "Bundle and Ground Truth"
     bl_parent_id = "RFGS_PT_generate"
-    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows settings and the two buttons."""

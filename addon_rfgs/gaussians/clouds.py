@@ -119,6 +119,17 @@ def clouds_here(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     return [item for item in items if item.type == "MESH" and GROUP in item.modifiers]
 
 
+def path_or_run(scene: bpy.types.Scene) -> str:
+    """The path of the panel, or the folder of its training where that is done; empty if neither."""
+    said = scene.rfgs
+    if said.gaussians.path:
+        return str(said.gaussians.path)
+    folder = said.jobs.run_folder
+    if folder.startswith("//") and not bpy.data.filepath:
+        return ""
+    return folder if (Path(bpy.path.abspath(folder)) / "point_cloud.ply").is_file() else ""
+
+
 def chosen_clouds(context: bpy.types.Context, *, selected: bool = True) -> list[bpy.types.Object]:
     """The selected clouds if they are wanted, else all that are seen at this frame."""
     items = clouds_of(context.scene)

@@ -11,7 +11,7 @@ from ..command import Command
 from ..reporting import Progress, Undoable, chosen_path
 from ..scene.frames import named
 from . import commands
-from .clouds import chosen_clouds, clouds_of, import_gaussians
+from .clouds import chosen_clouds, clouds_of, import_gaussians, path_or_run
 from .compare import compare_with_mesh, keep_result
 from .export_ply import export_gaussians
 from .opening import color_view, views_of
@@ -50,7 +50,7 @@ class RFGS_OT_import_gaussians(Undoable, bpy.types.Operator):
 
     def work(self, context: bpy.types.Context, _progress: Progress) -> str:
         """Imports with the panel's settings."""
-        return import_shown(context, chosen_path(context.scene.rfgs.gaussians.path))
+        return import_shown(context, chosen_path(path_or_run(context.scene)))
 
 
 def import_shown(context: bpy.types.Context, path: Path) -> str:

@@ -3,22 +3,29 @@
 
 import bpy
 
-from ..tab import Tab
+from ..steps import PartOfStep, Step
 from .cloud_mesh import FRAME
-from .clouds import clouds_here
+from .clouds import clouds_here, path_or_run
 from .coloring import RAMPED, missing
 from .compare import kept_result
 
 
-class RFGS_PT_gaussians(Tab, bpy.types.Panel):
+class RFGS_PT_gaussians(Step, bpy.types.Panel):
     """Gaussians back into the scene."""
 
     bl_label = "5 Inspect"
+    step, icon = "inspect", "OUTLINER_OB_POINTCLOUD"
 
-    def draw(self, context: bpy.types.Context) -> None:
+    @classmethod
+    def waits_for(cls, scene: bpy.types.Scene) -> str:
+        """Gaussians, in the scene or on disk."""
+        return "" if clouds_here(scene) or path_or_run(scene) else "no Gaussians"
+
+    def draw_step(self, context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
         """Shows the path and the buttons."""
-        layout, settings = self.columns(), context.scene.rfgs.gaussians
-        layout.prop(settings, "path")
+        layout, settings = self.columns(layout), context.scene.rfgs.gaussians
+        trained = path_or_run(context.scene) and not settings.path
+        layout.prop(settings, "path", placeholder="the run of step 4" if trained else "")
         layout.operator("rfgs.import_gaussians", icon="IMPORT")
         layout.operator("rfgs.export_gaussians", icon="EXPORT")
         item = context.object
@@ -26,17 +33,16 @@ class RFGS_PT_gaussians(Tab, bpy.types.Panel):
             layout.label(text=f"{item.name}: recorded at frame {item.data[FRAME]}", icon="INFO")
 
 
-class _Part(Tab):
+class _Part(PartOfStep):
     """A panel below the one above."""
 
     bl_parent_id = "RFGS_PT_gaussians"
-    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
     names: tuple[str, ...] = ()
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Whether there are Gaussians that it acts on."""
-        return bool(clouds_here(context.scene))
+        return bool(clouds_here(context.scene)) and super().poll(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows the settings `names`."""

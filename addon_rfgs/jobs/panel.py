@@ -4,7 +4,9 @@
 import bpy
 
 from ..scene.taking_part import wanted_radios
-from ..tab import Tab, paragraph
+from ..steps import PartOfStep, Step
+from ..tab import paragraph
+from .checking import CHECK
 from .following import QUEUE, chosen_job
 from .preferences import ADDON, draw_check, environment_path, preferences
 from .process import SUPPORTED
@@ -40,14 +42,21 @@ class RFGS_UL_jobs(bpy.types.UIList):
         row.label(text=item.state)
 
 
-class RFGS_PT_generate(Tab, bpy.types.Panel):
+class RFGS_PT_generate(Step, bpy.types.Panel):
     """What is generated."""
 
     bl_label = "3 Generate"
+    step, icon = "generate", "RENDER_ANIMATION"
 
-    def draw(self, context: bpy.types.Context) -> None:
+    @classmethod
+    def waits_for(cls, _scene: bpy.types.Scene) -> str:
+        """A Python that can trace, and a file on disk."""
+        return _lacks_environment() or ("" if bpy.data.filepath else "an unsaved file")
+
+    def draw_step(self, context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
         """Shows what everybody sets, and the button."""
-        layout, settings, stored = self.columns(), context.scene.rfgs.jobs, preferences()
+        layout, settings = self.columns(layout), context.scene.rfgs.jobs
+        stored = preferences()
         layout.prop(settings, "dataset_folder")
         layout.prop(settings, "radios", placeholder=", ".join(wanted_radios(context.scene)))
         if missing := doing_without(context.scene):
@@ -63,12 +72,11 @@ class RFGS_PT_generate(Tab, bpy.types.Panel):
         _draw_standing(layout, "generate")
 
 
-class RFGS_PT_generate_more(Tab, bpy.types.Panel):
+class RFGS_PT_generate_more(PartOfStep, bpy.types.Panel):
     """What few change about a dataset."""
 
     bl_parent_id = "RFGS_PT_generate"
     bl_label = "More Settings"
-    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows settings of tracing, pictures and processes."""
@@ -84,14 +92,20 @@ class RFGS_PT_generate_more(Tab, bpy.types.Panel):
             layout.prop(settings, name)
 
 
-class RFGS_PT_train(Tab, bpy.types.Panel):
+class RFGS_PT_train(Step, bpy.types.Panel):
     """What is trained."""
 
     bl_label = "4 Train"
+    step, icon = "train", "MOD_PARTICLES"
 
-    def draw(self, context: bpy.types.Context) -> None:
+    @classmethod
+    def waits_for(cls, scene: bpy.types.Scene) -> str:
+        """A dataset, and a Python that can train."""
+        return _lacks_environment() or ("" if dataset_to_come(scene) else "no dataset")
+
+    def draw_step(self, context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
         """Shows what everybody sets and the buttons; a line as long as there is no dataset."""
-        layout, settings = self.columns(), context.scene.rfgs.jobs
+        layout, settings = self.columns(layout), context.scene.rfgs.jobs
         if not dataset_to_come(context.scene):
             layout.label(text="Needs the dataset of step 3", icon="INFO")
             return
@@ -103,17 +117,16 @@ class RFGS_PT_train(Tab, bpy.types.Panel):
         _draw_standing(layout, "evaluate")
 
 
-class RFGS_PT_train_more(Tab, bpy.types.Panel):
+class RFGS_PT_train_more(PartOfStep, bpy.types.Panel):
     """What few change about a training."""
 
     bl_parent_id = "RFGS_PT_train"
     bl_label = "More Settings"
-    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Whether there is something to train on."""
-        return dataset_to_come(context.scene)
+        return dataset_to_come(context.scene) and super().poll(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows settings of the fit."""
@@ -123,14 +136,22 @@ class RFGS_PT_train_more(Tab, bpy.types.Panel):
         self.automatic(layout, settings, "gaussians", "the recipe's")
 
 
-class RFGS_PT_jobs(Tab, bpy.types.Panel):
+class RFGS_PT_jobs(Step, bpy.types.Panel):
     """The environment and the list of jobs."""
 
     bl_label = "Jobs"
+    step, icon = "jobs", "SORTTIME"
 
-    def draw(self, _context: bpy.types.Context) -> None:
+    @classmethod
+    def waits_for(cls, _scene: bpy.types.Scene) -> str:
+        """A job, or an answer of the environment."""
+        stored = preferences()
+        told = CHECK.running or CHECK.problems or CHECK.versions
+        return "" if told or (stored is not None and stored.jobs) else "none"
+
+    def draw_step(self, _context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
         """Shows the list, and how the chosen job stands."""
-        layout, stored = self.layout, preferences()
+        stored = preferences()
         if stored is None:
             layout.label(text="Install the add-on to run jobs", icon="INFO")
             return
@@ -147,6 +168,13 @@ class RFGS_PT_jobs(Tab, bpy.types.Panel):
         job = chosen_job()
         if job is not None and stored.active_job < len(stored.jobs):
             _draw_job(layout, job, stored.jobs[stored.active_job])
+
+
+def _lacks_environment() -> str:
+    """Why no program of the environment can run, in few words; empty if one can."""
+    if not environment_path():
+        return "no environment"
+    return "unfit environment" if CHECK.problems else ""
 
 
 def _draw_standing(layout: bpy.types.UILayout, kind: str) -> None:

@@ -3,16 +3,15 @@
 
 import bpy
 
-from ..tab import Tab
+from ..steps import PartOfStep
 from .following import following, told
 
 
-class RFGS_PT_live(Tab, bpy.types.Panel):
+class RFGS_PT_live(PartOfStep, bpy.types.Panel):
     """Gaussians while radios send."""
 
     bl_parent_id = "RFGS_PT_gaussians"
     bl_label = "Live"
-    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows the port, the button and what was shown last, or why it ended."""

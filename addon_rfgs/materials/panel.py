@@ -8,18 +8,18 @@ from typing import Any
 import bpy
 
 from ..scene.bands import out_of_band, used_bands, validity
+from ..steps import PartOfStep
 from ..tab import Tab
 from ..tables import MATERIALS
 from .coloring import colored
 from .properties import RFGS_PG_guess
 
 
-class RFGS_PT_material(Tab, bpy.types.Panel):
+class RFGS_PT_material(PartOfStep, bpy.types.Panel):
     """Radio meaning of the active object's material."""
 
     bl_label = "Radio Materials"
     bl_parent_id = "RFGS_PT_check"
-    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows the carrier, the electrical model and what replaces its defaults."""

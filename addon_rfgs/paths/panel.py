@@ -3,15 +3,14 @@
 
 import bpy
 
-from ..tab import Tab
+from ..steps import PartOfStep
 
 
-class RFGS_PT_paths(Tab, bpy.types.Panel):
+class RFGS_PT_paths(PartOfStep, bpy.types.Panel):
     """Ray paths as curves."""
 
     bl_label = "Ray Paths"
     bl_parent_id = "RFGS_PT_gaussians"
-    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows settings and the two buttons."""

@@ -3,17 +3,17 @@
 
 import bpy
 
-from ..tab import Tab
+from ..steps import Step
 from ..version import version
 
 
-class RFGS_PT_file(Tab, bpy.types.Panel):
+class RFGS_PT_file(Step, bpy.types.Panel):
     """What this file holds."""
 
     bl_label = "This File"
-    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
+    step, icon, unfolds = "file", "FILE_BLEND", False
 
-    def draw(self, _context: bpy.types.Context) -> None:
+    def draw_step(self, _context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
         """Shows the button."""
-        self.layout.operator("rfgs.remove_data", icon="TRASH")
-        self.layout.label(text=f"RF-GS {version()}")
+        layout.operator("rfgs.remove_data", icon="TRASH")
+        layout.label(text=f"RF-GS {version()}")

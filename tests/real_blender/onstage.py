@@ -174,6 +174,8 @@ class Stage:
 def unfold_panels(only: tuple[str, ...] = ()) -> None:
     """Registers the extension again with every panel open; Blender cannot be asked to open one.
 
+    Steps fold by themselves, and can be.
+
     Args:
         only: Panels that are shown; all of them if none is named.
     """
@@ -189,6 +191,9 @@ def unfold_panels(only: tuple[str, ...] = ()) -> None:
         elif "poll" in vars(panel):
             del panel.poll
     extension.register()
+    steps = bpy.context.window_manager.rfgs.steps
+    for name in type(steps).__annotations__:
+        setattr(steps, name, True)
 
 
 #: Panel → its own `poll`.

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The steps of the tab, which unfold by themselves as soon as they can be taken."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import bpy
+
+from .tab import Tab
+
+#: Step → its panel.
+_PANELS: dict[str, type[Step]] = {}
+#: Steps that the user folded or unfolded against what they do by themselves. Neither the file nor
+#: its window manager, which is saved with it, has to remember that.
+_CHOSEN: dict[str, bool] = {}
+
+
+class Step(Tab):
+    """Mixed into the panel of a step, whose header is drawn here: Blender opens none of its own."""
+
+    bl_options: ClassVar[set[str]] = {"HIDE_HEADER"}
+    step: ClassVar[str]
+    """Name of the property that folds it."""
+    icon: ClassVar[str] = "NONE"
+    """Stands before its title and tells it from the panels below."""
+    unfolds: ClassVar[bool] = True
+    """Whether it unfolds by itself."""
+
+    def __init_subclass__(cls, **more: Any) -> None:
+        super().__init_subclass__(**more)
+        _PANELS[cls.step] = cls
+
+    @classmethod
+    def waits_for(cls, _scene: bpy.types.Scene) -> str:
+        """What it waits for, in two or three words; empty as soon as it can be taken."""
+        return ""
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draws the header and, where it is unfolded, what stands below."""
+        steps = context.window_manager.rfgs.steps
+        header, body = self.layout.panel_prop(steps, self.step)
+        header.label(text=self.bl_label, icon=self.icon)
+        lacking = self.waits_for(context.scene)
+        if lacking:
+            reason = header.row()
+            reason.active, reason.alignment = False, "RIGHT"
+            reason.label(text=lacking)
+        if body is not None:
+            self.draw_step(context, body)
+
+    def draw_step(self, context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
+        """Draws what stands below the header."""
+        raise NotImplementedError
+
+
+class PartOfStep(Tab):
+    """Mixed into a panel below that of a step, and folded away with it."""
+
+    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether the step above is unfolded."""
+        return is_unfolded(cls.step_above(), context.scene)
+
+    @classmethod
+    def step_above(cls) -> str:
+        """Name of the step that the panel is a part of."""
+        parent = cls.bl_parent_id
+        return next(name for name, panel in _PANELS.items() if panel.__name__ == parent)
+
+
+def is_unfolded(step: str, scene: bpy.types.Scene) -> bool:
+    """Whether a step is unfolded: as the user wants it, else as soon as it can be taken."""
+    panel = _PANELS[step]
+    return _CHOSEN.get(step, panel.unfolds and not panel.waits_for(scene))
+
+
+def fold(step: str, unfolded: bool) -> None:
+    """Keeps what the user wants; a step that is as it would be by itself goes on by itself."""
+    _CHOSEN.pop(step, None)
+    if unfolded != is_unfolded(step, bpy.context.scene):
+        _CHOSEN[step] = unfolded
+
+
+def fold_by_themselves() -> None:
+    """Forgets what the user wanted."""
+    _CHOSEN.clear()
+
+
+def _folded(step: str, title: str) -> Any:
+    return bpy.props.BoolProperty(
+        name=title,
+        description="Whether this step is unfolded; by itself it is once it can be taken",
+        get=lambda _steps: is_unfolded(step, bpy.context.scene),
+        set=lambda _steps, value: fold(step, value),
+        options={"SKIP_SAVE"},
+    )
+
+
+class RFGS_PG_steps(bpy.types.PropertyGroup):
+    """Which steps of the tab are unfolded; nothing of it is stored."""
+
+    radios: _folded("radios", "1 Radios")
+    check: _folded("check", "2 Check")
+    generate: _folded("generate", "3 Generate")
+    train: _folded("train", "4 Train")
+    jobs: _folded("jobs", "Jobs")
+    inspect: _folded("inspect", "5 Inspect")
+    file: _folded("file", "This File")

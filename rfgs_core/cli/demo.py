@@ -10,14 +10,12 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
-
-import tyro
+from typing import Any, Literal
 
 from rfgs_core.cli.calls import beside, call
 from rfgs_core.errors import RfgsError
 
-RADIOS = ("wifi", "mmwave")
+RADIOS: tuple[Literal["wifi", "mmwave"], ...] = ("wifi", "mmwave")
 _SETTINGS = "settings.json"
 #: The two radios' stages run side by side where so much memory is free [bytes]: each takes some
 #: 3 GB, and with less the machine would swap.
@@ -47,8 +45,9 @@ class DemoArgs:
     """Bounces of the radio paths that meet the person: 1 is direct only."""
     seed: int = 0
     """Root seed."""
-    only: tyro.conf.Suppress[str | None] = None
-    """Stages of one radio alone, as the demo calls itself beside those of the other."""
+    only: Literal["wifi", "mmwave"] | None = None
+    """Only train on this radio, evaluate and report, once the dataset is there: so the demo runs
+    the two side by side."""
 
 
 class Stages:
@@ -146,8 +145,8 @@ def run(args: DemoArgs) -> int:
     refuse_other_settings(args)
     runs = {radio: _run_of(args, radio) for radio in RADIOS}
     if args.only is not None:
-        if args.only not in RADIOS:
-            raise RfgsError(f"--only {args.only}: expected one of {', '.join(RADIOS)}")
+        if not (_dataset(args) / "dataset.json").exists():
+            raise RfgsError(f"{_dataset(args)}: no dataset yet; run `rfgs demo` without --only")
         _one_radio(args, args.only)
         return 0
     stages, dataset = Stages(args.out), _dataset(args)

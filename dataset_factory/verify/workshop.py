@@ -11,6 +11,7 @@ from typing import Any
 
 from dataset_factory.plan.tracers import TracerName
 from dataset_factory.scene.blender import Blender
+from dataset_factory.scene.builder import build_scene
 from dataset_factory.scene.bundle import Bundle, read_bundle
 from dataset_factory.scene.devices import choose_devices
 from dataset_factory.verify.description import Description

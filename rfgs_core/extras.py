@@ -18,6 +18,7 @@ EXTRA_OF = {
     "dask": "factory",
     "triton": "gpu",
     "playwright": "picture",
+    "imageio_ffmpeg": "video",
 }
 
 

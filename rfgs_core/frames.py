@@ -4,6 +4,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
+
+import numpy as np
 
 from rfgs_core.errors import RfgsError
 
@@ -29,6 +32,17 @@ def parse_frames(text: str) -> range:
     if last < first or step < 1:
         raise RfgsError(f"--frames {text!r}: expected FIRST <= LAST and STEP >= 1")
     return range(first, last + 1, step)
+
+
+def spread_frames(frames: Sequence[int], most: int) -> list[int]:
+    """Frames spread evenly from the first to the last, all of them where there are no more.
+
+    Example:
+        >>> spread_frames([10, 15, 20, 25, 30], 3)
+        [10, 20, 30]
+    """
+    rows = np.linspace(0, len(frames) - 1, min(most, len(frames))).round().astype(int)
+    return [frames[row] for row in rows.tolist()]
 
 
 def chosen_frames(text: str | None, available: list[int]) -> list[int]:

@@ -28,11 +28,25 @@ def check_video(path: Path) -> None:
     """
     if path.suffix.lower() not in (".mp4", ".webp"):
         raise RfgsError(f"{path}: expected a file name ending in .mp4 or .webp")
-    if path.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
+    if path.suffix.lower() == ".mp4" and _ffmpeg() is None:
         raise MissingToolError(
-            f"{path}: ffmpeg writes .mp4 and was not found; install it (Debian: `apt-get install "
-            f"-y ffmpeg`), or name the file {path.stem}.webp, which needs nothing"
+            f"{path}: ffmpeg writes .mp4 and was not found; install it (`pip install "
+            f"'rfgs[video]'`, or Debian: `apt-get install -y ffmpeg`), or name the file "
+            f"{path.stem}.webp, which needs nothing"
         )
+
+
+def _ffmpeg() -> str | None:
+    """The system's program, else the one that the extra `video` brings."""
+    found = shutil.which("ffmpeg")
+    if found is not None:
+        return found
+    try:
+        from imageio_ffmpeg import get_ffmpeg_exe
+
+        return str(get_ffmpeg_exe())
+    except (ModuleNotFoundError, RuntimeError):
+        return None
 
 
 def write_video(
@@ -73,8 +87,10 @@ def _write_mp4(path: Path, pictures: Iterable[np.ndarray], pictures_per_s: float
     if first is None:
         raise RfgsError("a video needs at least one picture")
     height, width = first.shape[:2]
+    program = _ffmpeg()
+    assert program is not None
     command = [
-        *("ffmpeg", "-y", "-loglevel", "error"),
+        *(program, "-y", "-loglevel", "error"),
         *("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}"),
         *("-r", f"{pictures_per_s:g}", "-i", "-"),
         # Its colours are stored for blocks of two by two pixels.

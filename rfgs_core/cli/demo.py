@@ -3,18 +3,23 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from rfgs_core.cli.calls import call
+from rfgs_core.cli.calls import beside, call
+from rfgs_core.errors import RfgsError
 
-RADIOS = ("wifi", "mmwave")
+RADIOS: tuple[Literal["wifi", "mmwave"], ...] = ("wifi", "mmwave")
 _SETTINGS = "settings.json"
+#: The two radios' stages run side by side where so much memory is free [bytes]: each takes some
+#: 3 GB, and with less the machine would swap.
+_ENOUGH = 8 * 2**30
 
 
 @dataclass(frozen=True)
@@ -40,13 +45,16 @@ class DemoArgs:
     """Bounces of the radio paths that meet the person: 1 is direct only."""
     seed: int = 0
     """Root seed."""
+    only: Literal["wifi", "mmwave"] | None = None
+    """Only train on this radio, evaluate and report, once the dataset is there: so the demo runs
+    the two side by side."""
 
 
 class Stages:
     """Runs stages once, remembers how long each took, and says which are already done."""
 
-    def __init__(self, out: Path) -> None:
-        self._path = out / "timings.json"
+    def __init__(self, out: Path, name: str = "timings") -> None:
+        self._path = out / f"{name}.json"
         self.seconds: dict[str, float] = _kept(self._path, dict[str, float]) or {}
 
     def run(self, name: str, done: Path, work: Callable[[], None]) -> None:
@@ -85,7 +93,7 @@ def _kept(path: Path, kind: Any) -> Any:
 
 
 def _asked(args: DemoArgs) -> dict[str, Any]:
-    return {name: value for name, value in asdict(args).items() if name != "out"}
+    return {name: value for name, value in asdict(args).items() if name not in ("out", "only")}
 
 
 def refuse_other_settings(args: DemoArgs) -> None:
@@ -94,8 +102,6 @@ def refuse_other_settings(args: DemoArgs) -> None:
     Raises:
         RfgsError: The folder holds such a demo.
     """
-    from rfgs_core.errors import RfgsError
-
     asked = _asked(args)
     found = _kept(args.out / _SETTINGS, dict[str, Any]) or asked
     differing = [name for name, value in asked.items() if found.get(name) != value]
@@ -137,9 +143,13 @@ def run(args: DemoArgs) -> int:
     from rfgs_core.run import open_run
 
     refuse_other_settings(args)
-    stages = Stages(args.out)
-    dataset = args.out / "dataset"
-    runs = {radio: args.out / f"run-{radio}" for radio in RADIOS}
+    runs = {radio: _run_of(args, radio) for radio in RADIOS}
+    if args.only is not None:
+        if not (_dataset(args) / "dataset.json").exists():
+            raise RfgsError(f"{_dataset(args)}: no dataset yet; run `rfgs demo` without --only")
+        _one_radio(args, args.only)
+        return 0
+    stages, dataset = Stages(args.out), _dataset(args)
     stages.run("generate", dataset / "dataset.json", lambda: _generate(args, dataset))
     stages.run(
         "validate",
@@ -147,22 +157,53 @@ def run(args: DemoArgs) -> int:
         lambda: call("dataset_factory", "validate", dataset),
     )
     stages.run("preview", dataset / "log", lambda: call("dataset_factory", "preview", dataset))
-    for radio, folder in runs.items():
-        train = ("rfgs_core.cli", "train", dataset, "--radio", radio, "--out", folder)
-        seed = ("--seed", str(args.seed))
-        stages.run(f"train {radio}", folder / "point_cloud.ply", lambda c=(*train, *seed): call(*c))
-        evaluate = ("rfgs_core.cli", "eval", folder)
-        stages.run(f"evaluate {radio}", folder / "metrics.json", lambda c=evaluate: call(*c))
-        stages.run(
-            f"report {radio}",
-            folder / "report.html",
-            lambda f=folder: call("rfgs_core.cli", "report", f),
-        )
-    picture = args.out / "inspect.png"
-    stages.run("back to Blender", picture, lambda: _inspect(args, runs[RADIOS[-1]]))
-    page = write_demo_report(
-        args.out, [open_run(folder) for folder in runs.values()], stages.seconds
-    )
+    results = [args.out / "inspect.png", *(folder / "report.html" for folder in runs.values())]
+    missing = next((path for path in results if not path.exists()), results[0])
+    stages.run(" and ".join(RADIOS), missing, lambda: _radios(args))
+    parts = [Stages(args.out, f"timings-{radio}").seconds for radio in RADIOS]
+    seconds = {**stages.seconds, **{f"– {n}": s for part in parts for n, s in part.items()}}
+    page = write_demo_report(args.out, [open_run(folder) for folder in runs.values()], seconds)
     total = sum(stages.seconds.values()) / 60
     sys.stdout.write(f"{page} written; all stages together took {total:.1f} minutes\n")
     return 0
+
+
+def _dataset(args: DemoArgs) -> Path:
+    return args.out / "dataset"
+
+
+def _run_of(args: DemoArgs, radio: str) -> Path:
+    return args.out / f"run-{radio}"
+
+
+def _radios(args: DemoArgs) -> None:
+    """The stages of all radios, side by side where the machine can."""
+    import psutil
+
+    first, *others = RADIOS
+    with contextlib.ExitStack() as at_work:
+        for radio in others:
+            if psutil.virtual_memory().available < _ENOUGH or (os.cpu_count() or 1) < 2:
+                at_work.callback(_one_radio, args, radio)
+                continue
+            log = args.out / f"{radio}.log"
+            sys.stderr.write(f"[{radio}] at work beside {first}; {log} tells how far it is\n")
+            asked = [(f"--{name}", str(value)) for name, value in _asked(args).items()]
+            words = [word for pair in asked for word in pair]
+            command = ("rfgs_core.cli", "demo", "--out", args.out, *words, "--only", radio)
+            at_work.enter_context(beside(*command, log=log))
+        _one_radio(args, first)
+
+
+def _one_radio(args: DemoArgs, radio: str) -> None:
+    """Trains on one radio, evaluates and reports; the last one's Gaussians go back to Blender."""
+    stages, folder = Stages(args.out, f"timings-{radio}"), _run_of(args, radio)
+    train = ("rfgs_core.cli", "train", _dataset(args), "--radio", radio, "--out", folder)
+    seed = ("--seed", str(args.seed))
+    stages.run(f"train {radio}", folder / "point_cloud.ply", lambda: call(*train, *seed))
+    evaluate = ("rfgs_core.cli", "eval", folder)
+    stages.run(f"evaluate {radio}", folder / "metrics.json", lambda: call(*evaluate))
+    report = folder / "report.html"
+    stages.run(f"report {radio}", report, lambda: call("rfgs_core.cli", "report", folder))
+    if radio == RADIOS[-1]:
+        stages.run("back to Blender", args.out / "inspect.png", lambda: _inspect(args, folder))

@@ -38,7 +38,7 @@ class RenderArgs:
     person_only: bool = False
     """Only what moves, on mid-grey, instead of in the room."""
     video: Path | None = None
-    """Video to write, .mp4 (ffmpeg must be installed) or .webp: the chosen frames in their own
+    """Video to write, .mp4 (by ffmpeg) or .webp: the chosen frames in their own
     time through one camera, rendered beside true."""
     camera: str | None = None
     """Camera of the video; left out: the first that the shader never saw, else the first."""

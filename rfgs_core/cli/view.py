@@ -56,7 +56,7 @@ class ViewArgs:
     width: int = 1280
     """Width of that picture [px]; 420 is what a phone shows."""
     record: Path | None = None
-    """Write a video to this .mp4 (ffmpeg must be installed) or .webp with a headless Chromium, and
+    """Write a video to this .mp4 (by ffmpeg) or .webp with a headless Chromium, and
     end: all frames in their own time, seen by a camera that swings around the people."""
 
 

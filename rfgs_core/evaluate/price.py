@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from rfgs_core.evaluate.baselines import BASELINES
+from rfgs_core.evaluate.oracle import MOST_FRAMES
 from rfgs_core.evaluate.scene import EvaluatedRun
 from rfgs_core.past import Speed, Stage, forecast, in_words, size_in_words
 from rfgs_core.run.costs import stages as training_stages
@@ -45,10 +46,11 @@ def price_line(run: EvaluatedRun, pictures: int, *, oracle: bool) -> str:
         Stage("pictures", "eval-pictures", what, pictures, Speed(0.0, USUAL_PICTURE_S)),
     ]
     if oracle:
-        fits = training_stages(run.config, run.sequence, frames, run.config.settings.iterations)
+        ceiling = min(frames, MOST_FRAMES)
+        fits = training_stages(run.config, run.sequence, ceiling, run.config.settings.iterations)
         stages += [replace(fit, name="oracle_init") for fit in fits if fit.name != "find"]
     found = forecast(stage for stage in stages if stage.steps)
-    fits = f", {frames} fits from the true surface" if oracle else ""
+    fits = f", {min(frames, MOST_FRAMES)} fits from the true surface" if oracle else ""
     less = "; --no-oracle is less" if oracle else ""
     return (
         f"{frames} frames beside {len(BASELINES)} baselines, {pictures} pictures{fits}; about "

@@ -172,12 +172,17 @@ def f10_chart(frames: list[dict], shown: dict[str, tuple[str, str]]) -> str:
         number = [row["frame"] for row in frames]
         own = [row["geometry"]["f10"] for row in frames]
         for name, (words, colour) in shown.items():
-            values = [
-                row["baselines"].get(name, {}).get("geometry", {}).get("f10", np.nan)
-                for row in frames
-            ]
-            if not np.isnan(values).all():
-                axis.plot(number, values, "o-", ms=3.5, lw=1.2, color=colour, label=words)
+            of = {row["frame"]: row["baselines"].get(name, {}).get("geometry") for row in frames}
+            known = {frame: values["f10"] for frame, values in of.items() if values}
+            if known:
+                axis.plot(
+                    *zip(*known.items(), strict=True),
+                    "o-",
+                    ms=3.5,
+                    lw=1.2,
+                    color=colour,
+                    label=words,
+                )
         axis.plot(number, own, "o-", ms=5, lw=2.2, color=METHOD, label="RF-GS")
         label = "match within 10 cm (F10)"
         axis.set(xlabel="frame", ylabel=label, ylim=(0, 1.02), xticks=number)

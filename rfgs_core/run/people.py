@@ -11,7 +11,6 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import numpy as np
 from msgspec import Meta
 from tqdm import tqdm
 
@@ -19,6 +18,7 @@ from rfgs_core.background.learned import learned_background
 from rfgs_core.bodies.count import FEWEST_PAIRS, count_bodies
 from rfgs_core.dataset import Sequence
 from rfgs_core.errors import RfgsError, RfgsFormatError
+from rfgs_core.frames import spread_frames
 from rfgs_core.measure.observations import observe
 from rfgs_core.records import record
 from rfgs_core.run.config import CONFIG_FILE
@@ -194,13 +194,12 @@ def head_count(
         raise RfgsError(f"--people sensed: {why_not}; expected --people told, or their number")
     if asked == "told" or why_not:
         return HeadCount(told(sequence), "told")
-    spread = np.linspace(0, len(frames) - 1, votes_of(frames)).round().astype(int)
     empty = None
     if config.background == "learned":
         empty = learned_background(sequence, radio, config.channel, config.observe, config.packets)
     votes = {}
     on_frame(0)
-    for frame in (frames[index] for index in spread):
+    for frame in spread_frames(frames, votes_of(frames)):
         seen = observe(
             sequence, radio, frame, config.channel, config.observe, empty, config.packets
         )

@@ -57,9 +57,9 @@ def package_name(requirement: str) -> str:
 
 
 def test_every_package_of_an_extra_names_one_that_exists() -> None:
-    assert {"factory", "blender", "scenes", "cluster", "gpu", "picture", "dev", "docs"} == set(
-        EXTRAS
-    )
+    assert set(EXTRAS) == {
+        *("factory", "blender", "scenes", "cluster", "gpu", "picture", "video", "dev", "docs")
+    }
     assert set(EXTRA_OF.values()) <= set(EXTRAS)
 
 

@@ -6,10 +6,12 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from imageio_ffmpeg import get_ffmpeg_exe
 from PIL import Image
 
 from rfgs_core.errors import MissingToolError, RfgsError
@@ -33,12 +35,12 @@ def test_a_webp_plays_every_picture_for_its_time(tmp_path: Path) -> None:
             assert abs(np.asarray(video.convert("RGB")).astype(int) - shade).max() < 6
 
 
-@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="no ffmpeg on this system")
 def test_an_mp4_of_odd_size_is_padded_and_keeps_its_pictures(tmp_path: Path) -> None:
     file = tmp_path / "a.mp4"
     write_video(file, iter(pictures(65, 47)), 5.0)
+    program = shutil.which("ffmpeg") or get_ffmpeg_exe()
     raw = subprocess.run(
-        ["ffmpeg", "-loglevel", "error", "-i", file, "-f", "rawvideo", "-pix_fmt", "gray", "-"],
+        [program, "-loglevel", "error", "-i", file, "-f", "rawvideo", "-pix_fmt", "gray", "-"],
         capture_output=True,
         check=True,
     ).stdout
@@ -53,9 +55,9 @@ def test_names_and_tools_are_checked_before_anything_is_drawn(
     with pytest.raises(RfgsError, match=r"a\.gif: expected a file name ending in \.mp4 or \.webp"):
         check_video(Path("a.gif"))
     monkeypatch.setattr(shutil, "which", lambda _name: None)
-    with pytest.raises(
-        MissingToolError, match=r"apt-get install -y ffmpeg.*or name the file a\.webp"
-    ):
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    said = r"rfgs\[video\].*apt-get install -y ffmpeg.*or name the file a\.webp"
+    with pytest.raises(MissingToolError, match=said):
         check_video(Path("a.mp4"))
     with pytest.raises(RfgsError, match="at least one picture"):
         write_video(tmp_path / "a.webp", [], 5.0)

@@ -29,8 +29,8 @@ class BenchArgs:
     tracers: the fast tracer beside Sionna RT on our scenes, as `rfgs-factory tracers`.
     limbs: joints and surface of a dataset's one person beside what knows less.
     people: how often a dataset's people are counted right, beside channels without any; or with
-    --data, joints of real people in a public set (MM-Fi, mmBody, HuPR) by our network, which saw
-    synthetic radio alone.
+    --data, joints of real people in a public set (MM-Fi, mmBody, HuPR, RT-Pose, M4Human) by our
+    network, which saw synthetic radio alone.
     live: six receivers of 1,000 packets/s each over UDP, made here: packets lost, latency, updates.
     fields: the grid search that settings of neural fields, our baselines, were taken from.
     table1: the paper's table 1, methods x Wi-Fi and mmWave, resumable; see --size and --out.

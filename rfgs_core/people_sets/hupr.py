@@ -80,6 +80,7 @@ class HuPR:
             "its abstract, wizwand.com/paper/68fa7a641e209131cea82dbc, read 2026-11-24",
         ),
     )
+    assumptions: tuple[str, ...] = (f"range bins of {100 * RANGE_BIN_M:g} cm",)
 
     @staticmethod
     def at(folder: Path) -> HuPR | None:

@@ -22,9 +22,11 @@ from rfgs_core.limbs.network import LimbNetwork
 from rfgs_core.limbs.propose import propose
 from rfgs_core.limbs.tokens import MIRRORED
 from rfgs_core.people_sets.hupr import HuPR
+from rfgs_core.people_sets.m4human import M4Human
 from rfgs_core.people_sets.mmbody import MMBody
 from rfgs_core.people_sets.mmfi import MMFi
 from rfgs_core.people_sets.model import HeardFrame, PeopleSet
+from rfgs_core.people_sets.rtpose import RTPose
 from rfgs_core.people_sets.scatterers import heard_by_us
 from rfgs_core.seeds import sub_seed
 from rfgs_core.skeleton import JOINTS
@@ -59,13 +61,14 @@ def open_people_set(folder: Path) -> PeopleSet:
     """
     if not folder.is_dir():
         raise RfgsError(f"{folder}: no such folder")
-    for kind in (MMFi, MMBody, HuPR):
+    for kind in (MMFi, MMBody, HuPR, RTPose, M4Human):
         found = kind.at(folder)
         if found is not None and found.count:
             return found
     raise RfgsError(
-        f"{folder}: expected MM-Fi (E01/S01/A01/mmwave), mmBody (sequence_0/radar) or HuPR "
-        "(single_1/hori with joints), see docs/captures.md"
+        f"{folder}: expected MM-Fi (E01/S01/A01/mmwave), mmBody (sequence_0/radar), HuPR "
+        "(single_1/hori with joints), RT-Pose (Train.json and its cubes) or M4Human "
+        "(p1/actions/1/mmwave and p1/parameters/1.json), see docs/captures.md"
     )
 
 
@@ -108,6 +111,7 @@ def judge_people(
         "frames without points": silent,
         "points per frame": float(np.mean([len(answer.frame.points) for answer in answers])),
         **dict(_figures(answers)),
+        **{f"assumed {n}": said for n, said in enumerate(public.assumptions, start=1)},
         **{f"claimed, not reproduced ({claim.source})": claim.figure for claim in public.claims},
     }
 

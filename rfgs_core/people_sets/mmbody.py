@@ -24,7 +24,7 @@ from rfgs_core.errors import RfgsFormatError
 from rfgs_core.people_sets.model import Claim, Found, HeardFrame, joints_of
 
 #: Rows of the first 22 joints of SMPL-X; its head is where the skull begins, which is our neck.
-_SMPLX = {
+SMPLX = {
     "pelvis": 0,
     "left_hip": 1,
     "right_hip": 2,
@@ -54,6 +54,7 @@ class MMBody:
 
     name = "mmBody"
     claims: tuple[Claim, ...] = ()
+    assumptions: tuple[str, ...] = ()
 
     @staticmethod
     def at(folder: Path) -> MMBody | None:
@@ -105,6 +106,6 @@ def _joints(path: Path) -> Float64[np.ndarray, "17 3"]:
     stored = load_arrays(path, _REMEDY, {"joints": ("joint", 3)}, seal=False)["joints"].astype(
         np.float64
     )
-    if len(stored) <= max(_SMPLX.values()):
+    if len(stored) <= max(SMPLX.values()):
         raise RfgsFormatError(f"{path}: expected 22 joints or more, found {len(stored)}; {_REMEDY}")
-    return joints_of(stored, _SMPLX)
+    return joints_of(stored, SMPLX)

@@ -47,6 +47,9 @@ class MMFi:
 
     name = "MM-Fi"
     claims: tuple[Claim, ...] = ()
+    assumptions: tuple[str, ...] = (
+        "heads are above ankles, and points lie where they are nearest to joints",
+    )
 
     @staticmethod
     def at(folder: Path) -> MMFi | None:

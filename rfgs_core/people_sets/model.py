@@ -51,6 +51,11 @@ class PeopleSet(Protocol):
         ...
 
     @property
+    def assumptions(self) -> tuple[str, ...]:
+        """What its files and loaders leave open, and what is taken for it."""
+        ...
+
+    @property
     def count(self) -> int:
         """Frames there are."""
         ...

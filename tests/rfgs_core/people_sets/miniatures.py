@@ -7,9 +7,10 @@ import json
 from pathlib import Path
 
 import numpy as np
+from scipy.io import savemat
 
 from rfgs_core.articulated import people
-from rfgs_core.people_sets import hupr, mmbody
+from rfgs_core.people_sets import hupr, m4human, mmbody, rtpose
 from rfgs_core.skeleton import JOINTS
 from rfgs_core.worlds.motion import random_motion
 
@@ -65,7 +66,7 @@ def write_mmbody(folder: Path, frames: int = 4) -> list[tuple[np.ndarray, np.nda
         rows = np.concatenate([points, np.full((len(points), 3), 7.0)], axis=1)
         np.save(part / "radar" / f"frame_{number}.npy", rows)
         smplx = np.zeros((127, 3))
-        for name, row in mmbody._SMPLX.items():
+        for name, row in mmbody.SMPLX.items():
             smplx[row] = joints[JOINTS.index(name)]
         arrays = {"joints": smplx, "pose": np.zeros(69), "vertices": np.zeros((10475, 3))}
         np.savez(part / "mesh" / f"frame_{number}.npz", **arrays)
@@ -100,3 +101,74 @@ def write_hupr(folder: Path, frames: int = 3, together: bool = False) -> np.ndar
     sines = np.array([(31 - a) / 32, (31 - e) / 32])
     ahead = np.sqrt(1.0 - (sines**2).sum())
     return distance_m * np.array([sines[0], ahead, sines[1]])
+
+
+def write_rtpose(
+    folder: Path, frames: int = 3, processed: bool = False
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """RT-Pose: a wall that stands still, louder than the points that move; joints by frame."""
+    home = folder / ("sequences/7/radar/npy_DZYX_complex" if processed else "walk/DZYX_npy_f16")
+    home.mkdir(parents=True)
+    moments = walker(frames)
+    labels = {}
+    for number, (joints, points) in enumerate(moments):
+        cube = np.zeros((6, *rtpose._CELLS), np.complex64 if processed else np.float16)
+        cube[0, 16, 20:100, 160] = 50.0
+        cube[1, 16, 20:100, 160] = 20.0
+        right, ahead, up = points.T
+        zyx = np.stack([up, -right, ahead], axis=-1)
+        z, y, x = np.rint((zyx - rtpose._START_M) / rtpose._STEP_M).astype(int).T
+        cube[3, z, y, x] = 2.0j if processed else 2.0
+        np.save(home / f"{number + 30:06d}.npy", cube)
+        pose = [[0.0] * 3] * 15
+        for name, row in rtpose._ORDER.items():
+            right, ahead, up = (float(value) for value in joints[JOINTS.index(name)])
+            pose[row] = [ahead, -right, up]
+        person = {"Radar_frameID": number + 30 if processed else f"{number + 30:06d}", "pose": pose}
+        labels[f"{number:06d}"] = [person]
+    # Two people, nobody, and a frame whose cube is missing are left out.
+    labels |= {"8": [person, person], "9": [{**person, "pose": []}]}
+    labels["10"] = [{**person, "Radar_frameID": "000999"}]
+    (folder / "Test.json").write_text(json.dumps({"7": labels}))
+    if not processed:
+        (folder / "file_meta.txt").write_text("6,other\n7,walk\n")
+    return moments
+
+
+def write_m4human(
+    folder: Path, frames: int = 3, person: int = 1, action: int = 36
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """M4Human: points in MATLAB files, joints in the axes of another room, two calibrations."""
+    part = folder / f"p{person}" / "actions" / str(action)
+    for path in (part / "mmwave", part / "rgb", folder / f"p{person}/parameters"):
+        path.mkdir(parents=True)
+    calibration = folder / f"p{person}" / "ins_ext"
+    if person == 14:
+        calibration = calibration / "action30-37"
+    calibration.mkdir(parents=True)
+    rng = np.random.default_rng(person)
+    vicon, camera = (np.linalg.qr(rng.standard_normal((3, 3)))[0] for _ in range(2))
+    vicon *= np.linalg.det(vicon)
+    camera *= np.linalg.det(camera)
+    shifts = rng.standard_normal((2, 3))
+    rows = np.hstack([vicon, 1000.0 * shifts[0][:, None]])
+    np.savetxt(calibration / "vicon_to_cam.txt", np.vstack([rows, [0, 0, 0, 1]]))
+    np.savetxt(calibration / "radar2rgb_rotmatrix.txt", camera)
+    np.savetxt(calibration / "radar2rgb_tvec.txt", shifts[1])
+    moments, fits = walker(frames), []
+    # A picture of its own takes a row of the joints, too.
+    (part / "rgb" / "4.png").write_bytes(b"")
+    for number, (joints, points) in enumerate(moments, start=5):
+        high = [0.0, 0.0, m4human.RADAR_M]
+        values = np.hstack([points + high, np.full((len(points), 1), 3.0)])
+        tables = {"RawPoints": values, "rawImage_XYZ": np.zeros((3, 2, 2), np.float32)}
+        savemat(part / "mmwave" / f"{number}.mat", tables)
+        (part / "rgb" / f"{number}.png").write_bytes(b"")
+        there = (joints + high) @ camera.T + shifts[1]
+        smplx = np.zeros((55, 3))
+        for name, row in mmbody.SMPLX.items():
+            smplx[row] = (there[JOINTS.index(name)] - shifts[0]) @ vicon
+        fits.append(smplx.tolist())
+    fit = {"joints": [fits[0], *fits], "betas": [[0.0] * 16] * (frames + 1), "gender": "male"}
+    (folder / f"p{person}/parameters/{action}.json").write_text(json.dumps(fit))
+    return moments

@@ -8,7 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from miniatures import PLACE_M, walker, write_hupr, write_mmbody, write_mmfi
+from miniatures import (
+    PLACE_M,
+    walker,
+    write_hupr,
+    write_m4human,
+    write_mmbody,
+    write_mmfi,
+    write_rtpose,
+)
 
 from rfgs_core.cli import main
 from rfgs_core.encode.matched_filter import matched_filter_map
@@ -48,7 +56,7 @@ def test_a_point_is_heard_where_it_is() -> None:
     assert power[0] > 5.0 * power[1:].max()
 
 
-@pytest.mark.parametrize("write", [write_mmfi, write_mmbody])
+@pytest.mark.parametrize("write", [write_mmfi, write_mmbody, write_m4human])
 def test_rows_and_controls_on_point_clouds(tmp_path: Path, network, write) -> None:
     write(tmp_path)
     table = judge_people(tmp_path, network)
@@ -65,6 +73,16 @@ def test_rows_and_controls_on_point_clouds(tmp_path: Path, network, write) -> No
     assert float(table["mean walk, place told: joints [m]"]) < 0.5
     # The walker may face either way; told the wrong side, the mean walk is no better than that.
     assert "network, place found: the same, sides swapped [m]" in table
+
+
+def test_rows_on_cells_and_what_is_assumed(tmp_path: Path, network) -> None:
+    write_rtpose(tmp_path, frames=2)
+    table = judge_people(tmp_path, network)
+    assert (table["set"], table["frames"]) == ("RT-Pose", 2)
+    # Cells are 16 cm wide and 36 cm high.
+    assert float(table["place found: median error [m]"]) < 0.15
+    assert float(table["network, place told: joints, pelvis aligned [m]"]) < 0.25
+    assert table["assumed 1"] == "y points left (right-handed axes)"
 
 
 def test_pictures_are_compared_up_to_scale_and_shift(tmp_path: Path, network) -> None:

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from miniatures import write_hupr, write_mmbody, write_mmfi
+from miniatures import write_hupr, write_m4human, write_mmbody, write_mmfi, write_rtpose
+from scipy.io import savemat
 
 from rfgs_core.arrays import load_array
 from rfgs_core.errors import RfgsError
@@ -75,6 +76,82 @@ def test_hupr_cells_are_where_a_reflector_is(tmp_path: Path, together: bool) -> 
     ]
 
 
+@pytest.mark.parametrize("processed", [False, True])
+def test_rtpose_cells_are_where_somebody_moves(tmp_path: Path, processed: bool) -> None:
+    moments = write_rtpose(tmp_path, processed=processed)
+    public = open_people_set(tmp_path)
+    assert (public.name, public.count) == ("RT-Pose", 3)
+    half_a_cell = np.array([20.1 / 128, 11.6 / 256, 11.6 / 32]) / 2 + 1e-9
+    for (joints, points), frame in zip(moments, public.frames(1), strict=True):
+        assert frame.joints is not None
+        known = np.isfinite(frame.joints).all(axis=1)
+        assert [JOINTS[k] for k in np.flatnonzero(~known)] == ["spine", "neck"]
+        np.testing.assert_allclose(frame.joints[known], joints[known], atol=1e-12)
+        # Every cell holds a point, every point lies in a cell, and nothing is left of the wall.
+        away = np.abs(frame.points[:, None] - points)
+        near = (away <= half_a_cell).all(axis=-1)
+        assert near.any(axis=0).all() and near.any(axis=1).all()
+        np.testing.assert_allclose(frame.amplitude, 2.0)
+
+
+@pytest.mark.parametrize("person", [1, 14])
+def test_m4human_joints_are_seen_from_the_radar(tmp_path: Path, person: int) -> None:
+    moments = write_m4human(tmp_path, person=person)
+    public = open_people_set(tmp_path)
+    assert (public.name, public.count) == ("M4Human", 3)
+    for (joints, points), frame in zip(moments, public.frames(1), strict=True):
+        np.testing.assert_allclose(frame.points, points, atol=1e-9)
+        assert frame.joints is not None
+        known = np.isfinite(frame.joints).all(axis=1)
+        assert [JOINTS[k] for k in np.flatnonzero(~known)] == ["head"]
+        np.testing.assert_allclose(frame.joints[known], joints[known], atol=1e-9)
+
+
+def test_m4human_counts_without_pictures(tmp_path: Path) -> None:
+    moments = write_m4human(tmp_path)
+    for picture in tmp_path.rglob("*.png"):
+        picture.unlink()
+    (first, *_) = open_people_set(tmp_path).frames(1)
+    assert first.joints is not None
+    # The row of the picture that is gone comes first.
+    known = np.isfinite(first.joints).all(axis=1)
+    np.testing.assert_allclose(first.joints[known], moments[0][0][known], atol=1e-9)
+
+
+def test_m4human_calibrations_are_held_against_what_they_are(tmp_path: Path) -> None:
+    write_m4human(tmp_path)
+    turn = tmp_path / "p1/ins_ext/radar2rgb_rotmatrix.txt"
+    for said in ("0 0 0\n0 0 0\n0 0 0\n", "1 2 x", "", "1 0 0 0 nan 0 0 0 1"):
+        turn.write_text(said)
+        with pytest.raises(RfgsError, match="expected"):
+            list(open_people_set(tmp_path).frames(1))
+    turn.unlink()
+    with pytest.raises(RfgsError, match="no such file"):
+        list(open_people_set(tmp_path).frames(1))
+
+
+def test_rtpose_labels_lead_nowhere_else(tmp_path: Path) -> None:
+    write_rtpose(tmp_path / "set", frames=1)
+    (tmp_path / "set/walk").rename(tmp_path / "walk")
+    (tmp_path / "set/file_meta.txt").write_text("7,../walk\n")
+    with pytest.raises(RfgsError, match="expected MM-Fi"):
+        open_people_set(tmp_path / "set")
+    (tmp_path / "set/file_meta.txt").write_text("7;walk\n")
+    with pytest.raises(RfgsError, match="expected lines of a sequence and its folder"):
+        open_people_set(tmp_path / "set")
+    (tmp_path / "walk").rename(tmp_path / "set/walk")
+    (tmp_path / "set/file_meta.txt").write_text("7,walk\n")
+    labels = tmp_path / "set/Test.json"
+    rows = json.loads(labels.read_text())
+    rows["7"]["000000"][0]["pose"] = [[0.0, 0.0, 0.0]] * 14
+    labels.write_text(json.dumps(rows))
+    with pytest.raises(RfgsError, match="expected 15 joints"):
+        open_people_set(tmp_path / "set")
+    labels.write_text("[]")
+    with pytest.raises(RfgsError, match="expected an object"):
+        open_people_set(tmp_path / "set")
+
+
 class Pickled:
     """Ends the process if it is unpickled."""
 
@@ -90,8 +167,9 @@ def damaged(folder: Path, set_name: str) -> dict[str, Callable[[], object]]:
         "mmfi": folder / "E01/S01/A13/ground_truth.npy",
         "mmbody": folder / "train/sequence_3/radar/frame_0.npy",
         "hupr": folder / "single_5/vert/000000000.npy",
+        "rtpose": folder / "walk/DZYX_npy_f16/000030.npy",
     }[set_name]
-    axes = {"mmfi": 3, "mmbody": 2, "hupr": 4}[set_name]
+    axes = {"mmfi": 3, "mmbody": 2, "hupr": 4, "rtpose": 4}[set_name]
     pickled = np.array([Pickled()], dtype=object).reshape((1,) * axes)
     return {
         "pickled": lambda: np.save(truth, pickled, allow_pickle=True),
@@ -105,9 +183,10 @@ def damaged(folder: Path, set_name: str) -> dict[str, Callable[[], object]]:
 
 
 @pytest.mark.parametrize("how", ["pickled", "cut", "empty", "garbage", "axes", "text", "shape"])
-@pytest.mark.parametrize("name", ["mmfi", "mmbody", "hupr"])
+@pytest.mark.parametrize("name", ["mmfi", "mmbody", "hupr", "rtpose"])
 def test_damage_is_one_line(tmp_path: Path, name: str, how: str) -> None:
-    {"mmfi": write_mmfi, "mmbody": write_mmbody, "hupr": write_hupr}[name](tmp_path)
+    write = {"mmfi": write_mmfi, "mmbody": write_mmbody, "hupr": write_hupr, "rtpose": write_rtpose}
+    write[name](tmp_path)
     damaged(tmp_path, name)[how]()
     with pytest.raises(RfgsError) as caught:
         list(open_people_set(tmp_path).frames(1))
@@ -115,10 +194,27 @@ def test_damage_is_one_line(tmp_path: Path, name: str, how: str) -> None:
     assert ("pickled" in str(caught.value)) == (how == "pickled")
 
 
+@pytest.mark.parametrize("how", ["cut", "empty", "garbage", "shape", "name"])
+def test_damaged_matlab_files_are_one_line(tmp_path: Path, how: str) -> None:
+    write_m4human(tmp_path, frames=1)
+    points = tmp_path / "p1/actions/36/mmwave/5.mat"
+    good = points.read_bytes()
+    {
+        "cut": lambda: points.write_bytes(good[:300]),
+        "empty": lambda: points.write_bytes(b""),
+        "garbage": lambda: points.write_bytes(bytes(range(256)) * 8),
+        "shape": lambda: savemat(points, {"RawPoints": np.zeros((4, 2))}),
+        "name": lambda: savemat(points, {"points": np.zeros((4, 4))}),
+    }[how]()
+    with pytest.raises(RfgsError) as caught:
+        list(open_people_set(tmp_path).frames(1))
+    assert "\n" not in str(caught.value) and "expected" in str(caught.value)
+
+
 def test_other_mistakes_are_one_line(tmp_path: Path) -> None:
     with pytest.raises(RfgsError, match="no such folder"):
         open_people_set(tmp_path / "nowhere")
-    with pytest.raises(RfgsError, match=r"expected MM-Fi .*, mmBody .* or HuPR"):
+    with pytest.raises(RfgsError, match=r"expected MM-Fi .*, mmBody .*, HuPR .* or M4Human"):
         open_people_set(tmp_path)
     write_mmfi(tmp_path)
     points = tmp_path / "E01/S01/A13/mmwave/frame003.bin"

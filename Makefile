@@ -11,6 +11,9 @@ PYTHON_FOUND := $(shell command -v $(PYTHON) || command -v python3)
 # As `rfgs_core` sets it for programs; pytest's plugins load numpy before that.
 export OPENBLAS_NUM_THREADS ?= 1
 
+# Commands take pip's Blender: one of the reader's own may lack the add-on. Only test-blender asks for it.
+unexport BLENDER
+
 # Tests side by side: each worker takes one half of them, and then from what is left to the other, so
 # that neighbours, which share what is costly to set up, stay together.
 WORKERS ?= 2
@@ -29,7 +32,7 @@ test-slow: $(KERNELS)
 	$(VENV)/pytest -m "slow and not blender" tests
 
 test-blender: $(READY) system
-	bash .ci/test_blender.sh
+	BLENDER="$(BLENDER)" bash .ci/test_blender.sh
 
 test-bpy: $(READY) system
 	bash .ci/test_bpy.sh

@@ -49,10 +49,12 @@ def python() -> Callable[..., subprocess.CompletedProcess[str]]:
     """Runs Python in the repository's folder; `must_work` shows what a failed run said."""
 
     def run(*arguments: str | Path, must_work: bool = False) -> subprocess.CompletedProcess[str]:
+        # A Blender of the developer's own, without our extension, would be asked otherwise.
+        without_blender = {name: value for name, value in os.environ.items() if name != "BLENDER"}
         done = subprocess.run(
             [sys.executable, *map(str, arguments)],
             cwd=ROOT,
-            env={**os.environ, "PYTHONPATH": str(ROOT)},
+            env=without_blender | {"PYTHONPATH": str(ROOT)},
             capture_output=True,
             text=True,
             timeout=400,

@@ -79,6 +79,13 @@ def color_view(space: Any) -> None:
     space.shading.type, space.shading.color_type = "SOLID", "VERTEX"
 
 
+def color_solid_views(screen: bpy.types.Screen | None) -> None:
+    """Lets the Solid views of a screen show the colours of meshes; other views are left."""
+    for space in views_of(screen):
+        if space.shading.type == "SOLID":
+            color_view(space)
+
+
 def views_of(screen: bpy.types.Screen | None) -> list[Any]:
     """The 3D views of a screen."""
     areas = screen.areas if screen else []

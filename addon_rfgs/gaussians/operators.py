@@ -14,7 +14,7 @@ from . import commands
 from .clouds import chosen_clouds, clouds_of, import_gaussians, path_or_run
 from .compare import compare_with_mesh, keep_result
 from .export_ply import export_gaussians
-from .opening import color_view, views_of
+from .opening import color_solid_views
 from .with_clouds import WithClouds
 
 
@@ -68,10 +68,7 @@ def import_shown(context: bpy.types.Context, path: Path) -> str:
     if done.frames and not done.frames[0] <= scene.frame_current <= done.frames[-1]:
         scene.frame_set(done.frames[0])
     if scene.rfgs.gaussians.solid_view:
-        # Solid views alone have to be told of colours.
-        for space in views_of(context.screen):
-            if space.shading.type == "SOLID":
-                color_view(space)
+        color_solid_views(context.screen)
     more = f"; coloured automatically: {done.automatic}" if done.automatic else ""
     return f"Imported {done.count} Gaussians in {len(done.objects)} clouds{more}"
 

@@ -40,12 +40,15 @@ class Following:
         except AddonError:
             self._feed.close()
             raise
-        self.updates, self.left_out, self.count, self.time_s = 0, 0, 0, 0.0
+        self.updates, self.left_out, self.count = 0, 0, 0
+        self.time_s, self._first_s = 0.0, 0.0
 
     @property
     def line(self) -> str:
         """What was shown last."""
-        text = f"{self.count} Gaussians at {self.time_s:.1f} s, {self.updates} updates"
+        # Clocks of radios begin anywhere.
+        passed_s = self.time_s - self._first_s
+        text = f"{self.count} Gaussians, {self.updates} updates in {passed_s:.1f} s"
         return f"{text}, {self.left_out} left out as no numbers" if self.left_out else text
 
     def step(self) -> bool:
@@ -63,6 +66,8 @@ class Following:
         # Whoever edits the points keeps them until the mode is left.
         if item.mode != "EDIT":
             _show(item, update)
+        if not self.updates:
+            self._first_s = update.time_s
         self.updates += 1
         self.left_out += update.left_out
         self.count, self.time_s = len(update.cloud), update.time_s

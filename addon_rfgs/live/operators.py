@@ -6,6 +6,7 @@ from __future__ import annotations
 import bpy
 
 from ..command import Command
+from ..gaussians.opening import color_solid_views
 from ..reporting import Progress, Reporting, Undoable
 from .following import begin, end, following, take, told
 
@@ -39,6 +40,8 @@ class RFGS_OT_follow_live(Undoable, bpy.types.Operator):
         if count:
             return take(context.scene, port, count)
         begin(context.scene, port)
+        if context.scene.rfgs.gaussians.solid_view:
+            color_solid_views(context.screen)
         return f"Follows 127.0.0.1, TCP port {port}"
 
 

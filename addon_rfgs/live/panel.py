@@ -4,6 +4,7 @@
 import bpy
 
 from ..steps import PartOfStep
+from ..tab import paragraph
 from .following import following, told
 
 
@@ -22,4 +23,4 @@ class RFGS_PT_live(PartOfStep, bpy.types.Panel):
         else:
             layout.operator("rfgs.follow_live", icon="PLAY")
         if told():
-            layout.label(text=told(), icon="INFO")
+            paragraph(layout, told(), icon="INFO")

@@ -118,7 +118,7 @@ def test_the_cloud_is_what_was_sent(said: Any, sender: Sender, tmp_path: Path) -
     np.testing.assert_array_equal(attributes.get(mesh, "scale"), rows[:, 3:6])
     np.testing.assert_allclose(attributes.get(mesh, "opacity"), rows[:, 10], rtol=1e-6)
     np.testing.assert_array_equal(attributes.get(mesh, "rf_power_db"), rows[:, 11])
-    assert following.told().startswith("30 Gaussians at 2.5 s")
+    assert following.told().startswith("30 Gaussians, ")
     # In pieces, and with another number of Gaussians; no mesh is left over.
     data = message(rows_of(7, seed=1))
     for part in (data[:10], data[10:150], data[150:]):
@@ -243,7 +243,7 @@ def test_the_command_saves_what_was_sent(
     out = tmp_path / "live.blend"
     assert run(["live", "--port", str(sender.port), "--out", str(out)]) == 0
     thread.join()
-    assert "12 Gaussians at 2.5 s, 1 updates" in capfd.readouterr().out
+    assert "12 Gaussians, 1 updates in 0.0 s" in capfd.readouterr().out
     with bpy.data.libraries.load(str(out)) as (found, _):
         assert found.objects == ["Gaussians live"]
 

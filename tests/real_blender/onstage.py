@@ -135,6 +135,10 @@ class Stage:
                 self.window.event_simulate(type=kind, value=value, x=x, y=y - down)
                 yield 0.3
 
+    def takes_place_of(self, operator: str, earlier: str) -> None:
+        """Looks for a button first where another one was, which it has replaced."""
+        self._places[operator] = self._places[earlier]
+
     def forget_places(self) -> None:
         """Looks for buttons anew: they have moved."""
         self._places.clear()

@@ -57,7 +57,7 @@ class Growth:
         return float(np.polyfit(np.log(self.sizes), np.log(self.seconds), 1)[0])
 
 
-def bench_scaling(on_size: Callable[[str], None] = lambda words: None) -> dict[str, float | str]:
+def growths(on_size: Callable[[str], None] = lambda words: None) -> tuple[Growth, ...]:
     """Cost of the fast tracer and of the propagation model over two decades of each size.
 
     The fast tracer: one person in a box of six walls, Wi-Fi, depth 2, four devices in the corners.
@@ -66,12 +66,21 @@ def bench_scaling(on_size: Callable[[str], None] = lambda words: None) -> dict[s
 
     Args:
         on_size: Told what is timed next.
+    """
+    return (*_of_tracer(on_size), *_of_propagation(on_size))
+
+
+def bench_scaling(on_size: Callable[[str], None] = lambda words: None) -> dict[str, float | str]:
+    """What `growths` measures, as numbers with names.
+
+    Args:
+        on_size: Told what is timed next.
 
     Returns:
         A flat dictionary: for each growth its exponent and the seconds at each size; hardware.
     """
     flat: dict[str, float | str] = {}
-    for growth in (*_of_tracer(on_size), *_of_propagation(on_size)):
+    for growth in growths(on_size):
         flat[f"{growth.name}: exponent"] = growth.exponent
         flat |= {
             f"{growth.name}: {size} [s]": seconds

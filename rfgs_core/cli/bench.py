@@ -36,6 +36,7 @@ class BenchArgs:
     table1: the paper's table 1, methods x Wi-Fi and mmWave, resumable; see --size and --out.
     scaling: how the cost of the fast tracer and of propagation grows over two decades of facets,
     Gaussians, links and subcarriers: CPU seconds and exponents, some two minutes.
+    performance: a page of how fast the kernels are here, some five minutes; see --out.
     """
 
     part: tyro.conf.Positional[
@@ -53,6 +54,7 @@ class BenchArgs:
             "fields",
             "table1",
             "scaling",
+            "performance",
         ]
     ]
     """What to time or judge."""
@@ -86,7 +88,8 @@ class BenchArgs:
     seeds: int | None = None
     """For the part `table1`: trainings of each method; left out: what the size has."""
     out: Path | None = None
-    """For the part `table1`: folder of its datasets, runs and cells; what is finished is kept."""
+    """For the part `table1`: folder of its datasets, runs and cells; what is finished is kept. For
+    the part `performance`: the page; left out, it is printed."""
     json: Path | None = None
     """Also write the numbers to this file, as one flat dictionary."""
 
@@ -266,6 +269,26 @@ def _scaling() -> dict[str, Any]:
     return bench_scaling(lambda words: _note(f"timing {words}"))
 
 
+def _performance(args: BenchArgs) -> int:
+    from dataclasses import asdict
+
+    from rfgs_core.evaluate.provenance import now
+    from rfgs_core.files import refuse_place, write_json, write_text
+    from rfgs_core.performance import measure, page
+
+    for place in filter(None, (args.out, args.json)):
+        refuse_place(place)
+    found = measure(lambda words: _note(f"timing {words}"))
+    text = page(found, now()[:10])
+    if args.out is None:
+        sys.stdout.write(text)
+    else:
+        write_text(args.out, text)
+    if args.json is not None:
+        write_json(args.json, asdict(found))
+    return 0
+
+
 def _note(line: str) -> None:
     """Tells something that is no result."""
     sys.stderr.write(f"{line}\n")
@@ -289,6 +312,8 @@ def run(args: BenchArgs) -> int:
         from rfgs_core.cli.table1 import make_table1
 
         return make_table1(args.out, args.size, args.seeds, args.json)
+    if args.part == "performance":
+        return _performance(args)
     if args.part in ("propagation", "raster", "blender"):
         sys.stderr.write(f"timing {args.part}; the plain twin takes most of it, about a minute\n")
     result = _bench(args)()

@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A page of how fast the kernels are on this machine, beside what they are judged by.
+
+Every number of `docs/performance.md` is measured when the page is made, in one process.
+"""
+
+from __future__ import annotations
+
+import resource
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from rfgs_core.bench import bench_propagation, hardware
+from rfgs_core.render.bench import Picture, bench_raster, time_picture
+from rfgs_core.scaling import Growth, growths
+from rfgs_core.selftest import OPERATIONS, Throughput, throughput
+
+#: Pictures that are timed: Gaussians, edge [px].
+PICTURES = ((100_000, 512), (1_000_000, 512))
+#: What is as large as at most this grows linearly, up to the noise of timing.
+_LINEAR = 1.1
+
+
+@dataclass(frozen=True)
+class Performance:
+    """What one run measured."""
+
+    propagation: dict[str, Any]
+    """As of `bench_propagation`."""
+    share: Throughput
+    """The scattered channel, and the chip's ceiling."""
+    raster: dict[str, float]
+    """As of `bench_raster`."""
+    pictures: tuple[Picture, ...]
+    """Of `PICTURES`."""
+    memory_gib: float
+    """The most memory that this process has held, before and with the pictures [GiB]."""
+    growths: tuple[Growth, ...]
+    """Cost over two decades of size."""
+    machine: dict[str, str | int]
+    """As of `hardware`."""
+
+
+def measure(note: Callable[[str], None] = lambda words: None) -> Performance:
+    """Measures everything; some five minutes on two cores.
+
+    Args:
+        note: Told what is timed next.
+    """
+    note("propagation, beside its plain twin")
+    propagation = bench_propagation()
+    note("propagation, beside a product of matrices")
+    share = throughput("cpu")
+    note("pictures, beside their plain twin")
+    raster = bench_raster()
+    pictures = []
+    for count, size_px in PICTURES:
+        note(f"a picture of {count} Gaussians")
+        pictures.append(time_picture(count, size_px))
+    memory_gib = _peak_gib()
+    return Performance(
+        propagation, share, raster, tuple(pictures), memory_gib, growths(note), hardware()
+    )
+
+
+def page(found: Performance, day: str) -> str:
+    """The page, in Markdown.
+
+    Args:
+        found: What was measured.
+        day: When, as YYYY-MM-DD.
+    """
+    machine = found.machine
+    gpu = "no GPU" if machine["gpu"] == "none" else f"{machine['gpu']} (not used here)"
+    made = f"{machine['cpu']}, {machine['cores']} cores, {gpu}, {day}"
+    parts = (
+        f"# Performance\n\nMade by `rfgs bench performance --out docs/performance.md` on {made}. "
+        "Run it on a machine without other work.\nTimes are wall-clock, the shortest of some runs; "
+        "each ratio is of two times of the same run. `rfgs selftest` holds every\nkernel against "
+        "its plain twin in double precision; `rfgs selftest --device cuda` does so on a GPU.\n",
+        _propagation(found),
+        _pictures(found),
+        _growths(found.growths),
+    )
+    return "\n".join(parts)
+
+
+def _propagation(found: Performance) -> str:
+    told, share = found.propagation, found.share
+    counts = (f"{told[f'num_{what}']:,} {what}" for what in ("gaussians", "links", "subcarriers"))
+    size = " × ".join(counts).replace("gaussians", "Gaussians")
+    rows = [
+        (
+            what,
+            f"{1e3 * told[f'{key}_s']:.1f} ms",
+            f"{told[f'{key}_ratio']:.0f}×",
+            f"{told[f'tuned_{key}_ratio']:.0f}×",
+        )
+        for what, key in (("forward", "forward"), ("with gradients", "forward_backward"))
+    ]
+    return (
+        f"## Propagation\n\n{size}, scattering and shadows, float32. The largest relative error of "
+        f"channels and gradients beside\nthe twin is {told['max_relative_error']:.1e}.\n\n"
+        + _table(("", "time", "plain torch twin", "twin with blocks as large as the cache"), rows)
+        + f"\nScattering alone takes {1e3 * share.forward_s:.1f} ms: "
+        f"{share.rate / 1e9:.0f} billion additions and multiplications per second of the\n"
+        f"recurrence over subcarriers, {share.rate / share.ceiling:.0%} of the "
+        f"{share.ceiling / 1e9:.0f} billion that a product of matrices reaches in the same run.\n"
+        f"{OPERATIONS} of them are counted for each Gaussian, link and subcarrier. Not counted is "
+        "what each Gaussian and link cost before\nthe recurrence begins: distances and phases in "
+        "double precision, sines, cosines and exponentials. That, and a recurrence whose\nsteps "
+        "wait for each other, is what a product of matrices does not have.\n"
+    )
+
+
+def _pictures(found: Performance) -> str:
+    raster = found.raster
+    rows = [
+        (
+            f"{each.num_gaussians:,}",
+            f"{each.size_px} × {each.size_px}",
+            f"{each.first_s:.2f} s",
+            f"{each.again_s:.3f} s",
+        )
+        for each in found.pictures
+    ]
+    return (
+        "## Pictures\n\nOf 20,000 Gaussians at 256 × 256 pixels the tiled rasteriser takes "
+        f"{1e3 * raster['raster_s']:.0f} ms, {raster['raster_ratio']:.0f} times quicker than the\n"
+        f"twin that visits every Gaussian at every pixel; the largest difference is "
+        f"{raster['max_abs_error']:.0e} of full brightness.\n\n"
+        + _table(("Gaussians", "pixels", "projected, sorted and drawn", "drawn again"), rows)
+        + "\n*Drawn again* is another picture of Gaussians that stay where they are, as in the fit "
+        "of colours.\nThe process has held "
+        f"{found.memory_gib:.1f} GiB at most after these pictures and the propagation above.\n"
+    )
+
+
+def _growths(growths: Sequence[Growth]) -> str:
+    rows = [
+        (
+            each.name,
+            f"{each.sizes[0]:,} to {each.sizes[-1]:,}",
+            f"{each.seconds[0]:.3g} s to {each.seconds[-1]:.3g} s",
+            f"{each.exponent:.2f}",
+        )
+        for each in growths
+    ]
+    steep = [each.name for each in growths if each.exponent > _LINEAR]
+    said = (
+        f"More than linear: {', '.join(steep)}."
+        if steep
+        else "Nothing grows more than linearly; below 1, part of the work does not grow."
+    )
+    heads = ("what grows", "sizes", "CPU time", "exponent")
+    return f"## How cost grows\n\n{_table(heads, rows)}\n{said}\n"
+
+
+def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [heads, ["---"] * len(heads), *rows]
+    return "".join(f"| {' | '.join(row)} |\n" for row in lines)
+
+
+def _peak_gib() -> float:
+    """The most memory that this process has held [GiB]."""
+    unit = 1 if sys.platform == "darwin" else 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 2**30

@@ -38,11 +38,13 @@ class RFGS_OT_follow_live(Undoable, bpy.types.Operator):
         # Timers need a window.
         count = max(self.updates, 1) if bpy.app.background else self.updates
         if count:
-            return take(context.scene, port, count)
-        begin(context.scene, port)
+            said = take(context.scene, port, count)
+        else:
+            begin(context.scene, port)
+            said = f"Follows 127.0.0.1, TCP port {port}"
         if context.scene.rfgs.gaussians.solid_view:
             color_solid_views(context.screen)
-        return f"Follows 127.0.0.1, TCP port {port}"
+        return said
 
 
 class RFGS_OT_stop_live(Reporting, bpy.types.Operator):

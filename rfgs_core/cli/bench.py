@@ -91,7 +91,7 @@ class BenchArgs:
     """For the part `table1`: folder of its datasets, runs and cells; what is finished is kept. For
     the part `performance`: the page; left out, it is printed."""
     json: Path | None = None
-    """Also write the numbers to this file, as one flat dictionary."""
+    """Also write the numbers to this file: one flat dictionary, except for `performance`."""
 
 
 def _bench(args: BenchArgs) -> Callable[[], dict[str, Any]]:

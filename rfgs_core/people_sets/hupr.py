@@ -24,15 +24,13 @@ from jaxtyping import Float64
 
 from rfgs_core.arrays import load_array
 from rfgs_core.errors import RfgsFormatError
-from rfgs_core.people_sets.model import Claim, Found, HeardFrame, joints_of
+from rfgs_core.people_sets.model import Claim, Found, HeardFrame, joints_of, strongest_cells
 from rfgs_core.records import read_record
 
 #: Ranges, angles and Dopplers of a cube, and the first range's bin.
 _RANGES, _ANGLES, _FIRST_BIN = 64, 64, 94
 #: Length of a range bin [m]; assumed, see the module.
 RANGE_BIN_M = 0.043
-#: Strongest cells that stand for a frame.
-_CELLS = 400
 #: Rows of the 14 joints.
 _ORDER = {
     "right_hip": 0,
@@ -156,8 +154,7 @@ def _cells(
     power = np.sqrt(across[:, :, None] * up[:, None, :])
     # Beyond a right angle there is nothing.
     power = np.where(sine[:, None] ** 2 + sine**2 < 1.0, power, 0.0).reshape(-1)
-    best = np.argsort(power, kind="stable")[::-1][:_CELLS]
-    best = best[power[best] > 0.0]
+    best = strongest_cells(power)
     r, a, e = np.unravel_index(best, (_RANGES, _ANGLES, _ANGLES))
     range_m = (_FIRST_BIN - r) * RANGE_BIN_M
     x, z = range_m * sine[a], range_m * sine[e]

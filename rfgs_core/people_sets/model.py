@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Float64, Int64
 
 from rfgs_core.skeleton import JOINTS
 
@@ -73,6 +73,16 @@ class Found:
     """Folder of the set."""
     parts: tuple[Path, ...]
     """Folders of its sequences."""
+
+
+#: Cells of a cube that stand for a frame.
+MOST_CELLS = 400
+
+
+def strongest_cells(power: Float64[np.ndarray, "cell"]) -> Int64[np.ndarray, "strong"]:
+    """Cells that stand for a frame, the strongest first: none that is silent."""
+    best = np.argsort(power, kind="stable")[::-1][:MOST_CELLS]
+    return best[power[best] > 0.0]
 
 
 def joints_of(

@@ -29,7 +29,7 @@ from jaxtyping import Float64
 from rfgs_core.arrays import load_array
 from rfgs_core.capture.file_bytes import read_bytes
 from rfgs_core.errors import RfgsFormatError
-from rfgs_core.people_sets.model import Claim, Found, HeardFrame, joints_of
+from rfgs_core.people_sets.model import Claim, Found, HeardFrame, joints_of, strongest_cells
 from rfgs_core.records import read_record
 
 #: Cells of a cube along z, y and x; Dopplers at least, so that some of what moves is left, and at
@@ -40,8 +40,6 @@ _START_M = np.array([-5.8, -10.05, 0.0])
 _STEP_M = np.array([11.6 / 32, 20.1 / 128, 11.6 / 256])
 #: Where people are, by the authors' configuration [m], along z, y and x.
 _LOW_M, _HIGH_M = np.array([-1.0875, -5.025, 0.7703]), np.array([4.7125, 5.025, 8.0203])
-#: Strongest cells that stand for a frame.
-_STRONGEST = 400
 _LABELS = ("Train.json", "Test.json")
 #: Rows of the 15 joints.
 _ORDER = {
@@ -204,7 +202,6 @@ def _strongest(
     last = np.floor((_HIGH_M - _START_M) / _STEP_M + 1e-3).astype(int)
     near = power[tuple(slice(a, b + 1) for a, b in zip(first, last, strict=True))]
     flat = near.reshape(-1)
-    best = np.argsort(flat, kind="stable")[::-1][:_STRONGEST]
-    best = best[flat[best] > 0.0]
+    best = strongest_cells(flat)
     cells = np.stack(np.unravel_index(best, near.shape), axis=-1) + first
     return _ours((_START_M + cells * _STEP_M)[:, ::-1]), np.sqrt(flat[best])

@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
+import signal
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,16 @@ from rfgs_core.settings import TrainConfig
 BOUNDS_M = np.array([[0.0, 0.0, 0.0], [4.0, 3.5, 2.5]])
 
 MakeObservations = Callable[..., Observations]
+
+
+@pytest.fixture
+def hears_ctrl_c() -> Iterator[None]:
+    """As our programs do, and so what they start: a shell's background job ignores Ctrl-C."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 Train = Callable[..., Run]
 
 

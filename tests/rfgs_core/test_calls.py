@@ -39,6 +39,7 @@ def test_a_failure_names_the_file_that_says_why(tmp_path: Path) -> None:
     assert log.read_text().startswith("error: ")
 
 
+@pytest.mark.usefixtures("hears_ctrl_c")
 def test_a_block_that_fails_ends_the_program(tmp_path: Path) -> None:
     before = {child.pid for child in psutil.Process().children()}
     start_s = time.monotonic()

@@ -54,16 +54,12 @@ def test_format_errors_are_value_errors_too() -> None:
     assert issubclass(RfgsFormatError, RfgsError)
 
 
+@pytest.mark.usefixtures("hears_ctrl_c")
 def test_ctrl_c_says_how_to_continue(capsys) -> None:
     def command() -> None:
         signal.raise_signal(signal.SIGINT)
 
-    # A shell that starts a job in the background lets it ignore the signal.
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        assert run_cli(command) == 130
-    finally:
-        signal.signal(signal.SIGINT, before)
+    assert run_cli(command) == 130
     out, err = capsys.readouterr()
     assert out == ""
     assert "run the same command to continue" in err

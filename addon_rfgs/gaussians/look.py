@@ -35,28 +35,32 @@ SPLAT_SIGMAS = 3.0
 
 
 def splat_material(attribute: str) -> bpy.types.Material:
-    """Shows instances as Gaussians: opacity falls off from the middle as exp(−r²/2).
+    """Shows instances as Gaussians: opacity is the largest that a ray meets, exp(−r²/2).
 
-    A ray that meets a sphere at an angle of cosine c between ray and normal passes its middle at
-    sin = √(1 − c²) of its radius, which stands for `SPLAT_SIGMAS` standard deviations. Front faces
-    alone count, as each ray leaves where it entered. Exact for round Gaussians.
+    In the Gaussian's own axes, where its sphere of radius one stands for `SPLAT_SIGMAS` standard
+    deviations, a ray through p along d passes the middle at √(|p|² − (p·d)²/|d|²). This holds for
+    every shape and needs nothing of the surface but some point of the ray on it. Front faces alone
+    count, as each ray leaves where it entered.
 
     Args:
         attribute: Name of the colour attribute of the instances.
     """
-    made, tree = _material("RFGS Gaussians splats")
+    made, tree = _material("RFGS Gaussian splats")
     if tree is None:
         return made
     made.surface_render_method = "BLENDED"
     tree.nodes.clear()
     build = _Shading(tree)
     place = build.add("ShaderNodeNewGeometry")
-    facing = build.add("ShaderNodeVectorMath")
-    facing.operation = "DOT_PRODUCT"
-    tree.links.new(place.outputs["Normal"], facing.inputs[0])
-    tree.links.new(place.outputs["Incoming"], facing.inputs[1])
-    cosine = facing.outputs["Value"]
-    aside = build.math("SUBTRACT", 1.0, build.math("MULTIPLY", cosine, cosine))
+    point = build.add("ShaderNodeTexCoord").outputs["Object"]
+    ray = build.add("ShaderNodeVectorTransform")
+    ray.vector_type, ray.convert_from, ray.convert_to = "VECTOR", "WORLD", "OBJECT"
+    tree.links.new(place.outputs["Incoming"], ray.inputs[0])
+    along = build.dot(point, ray.outputs[0])
+    nearest = build.math(
+        "DIVIDE", build.math("MULTIPLY", along, along), build.dot(ray.outputs[0], ray.outputs[0])
+    )
+    aside = build.math("SUBTRACT", build.dot(point, point), nearest)
     falloff = build.math("EXPONENT", build.math("MULTIPLY", aside, -0.5 * SPLAT_SIGMAS**2))
     opacity = build.attribute("opacity").outputs["Fac"]
     front = build.math("SUBTRACT", 1.0, place.outputs["Backfacing"])
@@ -97,6 +101,13 @@ class _Shading:
         node = self.add("ShaderNodeAttribute")
         node.attribute_type, node.attribute_name = "INSTANCER", name
         return node
+
+    def dot(self, first: Any, second: Any) -> Any:
+        node = self.add("ShaderNodeVectorMath")
+        node.operation = "DOT_PRODUCT"
+        for value, socket in zip((first, second), node.inputs, strict=False):
+            self._tree.links.new(value, socket)
+        return node.outputs["Value"]
 
     def math(self, operation: str, *values: Any) -> Any:
         node = self.add("ShaderNodeMath")

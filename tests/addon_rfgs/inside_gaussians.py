@@ -291,37 +291,6 @@ def test_an_import_goes_to_a_frame_with_gaussians_and_stays_at_one(settings) -> 
         assert scene.frame_current == after
 
 
-def test_a_splat_fades_out_as_a_gaussian_does(tmp_path: Path) -> None:
-    """Rendered over nothing: its alpha is opacity · exp(−r²/2) at r standard deviations."""
-    rows = rows_of(COLUMNS, 1)
-    for name in rows.dtype.names:
-        rows[name] = 0.0
-    rows["rot_0"], rows["opacity"] = 1.0, np.log(0.8 / 0.2)
-    for axis in range(3):
-        rows[f"scale_{axis}"] = np.log(0.5)
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    scene = bpy.context.scene
-    scene.rfgs.gaussians.display_mode = "splats"
-    scene.rfgs.gaussians.path = str(write(tmp_path / "one.ply", rows))
-    assert bpy.ops.rfgs.import_gaussians() == {"FINISHED"}
-    eye = bpy.data.objects.new("eye", bpy.data.cameras.new("eye"))
-    eye.data.type, eye.data.ortho_scale, eye.location.z = "ORTHO", 4.0, 5.0
-    scene.collection.objects.link(eye)
-    scene.camera, scene.render.engine, scene.render.film_transparent = eye, "CYCLES", True
-    scene.render.resolution_x = scene.render.resolution_y = 41
-    scene.cycles.samples, scene.cycles.device, scene.cycles.use_denoising = 64, "CPU", False
-    scene.render.filepath = str(tmp_path / "one.png")
-    bpy.ops.render.render(write_still=True)
-    image = bpy.data.images.load(scene.render.filepath)
-    values = np.zeros(4 * 41 * 41, np.float32)
-    image.pixels.foreach_get(values)
-    alpha = values.reshape(41, 41, 4)[20, :, 3]
-    sigmas = (np.arange(41) - 20) * (4.0 / 41) / 0.5
-    within = np.abs(sigmas) < 2.8
-    np.testing.assert_allclose(alpha[within], 0.8 * np.exp(-0.5 * sigmas[within] ** 2), atol=0.03)
-    assert alpha[~within].max() < 0.02
-
-
 def test_settings_can_be_made_before_there_are_gaussians_and_in_edit_mode(settings) -> None:
     item = cloud(2)
     bpy.context.view_layer.objects.active = item

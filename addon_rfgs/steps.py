@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The steps of the tab, which unfold by themselves as soon as they can be taken."""
+"""The steps of the tab: each unfolds by itself once it can be taken, and folds once it was."""
 
 from __future__ import annotations
 
@@ -11,8 +11,11 @@ from .tab import Tab
 
 #: Step → its panel.
 _PANELS: dict[str, type[Step]] = {}
-#: Steps that the user folded or unfolded against what they do by themselves. Neither the file nor
-#: its window manager, which is saved with it, has to remember that.
+#: The way through the tab. Where a step was taken it folds, and so do those before it: a window of
+#: 720 pixels shows one or two unfolded steps beside the headers of all. The last one stays.
+_PATH = ("radios", "check", "generate", "train", "inspect")
+#: Steps that the user folded or unfolded. Neither the file nor its window manager, which is saved
+#: with it, has to remember that.
 _CHOSEN: dict[str, bool] = {}
 
 
@@ -36,16 +39,27 @@ class Step(Tab):
         """What it waits for, in two or three words; empty as soon as it can be taken."""
         return ""
 
+    @classmethod
+    def taken(cls, _scene: bpy.types.Scene) -> str:
+        """What came out of it, in two or three words; empty as long as it was not taken."""
+        return ""
+
+    @classmethod
+    def failed(cls, _scene: bpy.types.Scene) -> bool:
+        """Whether it has to be seen again although it, or a later one, was taken."""
+        return False
+
     def draw(self, context: bpy.types.Context) -> None:
         """Draws the header and, where it is unfolded, what stands below."""
         steps = context.window_manager.rfgs.steps
         header, body = self.layout.panel_prop(steps, self.step)
         header.label(text=self.bl_label, icon=self.icon)
         lacking = self.waits_for(context.scene)
-        if lacking:
-            reason = header.row()
-            reason.active, reason.alignment = False, "RIGHT"
-            reason.label(text=lacking)
+        told = lacking or ("" if body is not None else self.taken(context.scene))
+        if told:
+            aside = header.row()
+            aside.active, aside.alignment = False, "RIGHT"
+            aside.label(text=told)
         if body is not None:
             self.draw_step(context, body)
 
@@ -72,16 +86,23 @@ class PartOfStep(Tab):
 
 
 def is_unfolded(step: str, scene: bpy.types.Scene) -> bool:
-    """Whether a step is unfolded: as the user wants it, else as soon as it can be taken."""
+    """Whether a step is unfolded: as the user wants it, else while it can be taken and was not."""
+    if step in _CHOSEN:
+        return _CHOSEN[step]
     panel = _PANELS[step]
-    return _CHOSEN.get(step, panel.unfolds and not panel.waits_for(scene))
+    return panel.unfolds and not panel.waits_for(scene) and not _is_behind(step, scene)
+
+
+def _is_behind(step: str, scene: bpy.types.Scene) -> bool:
+    """Whether a step, or a later one, was taken and nothing of it asks to be seen."""
+    if step not in _PATH[:-1] or _PANELS[step].failed(scene):
+        return False
+    return any(_PANELS[name].taken(scene) for name in _PATH[_PATH.index(step) :])
 
 
 def fold(step: str, unfolded: bool) -> None:
-    """Keeps what the user wants; a step that is as it would be by itself goes on by itself."""
-    _CHOSEN.pop(step, None)
-    if unfolded != is_unfolded(step, bpy.context.scene):
-        _CHOSEN[step] = unfolded
+    """Keeps what the user wants, until another file is opened."""
+    _CHOSEN[step] = unfolded
 
 
 def fold_by_themselves() -> None:
@@ -92,7 +113,7 @@ def fold_by_themselves() -> None:
 def _folded(step: str, title: str) -> Any:
     return bpy.props.BoolProperty(
         name=title,
-        description="Whether this step is unfolded; by itself it is once it can be taken",
+        description="Whether this step is unfolded; by itself it is until it was taken",
         get=lambda _steps: is_unfolded(step, bpy.context.scene),
         set=lambda _steps, value: fold(step, value),
         options={"SKIP_SAVE"},

@@ -20,7 +20,7 @@ class Tab:
 
     @staticmethod
     def automatic(
-        layout: bpy.types.UILayout, settings: object, name: str, text: str, number: int = 0
+        layout: bpy.types.UILayout, settings: object, name: str, text: str, number: float = 0
     ) -> None:
         """Shows a setting of which one number is none: what that stands for is written below."""
         column = layout.column(align=True)

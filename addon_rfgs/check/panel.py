@@ -44,6 +44,13 @@ class RFGS_PT_check(Step, bpy.types.Panel):
         """Something that can be checked."""
         return "" if scene.objects else "an empty scene"
 
+    @classmethod
+    def taken(cls, _scene: bpy.types.Scene) -> str:
+        """What the last check said, where nobody has to do anything about it."""
+        check = bpy.context.window_manager.rfgs.check
+        settled = not check.outdated and all(row.severity == "INFO" for row in check.rows)
+        return check.summary if settled else ""
+
     def draw_step(self, context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
         """Shows the button, the list, and the active finding in full."""
         check = context.window_manager.rfgs.check

@@ -66,6 +66,15 @@ class RFGS_PT_devices(Step, bpy.types.Panel):
     bl_label = "1 Radios"
     step, icon = "radios", "OUTLINER_OB_EMPTY"
 
+    @classmethod
+    def taken(cls, scene: bpy.types.Scene) -> str:
+        """How many there are, unless one of them is active: then its settings are looked at."""
+        active = bpy.context.object
+        count = sum(is_device(item) for item in scene.objects)
+        if not count or (active is not None and is_device(active)):
+            return ""
+        return f"{count} device{'' if count == 1 else 's'}"
+
     def draw_step(self, context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
         """Shows buttons that add, the list, and buttons for what is selected."""
         settings = context.scene.rfgs.devices

@@ -16,7 +16,7 @@ from ..scene.frames import unit_scale
 from ..timing import key_visibility
 from .cloud_mesh import FRAME, make_mesh
 from .coloring import Coloring, color_clouds
-from .display import Display, add_modifier
+from .display import Display, add_modifier, see_through
 from .features import read_features
 from .nodes import GROUP
 from .splats import read_gaussians
@@ -87,6 +87,7 @@ def import_gaussians(scene: bpy.types.Scene, path: Path, wanted: Inspection) -> 
     for item in objects:
         collection.objects.link(item)
         add_modifier(item, wanted.display)
+    see_through(scene, wanted.display)
     time_clouds(scene, objects, wanted.frame_offset, wanted.interpolation)
     frames = [mesh[FRAME] + wanted.frame_offset for mesh in meshes if FRAME in mesh]
     return Imported(objects, sorted(frames), count, automatic)
@@ -121,10 +122,12 @@ def clouds_here(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 
 def path_or_run(scene: bpy.types.Scene) -> str:
     """The path of the panel, or the folder of its training where that is done; empty if neither."""
-    said = scene.rfgs
-    if said.gaussians.path:
-        return str(said.gaussians.path)
-    folder = said.jobs.run_folder
+    return str(scene.rfgs.gaussians.path) or trained_run(scene)
+
+
+def trained_run(scene: bpy.types.Scene) -> str:
+    """The folder of the panel's training where that is done; empty if it is not."""
+    folder = scene.rfgs.jobs.run_folder
     if folder.startswith("//") and not bpy.data.filepath:
         return ""
     return folder if (Path(bpy.path.abspath(folder)) / "point_cloud.ply").is_file() else ""

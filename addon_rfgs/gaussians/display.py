@@ -13,6 +13,9 @@ from . import attributes
 from .look import SPLAT_SIGMAS
 from .nodes import GROUP, NO_POWER_DB, node_group, socket_ids
 
+#: Surfaces that a ray of Cycles may pass, as many as it allows: of a splat it passes two.
+_PASSED = 1024
+
 
 @dataclass(frozen=True)
 class Display:
@@ -37,6 +40,12 @@ def add_modifier(item: bpy.types.Object, display: Display) -> None:
     modifier: Any = item.modifiers.new(GROUP, "NODES")
     modifier.node_group = node_group()
     set_display(item, display)
+
+
+def see_through(scene: bpy.types.Scene, display: Display) -> None:
+    """Lets Cycles look through many splats: behind its usual eight surfaces all is black."""
+    if display.mode == "splats" and hasattr(scene, "cycles"):
+        scene.cycles.transparent_max_bounces = _PASSED
 
 
 def set_display(item: bpy.types.Object, display: Display) -> None:

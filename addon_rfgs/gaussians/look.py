@@ -45,7 +45,7 @@ def splat_material(attribute: str) -> bpy.types.Material:
     Args:
         attribute: Name of the colour attribute of the instances.
     """
-    made, tree = _material("RFGS Gaussian splats")
+    made, tree = _material("RFGS Gaussians as splats")
     if tree is None:
         return made
     made.surface_render_method = "BLENDED"

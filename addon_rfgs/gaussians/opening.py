@@ -26,8 +26,6 @@ _TRUTH_FACES = 240
 _TRUTH = (0.5, 0.42, 0.36, 1.0)
 #: The sidebar is there once it was drawn: so often and after so long it is asked [s].
 _TRIES, _PAUSE_S = 40, 0.25
-#: Enough for the longest tab, which Blender does not scroll beyond: 40 pixels each.
-_TURNS_OF_WHEEL = 60
 
 
 def show_at_opening(
@@ -84,6 +82,12 @@ def color_solid_views(screen: bpy.types.Screen | None) -> None:
     for space in views_of(screen):
         if space.shading.type == "SOLID":
             color_view(space)
+
+
+def hide_bones(screen: bpy.types.Screen | None) -> None:
+    """Keeps the bones of armatures out of a screen's 3D views: they are drawn over everything."""
+    for space in views_of(screen):
+        space.overlay.show_bones = False
 
 
 def views_of(screen: bpy.types.Screen | None) -> list[Any]:
@@ -144,24 +148,10 @@ def _open_tab(collection: bpy.types.Collection) -> Iterator[float]:
             if region.type == "UI"
         ]
         if regions and all(_turn_to_tab(region) for region in regions):
-            yield _PAUSE_S  # The tab has to be drawn before it can be scrolled.
-            _scroll_to_last_step()
             break
         yield _PAUSE_S
     # Once: whoever saves the file then has it as they left it.
     del collection[_OPENS]
-
-
-def _scroll_to_last_step() -> None:
-    """Shows the end of the tab, where Gaussians are inspected; earlier steps are above."""
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            for region in area.regions:
-                if area.type == "VIEW_3D" and region.type == "UI":
-                    with bpy.context.temp_override(window=window, area=area, region=region):
-                        for _ in range(_TURNS_OF_WHEEL):
-                            if bpy.ops.view2d.scroll_down.poll():
-                                bpy.ops.view2d.scroll_down()
 
 
 def _turn_to_tab(region: Any) -> bool:

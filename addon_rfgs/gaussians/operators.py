@@ -14,7 +14,7 @@ from . import commands
 from .clouds import chosen_clouds, clouds_of, import_gaussians, path_or_run
 from .compare import compare_with_mesh, keep_result
 from .export_ply import export_gaussians
-from .opening import color_solid_views
+from .opening import color_solid_views, hide_bones
 from .with_clouds import WithClouds
 
 
@@ -69,6 +69,8 @@ def import_shown(context: bpy.types.Context, path: Path) -> str:
         scene.frame_set(done.frames[0])
     if scene.rfgs.gaussians.solid_view:
         color_solid_views(context.screen)
+    if context.mode == "OBJECT":
+        hide_bones(context.screen)
     more = f"; coloured automatically: {done.automatic}" if done.automatic else ""
     return f"Imported {done.count} Gaussians in {len(done.objects)} clouds{more}"
 

@@ -8,6 +8,7 @@ from .cloud_mesh import FRAME
 from .clouds import clouds_here, path_or_run
 from .coloring import RAMPED, missing
 from .compare import kept_result
+from .nodes import NO_POWER_DB
 
 
 class RFGS_PT_gaussians(Step, bpy.types.Panel):
@@ -21,6 +22,12 @@ class RFGS_PT_gaussians(Step, bpy.types.Panel):
         """Gaussians, in the scene or on disk."""
         return "" if clouds_here(scene) or path_or_run(scene) else "no Gaussians"
 
+    @classmethod
+    def taken(cls, scene: bpy.types.Scene) -> str:
+        """How many clouds there are."""
+        count = len(clouds_here(scene))
+        return f"{count} cloud{'' if count == 1 else 's'}" if count else ""
+
     def draw_step(self, context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
         """Shows the path and the buttons."""
         layout, settings = self.columns(layout), context.scene.rfgs.gaussians
@@ -28,6 +35,9 @@ class RFGS_PT_gaussians(Step, bpy.types.Panel):
         layout.prop(settings, "path", placeholder="the run of step 4" if trained else "")
         layout.operator("rfgs.import_gaussians", icon="IMPORT")
         layout.operator("rfgs.export_gaussians", icon="EXPORT")
+        overlay = getattr(context.space_data, "overlay", None)
+        if overlay is not None and clouds_here(context.scene):
+            layout.prop(overlay, "show_bones", text="Show bones")
         item = context.object
         if item is not None and item.type == "MESH" and FRAME in item.data:
             layout.label(text=f"{item.name}: recorded at frame {item.data[FRAME]}", icon="INFO")
@@ -56,11 +66,14 @@ class RFGS_PT_gaussians_display(_Part, bpy.types.Panel):
 
     bl_label = "Display"
     bl_options = set()  # noqa: RUF012
-    names = ("display_mode", "size", "opacity_threshold", "power_threshold_db", "solid_view")
+    names = ("display_mode", "size", "opacity_threshold")
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows shapes and thresholds."""
         super().draw(context)
+        layout, settings = self.columns(), context.scene.rfgs.gaussians
+        self.automatic(layout, settings, "power_threshold_db", "all of them", NO_POWER_DB)
+        layout.prop(settings, "solid_view")
         self.layout.operator("rfgs.color_solid_view", icon="SHADING_SOLID")
         self.layout.operator("rfgs.update_display", icon="FILE_REFRESH")
 

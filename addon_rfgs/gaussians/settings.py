@@ -12,7 +12,7 @@ from ..errors import AddonError
 from ..path_options import path_setting
 from .clouds import Inspection, clouds_here, time_clouds
 from .coloring import Coloring, color_clouds
-from .display import Display, set_display
+from .display import Display, see_through, set_display
 from .nodes import NO_POWER_DB
 
 DISPLAY_MODES = [
@@ -55,8 +55,11 @@ TRUE_MESHES = [
 
 
 def _show(settings: RFGS_PG_gaussians, _context: Any) -> None:
-    for item in clouds_here(settings.id_data):
+    clouds = clouds_here(settings.id_data)
+    for item in clouds:
         set_display(item, settings.display())
+    if clouds:
+        see_through(settings.id_data, settings.display())
 
 
 def _color(settings: RFGS_PG_gaussians, _context: Any) -> None:

@@ -10,7 +10,7 @@ from ..reporting import Progress
 from .attributes import positions
 from .clouds import COLLECTION, clouds_of, time_clouds
 from .coloring import color_clouds
-from .display import set_display, shown
+from .display import see_through, set_display, shown
 from .opening import color_view
 from .with_clouds import WithClouds
 
@@ -28,6 +28,7 @@ class RFGS_OT_update_display(WithClouds, bpy.types.Operator):
         settings, items = context.scene.rfgs.gaussians, clouds_of(context.scene)
         for item in items:
             set_display(item, settings.display())
+        see_through(context.scene, settings.display())
         time_clouds(context.scene, items, settings.frame_offset, settings.interpolation)
         limits = color_clouds([item.data for item in items], settings.coloring())
         ramp = f", colours from {limits[0]:.3g} to {limits[1]:.3g}" if limits else ""

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The panels of datasets, trainings and the list of jobs."""
 
+from typing import Any
+
 import bpy
 
+from ..gaussians.clouds import trained_run
 from ..scene.taking_part import wanted_radios
 from ..steps import PartOfStep, Step
 from ..tab import paragraph
@@ -52,6 +55,16 @@ class RFGS_PT_generate(Step, bpy.types.Panel):
     def waits_for(cls, _scene: bpy.types.Scene) -> str:
         """A Python that can trace, and a file on disk."""
         return _lacks_environment() or ("" if bpy.data.filepath else "an unsaved file")
+
+    @classmethod
+    def taken(cls, scene: bpy.types.Scene) -> str:
+        """How far its job is, or that the dataset is there."""
+        return (_standing("generate") or "done") if dataset_to_come(scene) else ""
+
+    @classmethod
+    def failed(cls, _scene: bpy.types.Scene) -> bool:
+        """Whether its last job did."""
+        return _ended_badly("generate")
 
     def draw_step(self, context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
         """Shows what everybody sets, and the button."""
@@ -103,6 +116,16 @@ class RFGS_PT_train(Step, bpy.types.Panel):
         """A dataset, and a Python that can train."""
         return _lacks_environment() or ("" if dataset_to_come(scene) else "no dataset")
 
+    @classmethod
+    def taken(cls, scene: bpy.types.Scene) -> str:
+        """How far its job is, or that the run is there."""
+        return _standing("train") or ("done" if trained_run(scene) else "")
+
+    @classmethod
+    def failed(cls, _scene: bpy.types.Scene) -> bool:
+        """Whether its last job did."""
+        return _ended_badly("train")
+
     def draw_step(self, context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
         """Shows what everybody sets and the buttons; a line as long as there is no dataset."""
         layout, settings = self.columns(layout), context.scene.rfgs.jobs
@@ -140,6 +163,7 @@ class RFGS_PT_jobs(Step, bpy.types.Panel):
     """The environment and the list of jobs."""
 
     bl_label = "Jobs"
+    bl_order = 1
     step, icon = "jobs", "SORTTIME"
 
     @classmethod
@@ -177,17 +201,36 @@ def _lacks_environment() -> str:
     return "unfit environment" if CHECK.problems else ""
 
 
-def _draw_standing(layout: bpy.types.UILayout, kind: str) -> None:
-    """How far the last job of a kind is, or how it ended, below the button that began it."""
+def _last_row(kind: str) -> Any:
+    """The row of the last job of a kind; None without one."""
     stored = preferences()
     rows = [
         row
         for row, job in zip(stored.jobs if stored else (), QUEUE.jobs, strict=False)
         if job.plan.kind == kind
     ]
-    if not rows:
+    return rows[-1] if rows else None
+
+
+def _standing(kind: str) -> str:
+    """How far the last job of a kind is, in two or three words; empty without one."""
+    row = _last_row(kind)
+    if row is None:
+        return ""
+    return str(row.message if row.state == RUNNING and row.message else row.state).lower()
+
+
+def _ended_badly(kind: str) -> bool:
+    """Whether the last job of a kind has to be looked at."""
+    row = _last_row(kind)
+    return row is not None and row.state in (FAILED, STOPPED)
+
+
+def _draw_standing(layout: bpy.types.UILayout, kind: str) -> None:
+    """How far the last job of a kind is, or how it ended, below the button that began it."""
+    row = _last_row(kind)
+    if row is None:
         return
-    row = rows[-1]
     if row.state == RUNNING:
         layout.progress(factor=row.share, text=row.message)
     else:

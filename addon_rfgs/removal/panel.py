@@ -11,6 +11,7 @@ class RFGS_PT_file(Step, bpy.types.Panel):
     """What this file holds."""
 
     bl_label = "This File"
+    bl_order = 2
     step, icon, unfolds = "file", "FILE_BLEND", False
 
     def draw_step(self, _context: bpy.types.Context, layout: bpy.types.UILayout) -> None:

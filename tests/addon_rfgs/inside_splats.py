@@ -45,6 +45,24 @@ def test_a_splat_fades_out_as_a_gaussian_does(
     assert alpha[sigmas > 3.1].max() < 0.02
 
 
+def test_many_splats_are_seen_through(tmp_path: Path) -> None:
+    """Each takes its share of what comes from behind, however many there are."""
+    count, opacity = 60, 0.03
+    rows = rows_of(COLUMNS, count)
+    for name in rows.dtype.names:
+        rows[name] = 0.0
+    rows["rot_0"], rows["opacity"] = 1.0, np.log(opacity / (1 - opacity))
+    rows["z"] = np.linspace(-2, 2, count)
+    for axis in range(3):
+        rows[f"scale_{axis}"] = np.log(0.3)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    settings = bpy.context.scene.rfgs.gaussians
+    settings.display_mode, settings.path = "splats", str(write(tmp_path / "many.ply", rows))
+    assert bpy.ops.rfgs.import_gaussians() == {"FINISHED"}
+    middle = rendered_alpha(tmp_path / "many.png", perspective=False)[_SIDE // 2, _SIDE // 2]
+    assert middle == pytest.approx(1 - (1 - opacity) ** count, abs=0.03)
+
+
 def rendered_alpha(path: Path, perspective: bool) -> np.ndarray:
     """Alpha [_SIDE, _SIDE] of what an eye above the middle sees, bottom row first."""
     scene = bpy.context.scene

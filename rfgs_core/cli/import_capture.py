@@ -75,10 +75,12 @@ def run(args: ImportArgs) -> int:
         sys.stdout.write(f"guessed: {row['object']}: {row['what']}: {row['value']}\n")
     frames, samples, num_tx, num_rx, count = prepared.csi.shape
     radio = prepared.radio
+    # A capture does not tell who was there, and few radios can count: the reader knows.
+    people = "--people N " if args.layout else ""
     sys.stdout.write(
         f"{args.out}: {frames} frames of {samples} packets, {num_tx} x {num_rx} antennas, "
         f"{count} subcarriers ({int(prepared.measured.sum())} measured) at "
         f"{radio.centre_hz / 1e9:.4f} GHz; next: rfgs train {args.out} --radio {radio.name} "
-        "--out RUN\n"
+        f"{people}--out RUN{' (N people were there)' if people else ''}\n"
     )
     return 0

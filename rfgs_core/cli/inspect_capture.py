@@ -93,14 +93,18 @@ def _rows(capture: Capture) -> list[str]:
     device = "" if devices == 1 else f"{devices} devices x "
     centre = capture.centre_hz
     settings = ", ".join(
-        f"{key} {value}" for key, value in capture.info.items() if isinstance(value, (str, int))
+        f"{key} {value}"
+        for key, value in capture.info.items()
+        if isinstance(value, (str, int)) and key != "untimed"
     )
     rows = [
         f"{packets} packets of {device}{num_rx} RX x {num_tx} TX x {bins} {capture.axis} bins, "
         f"{low:.4g} to {high:.4g} {unit}",
         f"centre {'not in the file' if centre is None else f'{centre / 1e9:.6g} GHz'}; {settings}",
     ]
-    if not capture.info.get("untimed"):
+    if capture.info.get("untimed"):
+        rows.append("times are not told")
+    else:
         steps = np.diff(capture.time_s)
         gap = float(steps.max()) if len(steps) else 0.0
         rows.append(

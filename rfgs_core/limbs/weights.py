@@ -9,7 +9,6 @@ from typing import Annotated, Any, NamedTuple
 
 import msgspec
 import numpy as np
-import torch
 from safetensors.torch import save
 
 from rfgs_core.errors import RfgsError, RfgsFormatError
@@ -82,11 +81,8 @@ def load_network(path: Path) -> Trained:
         found = str(card.get("schema"))[:60]
         raise RfgsFormatError(f"{path}: expected schema {SCHEMA}, found {found}; {_REMEDY}")
     known: _Card = record(f"{path}: card", card, _Card, _REMEDY)
-    # Shapes first: a network is only made once there is a file of its size.
-    with torch.device("meta"):
-        wanted = LimbNetwork(known.ranges).state_dict()
-    refuse_misfit(path, weights, wanted, _REMEDY)
     network = LimbNetwork(known.ranges)
+    refuse_misfit(path, weights, network.state_dict(), _REMEDY)
     network.load_state_dict({name: value.float() for name, value in weights.items()})
     network.eval()
     return Trained(network, card)

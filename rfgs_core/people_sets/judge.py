@@ -23,6 +23,7 @@ from rfgs_core.limbs.propose import propose
 from rfgs_core.limbs.tokens import MIRRORED
 from rfgs_core.people_sets.hupr import HuPR
 from rfgs_core.people_sets.m4human import M4Human
+from rfgs_core.people_sets.m4human_lmdb import M4HumanLmdb
 from rfgs_core.people_sets.mmbody import MMBody
 from rfgs_core.people_sets.mmfi import MMFi
 from rfgs_core.people_sets.model import HeardFrame, PeopleSet
@@ -61,14 +62,15 @@ def open_people_set(folder: Path) -> PeopleSet:
     """
     if not folder.is_dir():
         raise RfgsError(f"{folder}: no such folder")
-    for kind in (MMFi, MMBody, HuPR, RTPose, M4Human):
+    for kind in (MMFi, MMBody, HuPR, RTPose, M4Human, M4HumanLmdb):
         found = kind.at(folder)
         if found is not None and found.count:
             return found
     raise RfgsError(
         f"{folder}: expected MM-Fi (E01/S01/A01/mmwave), mmBody (sequence_0/radar), HuPR "
         "(single_1/hori with joints), RT-Pose (Train.json and its cubes) or M4Human "
-        "(p1/actions/1/mmwave and p1/parameters/1.json), see docs/captures.md"
+        "(p1/actions/1/mmwave and p1/parameters/1.json, or rf3dpose_all/radar_comp.lmdb), "
+        "see docs/captures.md"
     )
 
 

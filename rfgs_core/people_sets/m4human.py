@@ -1,18 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """M4Human (Fan et al., CVPR 2026, arXiv 2512.12378): a mmWave radar, motion capture, SMPL-X.
 
-`p1/actions/12/mmwave/*.mat` (MATLAB up to 7.2) hold `RawPoints`, rows of x (across), y (ahead),
-z (up) [m] and intensity, beside the tensor `rawImage_XYZ` (121, 111, 31), which is not used here;
-`p1/parameters/12.json` holds `joints` [m] of every frame in the axes of the motion capture, and
-`p1/ins_ext` how they lie to a camera and the radar (`vicon_to_cam.txt` with a shift in millimetres,
-`radar2rgb_rotmatrix.txt`, `radar2rgb_tvec.txt` in metres; of p14 and p19 in a folder for some
-actions). Row i of the joints belongs to the i-th of the names in `mmwave` and `rgb` together. Read
-after github.com/FanJunqiao/M4Human (`m4human_utils.py`, `data_loader_Load_data.py`,
-`data_loader_camera_calibration.py`).
-
-The loader takes row 0 of the joints as the pelvis and its model's joints from SMPL-X, so the rows
-are taken as those of SMPL-X. Its grid reaches from 0 to 3 m in height, so heights count from the
-floor; how high the radar hangs it does not say. The same set as LMDB files is not read.
+The raw form. `p1/actions/12/mmwave/*.mat` (MATLAB up to 7.2) hold the tensor `rawImage_XYZ` (121,
+111, 31) and points `RawPoints`, see `m4human_frame`; `p1/parameters/12.json` holds `joints` [m] of
+every frame in the axes of the motion capture, and `p1/ins_ext` how they lie to a camera and the
+radar (`vicon_to_cam.txt` with a shift in millimetres, `radar2rgb_rotmatrix.txt`,
+`radar2rgb_tvec.txt` in metres; of p14 and p19 in a folder for some actions). Row i of the joints
+belongs to the i-th of the names in `mmwave` and `rgb` together. Read after
+github.com/FanJunqiao/M4Human (`m4human_utils.py`, `data_loader_Load_data.py`,
+`data_loader_camera_calibration.py`). `m4human_lmdb` reads the smaller form.
 """
 
 from __future__ import annotations
@@ -29,13 +25,17 @@ from jaxtyping import Float64
 from rfgs_core.capture.file_bytes import read_bytes
 from rfgs_core.capture.table_file import read_tables
 from rfgs_core.errors import RfgsError, RfgsFormatError
-from rfgs_core.people_sets.mmbody import SMPLX
-from rfgs_core.people_sets.model import Claim, Found, HeardFrame, joints_of
+from rfgs_core.people_sets.m4human_frame import (
+    ASSUMPTIONS,
+    Heard,
+    heard_points,
+    heard_tensor,
+    joints_seen,
+    to_radar,
+)
+from rfgs_core.people_sets.model import Claim, Found, HeardFrame
 from rfgs_core.records import read_record
 
-#: Height of the radar above the floor [m]; assumed, see the module.
-RADAR_M = 1.5
-_MOST_POINTS = 1_000_000
 _REMEDY = "expected M4Human as it is published (p1/actions/1/mmwave, p1/parameters/1.json)"
 
 
@@ -54,10 +54,7 @@ class M4Human:
 
     name = "M4Human"
     claims: tuple[Claim, ...] = ()
-    assumptions: tuple[str, ...] = (
-        "joints are those of SMPL-X, row by row",
-        f"heights count from the floor, the radar hangs {RADAR_M:g} m above it",
-    )
+    assumptions: tuple[str, ...] = ASSUMPTIONS
 
     @staticmethod
     def at(folder: Path) -> M4Human | None:
@@ -96,8 +93,8 @@ class M4Human:
             if last[0] != part:
                 last = part, _joints(part)
             if row < len(last[1]):
-                points = _points(file)
-                yield HeardFrame(points, np.ones(len(points)), last[1][row], None)
+                points, amplitude = _heard(file)
+                yield HeardFrame(points, amplitude, last[1][row], None)
 
 
 def _fit_of(action: Path) -> Path:
@@ -110,30 +107,22 @@ def _order(action: Path) -> tuple[tuple[int, str], ...]:
     return tuple((int("0" + "".join(re.findall("[0-9]", name))[:9]), name) for name in names)
 
 
-def _points(path: Path) -> Float64[np.ndarray, "point 3"]:
-    rows = read_tables(path, "mat").get("RawPoints")
-    if rows is None or rows.ndim != 2 or rows.shape[1] < 3 or rows.dtype.kind not in "fiu":
-        shape = "none" if rows is None else str(rows.shape)
-        raise RfgsFormatError(f"{path}: expected RawPoints (N, 4), found {shape}; {_REMEDY}")
-    if len(rows) > _MOST_POINTS:
-        raise RfgsFormatError(f"{path}: {len(rows)} points, at most {_MOST_POINTS} are read")
-    places = rows[:, :3].astype(np.float64)
-    # Rows of zeros fill up the loader's own copies.
-    return places[np.isfinite(places).all(axis=1) & places.any(axis=1)] - [0.0, 0.0, RADAR_M]
+def _heard(path: Path) -> Heard:
+    tables = read_tables(path, "mat")
+    cube, rows = tables.get("rawImage_XYZ"), tables.get("RawPoints")
+    if cube is not None:
+        return heard_tensor(path, np.asarray(cube))
+    if rows is None:
+        raise RfgsFormatError(f"{path}: expected rawImage_XYZ or RawPoints; {_REMEDY}")
+    return heard_points(path, rows)
 
 
 def _joints(action: Path) -> list[Float64[np.ndarray, "17 3"]]:
     """Joints of every frame of an action, seen from the radar."""
     path = _fit_of(action)
-    frames = read_record(path, _Fit, _REMEDY).joints
     turn, shift = _to_radar(action)
-    found = []
-    for joints in frames:
-        if len(joints) <= max(SMPLX.values()) or any(len(row) != 3 for row in joints):
-            raise RfgsFormatError(f"{path}: expected 22 joints of 3 numbers or more; {_REMEDY}")
-        there = np.array(joints, np.float64) @ turn.T + shift - [0.0, 0.0, RADAR_M]
-        found.append(joints_of(there, SMPLX))
-    return found
+    frames = read_record(path, _Fit, _REMEDY).joints
+    return [joints_seen(path, joints, turn, shift) for joints in frames]
 
 
 def _to_radar(action: Path) -> tuple[Float64[np.ndarray, "3 3"], Float64[np.ndarray, "3"]]:
@@ -148,10 +137,7 @@ def _to_radar(action: Path) -> tuple[Float64[np.ndarray, "3 3"], Float64[np.ndar
     vicon = _numbers(folder / "vicon_to_cam.txt", (12, 16)).reshape(-1, 4)
     radar = _numbers(folder / "radar2rgb_rotmatrix.txt", (9,)).reshape(3, 3)
     place = _numbers(folder / "radar2rgb_tvec.txt", (3,))
-    if abs(abs(float(np.linalg.det(radar))) - 1.0) > 0.1:
-        raise RfgsFormatError(f"{folder / 'radar2rgb_rotmatrix.txt'}: expected a turn; {_REMEDY}")
-    back = np.linalg.inv(radar)
-    return back @ vicon[:3, :3], back @ (vicon[:3, 3] / 1000.0 - place)
+    return to_radar(folder, vicon[:3, :3], vicon[:3, 3], radar, place)
 
 
 def _numbers(path: Path, sizes: tuple[int, ...]) -> Float64[np.ndarray, "number"]:

@@ -39,15 +39,15 @@ def addon(python: Run) -> Run:
 
 
 @pytest.fixture
-def pass_inside(python: Run, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
-    """Runs the tests of `inside_NAME.py`, all of which must pass, in a Python of their own."""
+def pass_inside(python: Run, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Runs the tests of `inside_NAME.py`, all of which must pass, in one Python of their own."""
 
     # Plugins that other packages bring along take half a second to load, and none is used.
     monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
 
-    def run(name: str) -> None:
-        inner = Path(__file__).with_name(f"inside_{name}.py")
-        done = python("-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", inner)
+    def run(*names: str) -> None:
+        inner = [Path(__file__).with_name(f"inside_{name}.py") for name in names]
+        done = python("-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *inner)
         assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
         assert " passed" in done.stdout
 

@@ -11,7 +11,7 @@ from two_receivers import write_captures
 
 
 def test_all_tests_of_captures_pass_inside_blender(
-    pass_inside: Callable[[str], None],
+    pass_inside: Callable[..., None],
     rfgs_python: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,

@@ -10,7 +10,7 @@ import pytest
 
 
 def test_all_tests_of_live_clouds_pass_inside_blender(
-    pass_inside: Callable[[str], None],
+    pass_inside: Callable[..., None],
     tiny_dataset: Path,
     rfgs_python: Path,
     monkeypatch: pytest.MonkeyPatch,

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.io import savemat
 
 from rfgs_core.articulated import people
-from rfgs_core.people_sets import hupr, m4human, mmbody, rtpose
+from rfgs_core.people_sets import hupr, m4human_frame, mmbody, rtpose
 from rfgs_core.skeleton import JOINTS
 from rfgs_core.worlds.motion import random_motion
 
@@ -159,10 +159,9 @@ def write_m4human(
     # A picture of its own takes a row of the joints, too.
     (part / "rgb" / "4.png").write_bytes(b"")
     for number, (joints, points) in enumerate(moments, start=5):
-        high = [0.0, 0.0, m4human.RADAR_M]
+        high = [0.0, 0.0, m4human_frame.RADAR_M]
         values = np.hstack([points + high, np.full((len(points), 1), 3.0)])
-        tables = {"RawPoints": values, "rawImage_XYZ": np.zeros((3, 2, 2), np.float32)}
-        savemat(part / "mmwave" / f"{number}.mat", tables)
+        savemat(part / "mmwave" / f"{number}.mat", {"RawPoints": values})
         (part / "rgb" / f"{number}.png").write_bytes(b"")
         there = (joints + high) @ camera.T + shifts[1]
         smplx = np.zeros((55, 3))

@@ -15,7 +15,6 @@ from typing import Any
 import pytest
 
 from dataset_factory.cli import main
-from dataset_factory.make.world_files import name_of
 from rfgs_core.files import sha256
 
 Factory = Callable[..., subprocess.CompletedProcess[str]]

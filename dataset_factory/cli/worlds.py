@@ -54,7 +54,7 @@ class WorldsArgs:
     """Fewest and most people, up to 4."""
     motion: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
     """What people do, as in walk, sit, fall or gesture; repeat the option for several; default:
-    anything that needs no stairs."""
+    anything."""
     depth: int = 2
     """Interactions of a path that meets a person: 1 the person alone, 2 also one wall, 3 two."""
     seed: int = 0
@@ -82,7 +82,7 @@ def run(args: WorldsArgs) -> int:
     from rfgs_core.extras import require
     from rfgs_core.files import refuse_place
     from rfgs_core.links import filled
-    from rfgs_core.worlds.cast import FAMILIES_ON_FLOORS
+    from rfgs_core.worlds.motion import FAMILIES
     from rfgs_core.worlds.settings_file import WorldsFile
     from rfgs_core.worlds.world import WorldSettings
 
@@ -101,7 +101,7 @@ def run(args: WorldsArgs) -> int:
         fps=args.fps,
         people=parse_people(args.people),
         depth=args.depth,
-        families=args.motion or FAMILIES_ON_FLOORS,
+        families=args.motion or FAMILIES,
     )
     settings.check()
     shared = WorldsFile(radio, settings, args.seed, _pictures(args), args.tracer)

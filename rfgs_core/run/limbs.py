@@ -142,7 +142,9 @@ def find_limbs(
         _alone(observations, track.axes_xy, config, seed)
         for observations, track, seed in zip(seen, tracks, seeds, strict=True)
     ]
-    told = _by_evidence(alone, tracks, config.seed, on_frame) if walks else [None] * len(alone[0])
+    told: list[Joints | None] = [None] * len(alone[0])
+    if walks:
+        told = _by_evidence(alone, tracks, config.seed, on_frame)
     if trained is not None:
         said = _by_network(trained, alone, tracks) if None in told else told
         told = [one or other for one, other in zip(told, said, strict=True)]

@@ -125,13 +125,11 @@ def job_of(args: GenerateArgs) -> tuple[Job, Outline]:
         usual_radios,
     )
     from dataset_factory.scene.overrides import label, read_options
+    from dataset_factory.schedule.spread import Spread
     from rfgs_core.llvm import use_llvm
     from rfgs_core.radio import pose_span_s
 
-    if not 1 <= args.workers <= 256:
-        raise RfgsError(f"--workers {args.workers}: expected 1 to 256")
-    if not 0.0 <= args.worker_memory <= 1e4:
-        raise RfgsError(f"--worker-memory {args.worker_memory}: expected GB, or 0")
+    Spread(args.workers, args.worker_memory, args.scheduler).check()
     scene, said = find_scene(args.scene), read_options(args.options)
     frames = whole_frames(args.frames or str(said.pop("frames", "")))
     blender, source = Blender(scene.blend, args.blender), label(args.options)

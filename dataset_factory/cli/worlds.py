@@ -37,7 +37,15 @@ class WorldsArgs:
     count: int = 10
     """How many worlds there shall be, all shards together."""
     shard: str = "1/1"
-    """Which share of them this process makes, K/N: start one on every core or machine."""
+    """Which share of them this command makes, K/N, for machines that no cluster joins."""
+    workers: int = 1
+    """Processes that make them, each keeps one core busy; the same bytes from any number. With
+    scenes of Blender they share the frames of one world after another."""
+    worker_memory: float = 0.0
+    """Memory of each [GB], as with `rfgs-factory generate`; 0 shares 90 % of the machine's."""
+    scheduler: str = ""
+    """Address of a Dask scheduler, as in tcp://node1:8786, whose workers make them instead. They
+    need this version of RF-GS, no shared storage; see docs/cluster.md."""
     frames: int = 8
     """Frames of each world."""
     fps: float = 10.0
@@ -46,7 +54,7 @@ class WorldsArgs:
     """Fewest and most people, up to 4."""
     motion: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
     """What people do, as in walk, sit, fall or gesture; repeat the option for several; default:
-    anything that needs no stairs."""
+    anything."""
     depth: int = 2
     """Interactions of a path that meets a person: 1 the person alone, 2 also one wall, 3 two."""
     seed: int = 0
@@ -70,15 +78,21 @@ def run(args: WorldsArgs) -> int:
 
     from dataset_factory.make.worlds import MOST, make_worlds, missing, parse_shard
     from dataset_factory.scene.radios import SCENE_RADIO, chosen_radios
+    from dataset_factory.schedule.spread import Spread
+    from rfgs_core.extras import require
     from rfgs_core.files import refuse_place
     from rfgs_core.links import filled
-    from rfgs_core.worlds.cast import FAMILIES_ON_FLOORS
+    from rfgs_core.worlds.motion import FAMILIES
     from rfgs_core.worlds.settings_file import WorldsFile
     from rfgs_core.worlds.world import WorldSettings
 
     if not 1 <= args.count <= MOST:
         raise RfgsError(f"--count {args.count}: expected 1 to {MOST}")
     number, shards = parse_shard(args.shard)
+    spread = Spread(args.workers, args.worker_memory, args.scheduler)
+    spread.check()
+    if args.scheduler or args.workers > 1:
+        require("distributed")
     (radio,) = chosen_radios((args.radio,)).values()
     if radio.name == SCENE_RADIO:
         raise RfgsError(f"--radio {SCENE_RADIO}: random worlds have no Empties; name another")
@@ -87,7 +101,7 @@ def run(args: WorldsArgs) -> int:
         fps=args.fps,
         people=parse_people(args.people),
         depth=args.depth,
-        families=args.motion or FAMILIES_ON_FLOORS,
+        families=args.motion or FAMILIES,
     )
     settings.check()
     shared = WorldsFile(radio, settings, args.seed, _pictures(args), args.tracer)
@@ -100,7 +114,7 @@ def run(args: WorldsArgs) -> int:
     with filled(args.out):
         left = len(missing(args.out, indices))
         with tqdm(total=left, desc="worlds", unit="world", disable=not left) as bar:
-            for _ in make_worlds(args.out, shared, args.radio, indices):
+            for _ in make_worlds(args.out, shared, args.radio, indices, spread):
                 bar.update()
     sys.stdout.write(f"{args.out}: {len(indices)} worlds, {left} of them new\n")
     return 0

@@ -6,38 +6,20 @@ from __future__ import annotations
 import re
 import shutil
 from collections.abc import Iterator
-from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-
-from dataset_factory.make.sequence import instance_row
+from dataset_factory.make.world_files import name_of, write_world
 from dataset_factory.plan.contents import make_plan, versions
 from dataset_factory.scene.builder import build_scene
 from dataset_factory.scene.catalogue import find_scene
-from rfgs_core.dataset.csi_store import create_csi, write_csi
-from rfgs_core.dataset.mesh_ply import write_mesh
-from rfgs_core.dataset.names import SequenceFiles
-from rfgs_core.dataset.schema import DatasetInfo, SequenceInfo
-from rfgs_core.dataset.splits import radio_split
-from rfgs_core.dataset.writer import finish_dataset, write_arrays, write_sequence_info
+from dataset_factory.schedule.archive import unpack
+from dataset_factory.schedule.spread import Spread
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json, replacing_folder, write_json
 from rfgs_core.links import refuse_link
 from rfgs_core.locks import alone_in
-from rfgs_core.radio import layout
-from rfgs_core.radio.files import radio_values
-from rfgs_core.radio.materials import MATERIALS
 from rfgs_core.worlds.settings_file import SETTINGS_FILE, WorldsFile
-from rfgs_core.worlds.world import (
-    Sounding,
-    World,
-    WorldSettings,
-    random_world,
-    refuse_radio,
-    sounded,
-)
+from rfgs_core.worlds.world import random_world, refuse_radio, sounded
 
 #: Folder of the worlds' scenes, where they are rendered or traced by Sionna RT.
 SCENES = "scenes"
@@ -88,17 +70,15 @@ def missing(out: Path, indices: range) -> list[int]:
 
 def _tidy(out: Path, indices: range) -> None:
     """Removes what a killed run of these worlds left; others may be at work on others."""
+    shutil.rmtree(out / f".work-{indices.start}-{indices.step}", ignore_errors=True)
     for old in out.glob(".tmp-*-world_*"):
         if int(old.name.rpartition("_")[2]) in indices:
             shutil.rmtree(old, ignore_errors=True)
 
 
-def name_of(index: int) -> str:
-    """Folder of a world, and name of its sequence."""
-    return f"world_{index:07d}"
-
-
-def make_worlds(out: Path, shared: WorldsFile, named: str, indices: range) -> Iterator[World]:
+def make_worlds(
+    out: Path, shared: WorldsFile, named: str, indices: range, spread: Spread | None = None
+) -> Iterator[int]:
     """Makes the worlds that are missing, each a dataset of its own below a folder.
 
     Args:
@@ -106,31 +86,76 @@ def make_worlds(out: Path, shared: WorldsFile, named: str, indices: range) -> It
         shared: What the worlds have in common.
         named: How `--radio` names their radio.
         indices: Which worlds.
+        spread: Who makes them; None is this process.
 
     Yields:
-        Every world that was made, when it is whole.
+        The number of every world that was made, when it is whole.
 
     Raises:
-        RfgsError: The folder holds something else, somebody else makes the same worlds, or a
-            radio cannot be traced in such rooms.
+        RfgsError: The folder holds something else, somebody else makes the same worlds, a radio
+            cannot be traced in such rooms, or there are no workers.
     """
     shared.settings.check()
     refuse_radio(shared.radio)
+    spread = spread or Spread()
+    if spread.scheduler:
+        # A cluster that is not there is known before the folder is claimed.
+        from dataset_factory.schedule.workers import count_workers
+
+        count_workers(spread.scheduler)
     claim(out, shared)
     lock = out / f".lock-{indices.start}-{indices.step}"
     refuse_link(lock)
     lock.touch()
     with alone_in(lock, out, "rfgs-factory worlds"):
         _tidy(out, indices)
-        for index in missing(out, indices):
-            world = random_world(shared.radio, shared.settings, shared.seed, index)
-            with replacing_folder(out / name_of(index)) as folder:
-                if shared.in_blender:
-                    _generate(folder, _scene(out, index), shared, named)
-                else:
-                    heard = sounded(world, shared.settings, shared.seed)
-                    _write(folder, heard, shared.settings, shared.seed)
-            yield world
+        left = missing(out, indices)
+        if shared.in_blender:
+            yield from _in_blender(out, shared, named, left, spread)
+        elif left and (spread.scheduler or spread.workers > 1):
+            yield from _by_workers(out, shared, left, spread, f"{indices.start}-{indices.step}")
+        else:
+            yield from _here(out, shared, left)
+
+
+def _here(out: Path, shared: WorldsFile, left: list[int]) -> Iterator[int]:
+    """Makes worlds in this process."""
+    for index in left:
+        world = random_world(shared.radio, shared.settings, shared.seed, index)
+        with replacing_folder(out / name_of(index)) as folder:
+            heard = sounded(world, shared.settings, shared.seed)
+            write_world(folder, heard, shared.settings, shared.seed)
+        yield index
+
+
+def _by_workers(
+    out: Path, shared: WorldsFile, left: list[int], spread: Spread, share: str
+) -> Iterator[int]:
+    """Has worlds made by Dask's workers; `share` tells this process from others at the folder."""
+    from dataset_factory.make.world_workers import archives_of
+
+    scratch, log = out / f".work-{share}", out / "log" / share
+    refuse_link(scratch)
+    try:
+        with spread.ready(len(left), scratch, log) as workers:
+            for index, archive in archives_of(workers, shared, left, log):
+                with replacing_folder(out / name_of(index)) as folder:
+                    unpack(archive, folder)
+                yield index
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
+
+
+def _in_blender(
+    out: Path, shared: WorldsFile, named: str, left: list[int], spread: Spread
+) -> Iterator[int]:
+    """Makes worlds as scenes of Blender one after another; workers share the frames of each."""
+    for index in left:
+        # Without space for its people a world is refused before a scene is made of it.
+        random_world(shared.radio, shared.settings, shared.seed, index)
+        with replacing_folder(out / name_of(index)) as folder:
+            _generate(folder, _scene(out, index), shared, named, spread)
+        yield index
 
 
 def _scene(out: Path, index: int) -> Path:
@@ -145,7 +170,7 @@ def _scene(out: Path, index: int) -> Path:
     return blend
 
 
-def _generate(folder: Path, blend: Path, shared: WorldsFile, named: str) -> None:
+def _generate(folder: Path, blend: Path, shared: WorldsFile, named: str, spread: Spread) -> None:
     """Makes the dataset of a world's scene."""
     # Worlds without Blender do without what traces and renders scenes, Dask among it.
     from dataset_factory.make.generate import generate
@@ -170,89 +195,12 @@ def _generate(folder: Path, blend: Path, shared: WorldsFile, named: str) -> None
         paths=False,
         overrides={},
     )
-    generate(Job(folder, plan, Blender(blend, None), workers=1))
-
-
-def _write(folder: Path, heard: Sounding, settings: WorldSettings, seed: int) -> None:
-    world = heard.world
-    name = name_of(world.index)
-    files, frames = SequenceFiles(folder / name), list(range(1, settings.frames + 1))
-    info = _describe(world, settings, seed, frames)
-    write_sequence_info(files, info)
-    radio, devices = world.radio, world.devices
-    store = files.csi(radio.name)
-    create_csi(store, radio, layout(radio, devices), frames, heard.time_s.tolist())
-    write_csi(store, None, heard.csi_static, files.csi_done(radio.name, None))
-    for row, frame in enumerate(frames):
-        write_csi(store, row, heard.csi[row], files.csi_done(radio.name, frame))
-    _write_geometry(files, heard, settings, frames)
-    config = {"worlds": asdict(settings), "radio": radio.name, "index": world.index}
-    has = ["csi", "csi_static", "geometry"]
-    finish_dataset(folder, DatasetInfo(versions(), config, seed, has, [name]))
-
-
-def _write_geometry(
-    files: SequenceFiles, heard: Sounding, settings: WorldSettings, frames: list[int]
-) -> None:
-    world, movers = heard.world, heard.world.movers
-    write_mesh(files.static_mesh, *world.setting.mesh())
-    write_arrays(
-        files.topology,
-        faces=movers.faces.astype(np.int32),
-        material=movers.material,
-        instance=movers.instance,
-        segment=movers.segment,
-        rest_vertices=movers.rest_vertices,
+    job = Job(
+        folder,
+        plan,
+        Blender(blend, None),
+        workers=spread.workers,
+        worker_memory_gb=spread.memory_gb,
+        scheduler=spread.scheduler,
     )
-    for frame, time_s in zip(frames, heard.time_s.tolist(), strict=True):
-        write_arrays(
-            files.geometry(frame),
-            vertices=world.vertices(time_s),
-            joints=world.joints(time_s),
-            segment_velocity=world.segment_velocity(time_s, 1.0 / settings.fps),
-            person_instance=np.arange(1, len(world.actors) + 1, dtype=np.int32),
-            action=np.array([actor.motion.family for actor in world.actors], np.str_),
-        )
-
-
-def _describe(world: World, settings: WorldSettings, seed: int, frames: list[int]) -> SequenceInfo:
-    radio, devices, setting = world.radio, world.devices, world.setting
-    people = [
-        instance_row({"id": number, "name": f"person_{number}", "class": "person", "person": True})
-        for number in range(1, len(world.actors) + 1)
-    ]
-    still = [{"name": part.name, "class": "static", "instance": 0} for part in setting.parts]
-    moving = [{"name": row["name"], "class": "person", "instance": row["id"]} for row in people]
-    split = radio_split(radio, layout(radio, devices), seed)
-    return SequenceInfo(
-        scene=name_of(world.index),
-        blend_sha256="",
-        frames=frames,
-        frame_start=1,
-        fps=settings.fps,
-        bounds_m=setting.bounds_m.tolist(),
-        cameras=[],
-        devices={radio.name: [asdict(device) for device in devices]},
-        radios={radio.name: radio_values(radio)},
-        splits={
-            "rf": {radio.name: split},
-            "images": {"test_cameras": [], "test_frames": []},
-        },
-        materials=_materials(world),
-        instances=people,
-        objects=[{"id": number, **row} for number, row in enumerate([*still, *moving], start=1)],
-        trace_depth=min(settings.depth, radio.deepest),
-        tracer="fast",
-    )
-
-
-def _materials(world: World) -> list[dict[str, Any]]:
-    """The world's materials as datasets name them."""
-    return [
-        {
-            "name": slab.name, "source": slab.name, "radio_material": slab.name, "guessed": False,
-            "thickness_m": slab.thickness_m, "scattering_coefficient": 0.0,
-            "color": list(MATERIALS[slab.name].colour),
-        }
-        for slab in world.setting.materials
-    ]  # fmt: skip
+    generate(job)

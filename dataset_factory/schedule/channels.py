@@ -8,14 +8,9 @@ else.
 from __future__ import annotations
 
 import hashlib
-import io
-import tarfile
 import time
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import asdict
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tqdm import tqdm
@@ -23,13 +18,14 @@ from tqdm import tqdm
 from dataset_factory.plan.contents import missing_channels, versions
 from dataset_factory.plan.job import Job
 from dataset_factory.scene.bundle import Bundle, frame_file
+from dataset_factory.schedule.archive import packed
+from dataset_factory.schedule.spread import Spread
 from dataset_factory.schedule.worker import Answer, Request, Task, trace_frame
-from dataset_factory.schedule.workers import Workers, workers_here, workers_of
+from dataset_factory.schedule.workers import Workers
 from rfgs_core.dataset.csi_store import write_csi
 from rfgs_core.dataset.names import SequenceFiles
 from rfgs_core.dataset.schema import SequenceInfo, device_pose
 from rfgs_core.files import write_bytes
-from rfgs_core.links import refuse_link
 from rfgs_core.past import Clock
 
 if TYPE_CHECKING:
@@ -50,25 +46,11 @@ def trace(job: Job, bundle: Bundle, sequence: SequenceInfo) -> None:
     ]
     if not tasks:
         return
-    with _workers(job, len(tasks)) as workers:
+    spread = Spread(job.workers, job.worker_memory_gb, job.scheduler)
+    with spread.ready(len(tasks), job.work / "workers", job.out / "log") as workers:
         if job.scheduler:
             job.workers = workers.count
         _trace(job, bundle, sequence, tasks, workers)
-
-
-@contextmanager
-def _workers(job: Job, tasks: int) -> Iterator[Workers]:
-    if job.scheduler:
-        with workers_of(job.scheduler) as workers:
-            yield workers
-        return
-    count, log = min(job.workers, tasks), job.out / "log"
-    refuse_link(log)
-    log.mkdir(parents=True, exist_ok=True)
-    for old in log.glob("worker*.log"):
-        old.unlink()
-    with workers_here(count, job.worker_memory_gb, job.work / "workers", log) as workers:
-        yield workers
 
 
 def _trace(
@@ -77,7 +59,7 @@ def _trace(
     request = _request(job, bundle, sequence, str((job.out / "log").absolute()))
     client = workers.client
     # A task of its own, so that Dask makes it again where the worker that held it died.
-    scene = client.submit(bytes, packed(bundle.path), key=f"scene-{request.key}")
+    scene = client.submit(bytes, packed(bundle.path, without="frames"), key=f"scene-{request.key}")
 
     def submit(task: Task) -> Future:
         moving = b"" if task.frame is None else frame_file(bundle.path, task.frame).read_bytes()
@@ -120,17 +102,6 @@ def _request(job: Job, bundle: Bundle, sequence: SequenceInfo, log: str) -> Requ
         versions=versions(),
         log="" if job.scheduler else log,
     )
-
-
-def packed(bundle: Path) -> bytes:
-    """A scene without its frames, as an archive."""
-    buffer = io.BytesIO()
-    with tarfile.open(fileobj=buffer, mode="w:gz", compresslevel=1) as archive:
-        for path in sorted(bundle.rglob("*")):
-            name = path.relative_to(bundle)
-            if path.is_file() and name.parts[0] != "frames":
-                archive.add(path, name.as_posix())
-    return buffer.getvalue()
 
 
 def _write(files: SequenceFiles, sequence: SequenceInfo, task: Task, answer: Answer) -> None:

@@ -8,13 +8,11 @@ go back.
 
 from __future__ import annotations
 
-import io
 import os
-import tarfile
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 import psutil
@@ -23,6 +21,7 @@ from dataset_factory.children import end_with_parent
 from dataset_factory.plan.contents import versions
 from dataset_factory.plan.tracers import TracerName, TracingDevice
 from dataset_factory.scene.bundle import BundleFrame, frame_file, read_bundle
+from dataset_factory.schedule.archive import unpack
 from rfgs_core.dataset.path_store import write_paths
 from rfgs_core.dataset.schema import device_pose, radio_from_json
 from rfgs_core.errors import RfgsError
@@ -30,6 +29,8 @@ from rfgs_core.radio.path_table import PathTable
 
 if TYPE_CHECKING:
     from dataset_factory.trace import AnyTracer
+
+V = TypeVar("V")
 
 #: Frames after which a worker asks for another process: a start costs seconds.
 FRESH_AFTER_FRAMES = 300
@@ -51,11 +52,11 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Answer:
-    """What a worker has to say of a frame."""
+class Answer(Generic[V]):
+    """What a worker has to say of a frame, or of another task."""
 
-    value: np.ndarray
-    """The channel."""
+    value: V
+    """What was made: of a frame, its channel."""
     paths: bytes
     """Its table of paths as a file; empty if there is none."""
     seconds: dict[str, float]
@@ -157,13 +158,12 @@ class _Place:
     def __init__(self, request: Request, scene: bytes, worker: Any) -> None:
         refuse_other_versions(request.versions)
         if request.log:
-            _begin(Path(request.log) / f"worker{worker.name}.log")
+            begin(Path(request.log) / f"worker{worker.name}.log")
         self.key, self.frames = request.key, 0
         self._folder = tempfile.TemporaryDirectory(prefix="rfgs-", dir=worker.local_directory)
         self.path = Path(self._folder.name)
         self.bundle = self.path / "bundle"
-        with tarfile.open(fileobj=io.BytesIO(scene), mode="r:gz") as archive:
-            archive.extractall(self.bundle, filter="data")
+        unpack(scene, self.bundle)
         (self.bundle / "frames").mkdir()
         self.tracer = SceneTracer(request, self.bundle)
 
@@ -175,7 +175,7 @@ class _Place:
 _place: _Place | None = None
 
 
-def trace_frame(request: Request, scene: bytes, moving: bytes, task: Task) -> Answer:
+def trace_frame(request: Request, scene: bytes, moving: bytes, task: Task) -> Answer[np.ndarray]:
     """Traces one frame.
 
     Args:
@@ -203,9 +203,15 @@ def trace_frame(request: Request, scene: bytes, moving: bytes, task: Task) -> An
         write_paths(file, table)
         paths = file.read_bytes()
     _place.frames += 1
+    return answer_of(worker, value, paths, seconds, _place.frames)
+
+
+def answer_of(
+    worker: Any, value: V, paths: bytes, seconds: dict[str, float], frames: int
+) -> Answer[V]:
+    """The answer of a worker, with what it holds now; `frames` is how many it has traced."""
     memory_bytes = psutil.Process().memory_info().rss
-    limit_bytes = worker.memory_manager.memory_limit
-    fresh = wants_fresh_process(memory_bytes, limit_bytes, _place.frames)
+    fresh = wants_fresh_process(memory_bytes, worker.memory_manager.memory_limit, frames)
     return Answer(value, paths, seconds, memory_bytes, worker.address, fresh)
 
 
@@ -237,7 +243,7 @@ def refuse_other_versions(wanted: dict[str, str]) -> None:
             )
 
 
-def _begin(log: Path) -> None:
+def begin(log: Path) -> None:
     """Makes this process a quiet child: libraries print to a file, and it ends with the factory."""
     end_with_parent()
     with log.open("a") as stream:

@@ -74,7 +74,7 @@ class Workers:
 
     def answers(
         self, tasks: Sequence[T], submit: Callable[[T], Future]
-    ) -> Iterator[tuple[T, Answer]]:
+    ) -> Iterator[tuple[T, Answer[Any]]]:
         """Has tasks done, in any order.
 
         Args:
@@ -106,12 +106,12 @@ class Workers:
             running.update([start(following) for following in islice(waiting, 1)])
             yield task, answer
 
-    def _answer(self, future: Future, task: Any) -> Answer:
+    def _answer(self, future: Future, task: Any) -> Answer[Any]:
         from distributed import KilledWorker
 
         if future.status == "cancelled":
             raise RfgsError(
-                f"--scheduler {self.place}: the scheduler is gone; finished frames are kept, run "
+                f"--scheduler {self.place}: the scheduler is gone; what is finished is kept, run "
                 "the same command to continue"
             )
         try:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float64, Int64
@@ -15,9 +15,9 @@ from rfgs_core.skeleton import JOINTS
 from rfgs_core.worlds.furniture import Setting
 from rfgs_core.worlds.motion import FAMILIES, Motion, random_motion
 from rfgs_core.worlds.motion.curves import Z, about
+from rfgs_core.worlds.motion.motion import RATE_HZ
+from rfgs_core.worlds.props import Prop, props_of
 
-#: Stairs would need stairs.
-FAMILIES_ON_FLOORS = tuple(family for family in FAMILIES if family != "stairs")
 #: Nobody moves nearer to walls, furniture and others than this, from joints on [m].
 REACH_M = 0.3
 #: Share of children; looks at a motion while a place is sought for it.
@@ -26,6 +26,8 @@ _CHILDREN, _LOOKS = 0.12, 7
 _MOTIONS, _PLACES, _LEVEL_M = 12, 25, 0.01
 #: What somebody lies on ends this far below the skin [m].
 _UNDER_SKIN_M = 0.02
+#: Chairs and stairs stand at least this far from walls [m].
+_FROM_WALL_M = 0.05
 
 
 @dataclass(frozen=True)
@@ -40,11 +42,13 @@ class Actor:
     """How far the motion is turned, about the world's z axis."""
     shift_m: Float64[np.ndarray, "2"]
     """Where its origin is then put [m]."""
+    lift_m: float = 0.0
+    """And how far above the floor: those who go down stairs begin on top of them [m]."""
 
     def pose(self, time_s: float) -> Pose:
         """The pose at a time of the world [s]."""
         pose = self.motion.at(self.start_s + time_s).turned(about(Z, self.turn_rad))
-        return Pose(pose.root + np.append(self.shift_m, 0.0), pose.turns)
+        return Pose(pose.root + np.append(self.shift_m, self.lift_m), pose.turns)
 
 
 def segments(body: Body) -> Int64[np.ndarray, "triangle"]:
@@ -69,13 +73,13 @@ def cast_of(
     setting: Setting,
     count: int,
     lasts_s: float,
-    families: tuple[str, ...] = FAMILIES_ON_FLOORS,
+    families: tuple[str, ...] = FAMILIES,
 ) -> list[Actor]:
     """People who find room for what they do; takes their places on the floor.
 
     Args:
         rng: Where chance comes from.
-        setting: The room; beds are added to it.
+        setting: The room; beds, chairs and stairs are added to it.
         count: How many people.
         lasts_s: How long the world lasts [s].
         families: What they may do.
@@ -105,14 +109,21 @@ def _placed(
     for _ in range(_MOTIONS):
         motion = random_motion(rng, body, str(rng.choice(families)))
         start_s = float(rng.uniform(0.0, max(motion.duration_s - lasts_s, 0.0)))
+        props = props_of(body, motion)
+        lift_m = max(-float(motion.floor_m.min()), 0.0)
         for _ in range(_PLACES):
             turn = float(rng.uniform(-np.pi, np.pi))
-            actor = _somewhere(rng, setting, Actor(body, motion, start_s, turn, np.zeros(2)))
-            reach = None if actor is None else swept(actor, lasts_s)
-            if actor is None or reach is None or not _fits(setting, actor, reach, lasts_s):
+            if motion.plates:
+                # Stairs are long, and run along a wall.
+                turn = 0.5 * np.pi * round(turn / (0.5 * np.pi))
+            actor = Actor(body, motion, start_s, turn, np.zeros(2), lift_m)
+            actor = _somewhere(rng, setting, actor)
+            reach = _with_props(swept(actor, lasts_s), actor, props)
+            if not _fits(setting, actor, reach, lasts_s):
                 continue
             setting.taken_m.append(reach[:, :2])
             _add_bed(setting, actor, reach, lasts_s)
+            _add_props(setting, actor, props)
             return actor
     return None
 
@@ -121,8 +132,7 @@ def _somewhere(rng: np.random.Generator, setting: Setting, actor: Actor) -> Acto
     """The actor with the first pose anywhere in the room."""
     low, high = setting.bounds_m[0, :2] + REACH_M, setting.bounds_m[1, :2] - REACH_M
     here = actor.body.joints17(actor.pose(0.0))[0, :2]
-    shift = rng.uniform(low, high) - here
-    return Actor(actor.body, actor.motion, actor.start_s, actor.turn_rad, shift)
+    return replace(actor, shift_m=rng.uniform(low, high) - here)
 
 
 def swept(actor: Actor, lasts_s: float) -> Float64[np.ndarray, "2 3"]:
@@ -132,31 +142,51 @@ def swept(actor: Actor, lasts_s: float) -> Float64[np.ndarray, "2 3"]:
     return np.array([joints.min(axis=0) - REACH_M, joints.max(axis=0) + REACH_M])
 
 
+def _with_props(reach_m: np.ndarray, actor: Actor, props: list[Prop]) -> np.ndarray:
+    """The box around an actor [2, 3], grown to hold her or his chair or stairs [m]."""
+    if not props:
+        return reach_m
+    plates = np.array([prop.plate for prop in props]).reshape(-1, 2, 3)
+    x, y = (plates[:, [[0, 0], [1, 1]], 0].ravel(), plates[:, [[0, 1], [0, 1]], 1].ravel())
+    flat = np.stack([x, y], axis=1) @ about(Z, actor.turn_rad)[:2, :2].T + actor.shift_m
+    out = reach_m.copy()
+    out[0, :2] = np.minimum(out[0, :2], flat.min(axis=0) - _FROM_WALL_M)
+    out[1, :2] = np.maximum(out[1, :2], flat.max(axis=0) + _FROM_WALL_M)
+    return out
+
+
 def _fits(setting: Setting, actor: Actor, reach_m: np.ndarray, lasts_s: float) -> bool:
     """Whether an actor stays within the room, clear of the others, and on one level."""
     low, high = setting.bounds_m
     inside = (reach_m[0, :2] >= low[:2]).all() and (reach_m[1] <= high).all()
-    level = _floors(actor, lasts_s)
-    return bool(
-        inside and np.ptp(level) <= _LEVEL_M and setting.free(reach_m[0, :2], reach_m[1, :2], 0.0)
-    )
+    level = bool(actor.motion.plates) or np.ptp(_floors(actor, lasts_s)) <= _LEVEL_M
+    return bool(inside and level and setting.free(reach_m[0, :2], reach_m[1, :2], 0.0))
 
 
 def _floors(actor: Actor, lasts_s: float) -> Float64[np.ndarray, "sample"]:
     """Heights of what carries the actor while the world lasts [m]."""
-    from rfgs_core.worlds.motion.motion import RATE_HZ
-
     first = int(actor.start_s * RATE_HZ)
     return actor.motion.floor_m[first : first + int(lasts_s * RATE_HZ) + 2]
 
 
 def _add_bed(setting: Setting, actor: Actor, reach_m: np.ndarray, lasts_s: float) -> None:
     """Puts a bed under somebody who does not lie on the floor."""
+    if actor.motion.plates:
+        return
     top = float(_floors(actor, lasts_s).min()) - _UNDER_SKIN_M
     if top > 4.0 * _UNDER_SKIN_M:
         low, high = reach_m[0].copy(), reach_m[1].copy()
         low[2], high[2] = _UNDER_SKIN_M, top
         setting.add_box(f"bed_{len(setting.parts)}", "chipboard", low, high)
+
+
+def _add_props(setting: Setting, actor: Actor, props: list[Prop]) -> None:
+    """Puts chair or stairs where the actor needs them."""
+    shift_m = np.append(actor.shift_m, actor.lift_m)
+    for prop in props:
+        name = f"{prop.name}_{len(setting.parts)}"
+        low, high = np.array(prop.plate)
+        setting.add_box(name, prop.material, low, high, actor.turn_rad, shift_m)
 
 
 def segment_centres(

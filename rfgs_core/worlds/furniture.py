@@ -12,10 +12,13 @@ from jaxtyping import Float64, Int64
 from rfgs_core.radio import Radio
 from rfgs_core.radio.materials import MATERIALS
 from rfgs_core.simulate.geometry.room import Room, SlabMaterial, box_room
+from rfgs_core.worlds.motion.curves import Z, about
 
 #: What walls, floors and ceilings are made of; those that a radio's band allows are drawn from.
 WALLS = ("concrete", "brick", "plasterboard", "wood", "glass")
 FLOORS, CEILINGS = ("concrete", "wood"), ("concrete", "ceiling_board", "plasterboard")
+#: The first parts of every room.
+_SIDES = ("wall_x_low", "wall_x_high", "wall_y_low", "wall_y_high", "floor", "ceiling")
 #: The skin of people, last among the materials of every world.
 SKIN = "skin"
 #: Furniture stands this high above the floor and this far from walls, people and devices [m].
@@ -82,13 +85,40 @@ class Setting:
         corners = np.concatenate([part.triangles for part in self.parts]).reshape(-1, 3)
         return corners.astype(np.float32), _rows_of_three(len(corners)).astype(np.int32)
 
-    def add_box(self, name: str, material: str, low_m: np.ndarray, high_m: np.ndarray) -> None:
-        """Adds a closed box of a material's usual thickness, from corner to corner [m]."""
+    def add_box(
+        self,
+        name: str,
+        material: str,
+        low_m: np.ndarray,
+        high_m: np.ndarray,
+        turn_rad: float = 0.0,
+        shift_m: np.ndarray | None = None,
+    ) -> None:
+        """Adds a closed box of a material's usual thickness.
+
+        Args:
+            name: What it is.
+            material: Of what.
+            low_m: Its lowest corner, before it is turned [m].
+            high_m: Its highest [m].
+            turn_rad: How far it is turned about the vertical through the origin [rad].
+            shift_m: Where the origin is then put, shape (3,) [m].
+        """
         slab = _slab(material)
         if slab not in self.materials:
             self.materials.append(slab)
-        box = box_room(low_m, high_m, slab).triangles
+        box = box_room(low_m, high_m, slab).triangles @ about(Z, turn_rad).T
+        box = box if shift_m is None else box + shift_m
         self.parts.append(Mesh(name, self.materials.index(slab), box))
+
+    def clear_of_furniture(self, point_m: np.ndarray, clear_m: float) -> bool:
+        """Whether a point keeps clear of the boxes around all furniture so far [m]."""
+        corners = [part.triangles.reshape(-1, 3) for part in self.parts[len(_SIDES) :]]
+        return not any(
+            (point_m > each.min(axis=0) - clear_m).all()
+            and (point_m < each.max(axis=0) + clear_m).all()
+            for each in corners
+        )
 
     def free(self, low_m: np.ndarray, high_m: np.ndarray, clear_m: float = _CLEAR_M) -> bool:
         """Whether a box, seen from above, keeps clear of all that is taken [m]."""
@@ -108,8 +138,7 @@ def empty_setting(rng: np.random.Generator, radio: Radio) -> Setting:
     sides += [str(rng.choice(_allowed(names, radio))) for names in (FLOORS, CEILINGS)]
     setting = Setting(bounds, [])
     box = box_room(bounds[0], bounds[1], _slab(sides[0])).triangles
-    names = ("wall_x_low", "wall_x_high", "wall_y_low", "wall_y_high", "floor", "ceiling")
-    for index, (name, material) in enumerate(zip(names, sides, strict=True)):
+    for index, (name, material) in enumerate(zip(_SIDES, sides, strict=True)):
         slab = _slab(material)
         if slab not in setting.materials:
             setting.materials.append(slab)

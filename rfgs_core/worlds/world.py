@@ -29,8 +29,9 @@ from rfgs_core.simulate.geometry.room import SlabMaterial
 from rfgs_core.simulate.surface.edges import UNSAID
 from rfgs_core.simulate.surface.movers import Movers
 from rfgs_core.simulate.tracer import FastTracer
-from rfgs_core.worlds.cast import FAMILIES_ON_FLOORS, Actor, cast_of, segment_centres, segments
+from rfgs_core.worlds.cast import Actor, cast_of, segment_centres, segments
 from rfgs_core.worlds.furniture import SKIN, Setting, empty_setting, furnish
+from rfgs_core.worlds.motion import FAMILIES
 from rfgs_core.worlds.room import IN_CORNERS, anywhere
 
 #: Devices of a world, fewest and most, and their heights in corners [m].
@@ -39,6 +40,8 @@ _DEVICES, _HEIGHTS_M = (3, 6), (0.4, 2.4)
 _ROOMS = 40
 #: Furniture keeps this far from a device [m].
 _AROUND_DEVICE_M = 0.3
+#: And so do beds, chairs and stairs, which are there before [m].
+_FROM_DEVICE_M = 0.1
 
 
 @dataclass(frozen=True)
@@ -53,7 +56,7 @@ class WorldSettings:
     """Fewest and most people."""
     depth: int = 2
     """Interactions of people's paths."""
-    families: tuple[str, ...] = FAMILIES_ON_FLOORS
+    families: tuple[str, ...] = FAMILIES
     """What people may do."""
 
     @property
@@ -76,11 +79,10 @@ class WorldSettings:
             raise RfgsError(f"fps {self.fps}: expected 0.1 to 1000 frames per second")
         if not 1 <= self.depth <= 3:
             raise RfgsError(f"depth {self.depth}: expected 1, 2 or 3")
-        unknown = sorted(set(self.families) - set(FAMILIES_ON_FLOORS))
+        unknown = sorted(set(self.families) - set(FAMILIES))
         if unknown or not self.families:
             raise RfgsError(
-                f"motion {unknown[0] if unknown else ''!r}: expected some of "
-                f"{', '.join(FAMILIES_ON_FLOORS)}"
+                f"motion {unknown[0] if unknown else ''!r}: expected some of {', '.join(FAMILIES)}"
             )
 
 
@@ -196,7 +198,9 @@ def random_world(radio: Radio, settings: WorldSettings, seed: int, index: int) -
         except RfgsError:
             continue
         kind, devices = _devices(rng, radio, setting, actors, settings)
-        if not devices:
+        places = [np.array(device.position_m) for device in devices]
+        clear = [setting.clear_of_furniture(place, _FROM_DEVICE_M) for place in places]
+        if not devices or not all(clear):
             continue
         for device in devices:
             here = np.array(device.position_m[:2])

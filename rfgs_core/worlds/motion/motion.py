@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -15,6 +16,13 @@ from rfgs_core.articulated.turns import OPTIONS, chained, multiplied
 
 #: Samples of motions [1/s].
 RATE_HZ = 50.0
+
+
+class Plate(NamedTuple):
+    """A level board that bears feet or a body, from corner to corner [m], in a motion's world."""
+
+    low_m: tuple[float, float, float]
+    high_m: tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -31,6 +39,8 @@ class Motion:
     """Head of the pelvis's bone at each sample [m], shape [T, 3]."""
     floor_m: np.ndarray
     """Height of what carries the person at each sample: floor, step or bed [m], shape [T]."""
+    plates: tuple[Plate, ...] = ()
+    """Treads and landings of stairs that belong to the motion."""
 
     @property
     def duration_s(self) -> float:

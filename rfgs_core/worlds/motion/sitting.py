@@ -14,6 +14,9 @@ from rfgs_core.worlds.motion.manner import gesture, lap_pose, quiet_arm
 from rfgs_core.worlds.motion.standing import move_arms
 from rfgs_core.worlds.motion.track import SIDES, SIGN, Track
 
+#: Bones whose skin bears somebody who sits.
+SEATED = ("pelvis", "upperleg_left", "upperleg_right")
+
 
 def sit(rng: np.random.Generator, body: Body) -> Track:
     """Sits down, sits, stands up: one of them, or all."""
@@ -47,6 +50,13 @@ def sit(rng: np.random.Generator, body: Body) -> Track:
     return track
 
 
+def held_by(body: Body, *bones: str) -> np.ndarray:
+    """Which vertices follow some bones alone, or nearly so, shape [V]."""
+    rows, weight = body.weights
+    wanted = np.isin(rows, [bone(name) for name in bones])
+    return np.where(wanted, weight, 0.0).sum(axis=1) > 0.9
+
+
 def seat_below_m(body: Body) -> float:
     """How far the seat is below the pelvis's bone of somebody who sits upright [m]."""
     local = np.tile(np.eye(3), (len(BONES), 1, 1))
@@ -55,10 +65,7 @@ def seat_below_m(body: Body) -> float:
         local[bone(f"lowerleg_{side}")] = about(Y, 0.5 * np.pi)
     world = Pose.from_local(np.zeros(3), local)
     skin = body.skin(Pose(np.zeros(3), world.turns @ body.neutral))
-    rows, weight = body.weights
-    on_seat = [bone("pelvis"), bone("upperleg_left"), bone("upperleg_right")]
-    share = np.where(np.isin(rows, on_seat), weight, 0.0).sum(axis=1)
-    near = (share > 0.9) & (np.abs(skin[:, 0]) < 0.2)
+    near = held_by(body, *SEATED) & (np.abs(skin[:, 0]) < 0.2)
     # Flesh gives way by a centimetre or two.
     return float(-skin[near, 2].min()) - 0.015
 

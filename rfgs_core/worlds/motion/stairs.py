@@ -15,9 +15,17 @@ from rfgs_core.worlds.motion.arms import Shoulder, place_arm
 from rfgs_core.worlds.motion.curves import Y, about, noise, smoothed
 from rfgs_core.worlds.motion.legs import Feet, Step, plant
 from rfgs_core.worlds.motion.manner import gesture
-from rfgs_core.worlds.motion.motion import RATE_HZ
+from rfgs_core.worlds.motion.motion import RATE_HZ, Plate
 from rfgs_core.worlds.motion.standing import sway
 from rfgs_core.worlds.motion.track import SIDES, SIGN, Track
+
+#: Treads are boards so thick and wide, and landings reach so far behind or beyond a foot [m].
+_THICK_M, _WIDE_M, _LANDING_M = 0.04, 0.8, 0.45
+#: A tread begins so far behind the ankle: on the way up half a foot stands on it, so that the
+#: toes of the other pass its edge; on the way down the heel does, too [m].
+_BEHIND_UP_M, _BEHIND_DOWN_M = 0.02, 0.09
+#: Toes do not bend, and dip so far below the sole as a heel is raised [m].
+_DIP_M = 0.015
 
 
 def stairs(rng: np.random.Generator, body: Body) -> Track:
@@ -42,6 +50,7 @@ def stairs(rng: np.random.Generator, body: Body) -> Track:
     )
     for side in SIDES:
         feet.heel_rad[side] = _push_off(track.times, [s for s in steps if s.side == side], up)
+    track.plates = _treads(steps[flat[0] : flat[0] + count], steps[-1].place[0], up)
     _body(rng, track, feet, up)
     plant(track, feet, rng.uniform(0.0, 0.15))
     track.floor_m[:] = np.minimum(feet.places["left"][:, 2], feet.places["right"][:, 2])
@@ -70,6 +79,24 @@ def _steps(
         side = SIDES[1 - SIDES.index(side)]
         time_s += step_s
     return steps
+
+
+def _treads(steps: list[Step], last_x_m: float, up: float) -> tuple[Plate, ...]:
+    """A board under every step; the highest is a landing, and the floor itself bears the lowest."""
+    behind = _BEHIND_UP_M if up > 0 else _BEHIND_DOWN_M
+    begin = [float(step.place[0]) - behind for step in steps]
+    height = [float(step.place[2]) for step in steps]
+    if up > 0:
+        ends = [*begin[1:], last_x_m + _LANDING_M]
+    else:
+        # The floor above is where the walker starts; the last step is onto the floor below.
+        begin, ends = [-_LANDING_M, *begin[:-1]], begin
+        height = [0.0, *height[:-1]]
+    half = 0.5 * _WIDE_M
+    return tuple(
+        Plate((low, -half, top - _DIP_M - _THICK_M), (high, half, top - _DIP_M))
+        for low, high, top in zip(begin, ends, height, strict=True)
+    )
 
 
 def _push_off(times: np.ndarray, steps: list[Step], up: float) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 from rfgs_core.articulated import BONES, PARENTS, Body, Pose
 from rfgs_core.articulated.bones import bone
 from rfgs_core.worlds.motion.curves import X, Y, Z, about, smoothed
-from rfgs_core.worlds.motion.motion import RATE_HZ, Motion
+from rfgs_core.worlds.motion.motion import RATE_HZ, Motion, Plate
 
 SIDES = ("left", "right")
 #: Signs with which rotations about x and z count on each side.
@@ -35,6 +35,7 @@ class Track:
         self.local = np.tile(np.eye(3), (count, len(BONES), 1, 1))
         self.root = np.tile(body.heads[0], (count, 1))
         self.floor_m = np.zeros(count)
+        self.plates: tuple[Plate, ...] = ()
 
     def pelvis(
         self,
@@ -123,4 +124,5 @@ class Track:
 
     def motion(self, family: str) -> Motion:
         """The finished motion."""
-        return Motion(family, self.body.neutral, self.local, self.root, self.floor_m)
+        neutral = self.body.neutral
+        return Motion(family, neutral, self.local, self.root, self.floor_m, self.plates)

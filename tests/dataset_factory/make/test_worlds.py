@@ -10,7 +10,8 @@ import pytest
 
 from dataset_factory.check.validate import validate
 from dataset_factory.cli import main
-from dataset_factory.make.worlds import make_worlds, name_of, parse_shard
+from dataset_factory.make.world_files import name_of
+from dataset_factory.make.worlds import make_worlds, parse_shard
 from rfgs_core import open_dataset
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import sha256

@@ -8,8 +8,8 @@ import signal
 import subprocess
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -23,28 +23,7 @@ from rfgs_core.errors import RfgsError
 MakeJob = Callable[..., Job]
 Factory = Callable[..., subprocess.CompletedProcess[str]]
 Bytes = Callable[[Path], dict[str, bytes]]
-
-
-@contextmanager
-def running(folder: Path, threads: int = 1) -> Iterator[Any]:
-    """A cluster of two processes of this machine, which come back when they are killed."""
-    from distributed import LocalCluster
-
-    with LocalCluster(
-        n_workers=2,
-        threads_per_worker=threads,
-        processes=True,
-        dashboard_address=None,
-        local_directory=str(folder / "dask"),
-        silence_logs=50,
-    ) as cluster:
-        yield cluster
-
-
-@pytest.fixture
-def cluster(tmp_path: Path) -> Iterator[Any]:
-    with running(tmp_path) as cluster:
-        yield cluster
+StartCluster = Callable[..., AbstractContextManager[Any]]
 
 
 def kill_when(sign: Path, pid: int, killed: threading.Event) -> threading.Thread:
@@ -117,8 +96,10 @@ def test_an_address_without_a_scheduler_is_named(
     assert not (tmp_path / "out").exists(), "nothing is exported for nobody"
 
 
-def test_workers_of_several_threads_are_refused(make_job: MakeJob, tmp_path: Path) -> None:
-    with running(tmp_path, threads=2) as cluster:
+def test_workers_of_several_threads_are_refused(
+    make_job: MakeJob, start_cluster: StartCluster, tmp_path: Path
+) -> None:
+    with start_cluster(tmp_path, threads=2) as cluster:
         job = make_job(tmp_path / "out", images=False, scheduler=cluster.scheduler_address)
         with pytest.raises(RfgsError, match=r"has 2 threads, .* --nworkers 2 --nthreads 1"):
             generate(job)

@@ -11,6 +11,7 @@ import pytest
 from rfgs_core.errors import RfgsError
 from rfgs_core.radio.presets import preset
 from rfgs_core.worlds.cast import segment_centres
+from rfgs_core.worlds.furniture import Mesh
 from rfgs_core.worlds.world import World, WorldSettings, random_world, soundings
 
 SETTINGS = WorldSettings(frames=3, people=(1, 3))
@@ -36,15 +37,76 @@ def test_people_stay_within_their_room_and_out_of_all_that_stands_there(worlds) 
     beds = 0
     for world in worlds:
         low, high = world.setting.bounds_m
-        boxes = [part.triangles.reshape(-1, 3) for part in world.setting.parts[6:]]
         beds += sum(part.name.startswith("bed") for part in world.setting.parts)
         for time_s in (0.0, 0.25):
             skin = world.vertices(time_s)
             assert (skin > low - 0.02).all() and (skin < high).all()
-            for corners in boxes:
-                inside = (skin > corners.min(axis=0)) & (skin < corners.max(axis=0))
-                assert not inside.all(axis=1).any()
+            for part in world.setting.parts[6:]:
+                # Toes brush the edges of treads.
+                allowed_m = 0.02 if part.name.startswith("stairs") else 0.0
+                assert deepest_m(skin, part) <= allowed_m + 1e-6, part.name
     assert beds, "somebody lies on a bed"
+
+
+def deepest_m(skin: np.ndarray, part: Mesh) -> float:
+    """How deep the skin is in a box, which may be turned [m]; below 0 where it is outside."""
+    centre = part.triangles.reshape(-1, 3).mean(axis=0)
+    depth = np.full(len(skin), np.inf)
+    for a, b, c in part.triangles:
+        normal = np.cross(b - a, c - a)
+        normal *= np.sign(normal @ (a - centre)) / np.linalg.norm(normal)
+        depth = np.minimum(depth, (a - skin) @ normal)
+    return float(depth.max())
+
+
+@pytest.mark.parametrize(("family", "name"), [("sit", "chair"), ("stairs", "stairs")])
+def test_chairs_and_stairs_are_where_motions_need_them(family: str, name: str) -> None:
+    settings = WorldSettings(frames=8, people=(1, 1), families=(family,))
+    for index in range(5):
+        world = random_world(preset("wifi"), settings, 2, index)
+        low, high = world.setting.bounds_m
+        boards = [part for part in world.setting.parts if part.name.startswith(name)]
+        corners = np.concatenate([board.triangles.reshape(-1, 3) for board in boards])
+        assert (corners > low - 1e-9).all() and (corners < high).all()
+        (actor,) = world.actors
+        gaps_m = []
+        # Also before the world begins and after it ends: a chair is there as somebody sits down.
+        for time_s in np.arange(-actor.start_s, actor.motion.duration_s - actor.start_s, 0.1):
+            skin = world.vertices(float(time_s))
+            deepest = max(deepest_m(skin, board) for board in boards)
+            assert deepest <= (0.02 + 1e-6 if family == "stairs" else 0.0)
+            lowest = float(skin[:, 2].min())
+            gaps_m.append([gap_m(skin, board) for board in boards] + [lowest])
+        nearest = np.min(gaps_m, axis=1)
+        assert (nearest < 0.04).all(), "something bears the person at every instant"
+        seat = np.min(gaps_m, axis=0)[0]
+        assert seat < 0.04, "the seat, and the first tread, are used"
+
+
+def gap_m(skin: np.ndarray, board: Mesh) -> float:
+    """How far the lowest skin over a level board is above it [m]; infinite where there is none."""
+    corners = board.triangles.reshape(-1, 3)
+    centre, top = corners.mean(axis=0), corners[:, 2].max()
+    edges = board.triangles[:, [0, 1]] - board.triangles[:, [1, 2]]
+    flat = edges[np.abs(edges[..., 2]) < 1e-9].reshape(-1, 3)
+    inside = np.ones(len(skin), dtype=bool)
+    for edge in flat:
+        way = edge / np.linalg.norm(edge)
+        inside &= np.abs((skin - centre) @ way) <= np.abs((corners - centre) @ way).max() + 1e-9
+    over = inside & (skin[:, 2] > top - 0.03)
+    return float(skin[over, 2].min(initial=np.inf) - top)
+
+
+def test_those_who_walk_down_begin_on_top_and_end_on_the_floor() -> None:
+    settings = WorldSettings(frames=2, people=(1, 1), families=("stairs",))
+    worlds = [random_world(preset("wifi"), settings, 5, index) for index in range(8)]
+    lifted = [world.actors[0] for world in worlds if world.actors[0].lift_m > 0.0]
+    assert lifted and len(lifted) < len(worlds)
+    for actor in lifted:
+        ends = actor.body.skin(actor.pose(actor.motion.duration_s))[:, 2].min()
+        assert abs(ends) < 0.03
+        begins = actor.body.skin(actor.pose(-actor.start_s))[:, 2].min()
+        assert begins == pytest.approx(actor.lift_m, abs=0.03)
 
 
 def test_devices_stand_in_the_room_and_out_of_furniture(worlds) -> None:

@@ -81,10 +81,10 @@ class TrainOptions:
     standing: everybody stands, as is assumed without phases anyway."""
 
     limbs: Limbs = "auto"
-    """auto: a network that was trained on random worlds tells people's limbs where one for the
-    radio is at hand, else evidence those of one person who walks, and Gaussians start on the
-    skins of posed bodies; off: they start around the bodies' places, knowing nothing but whether
-    somebody stands or sits."""
+    """auto: evidence tells the limbs of people who walk, a network that was trained on random
+    worlds those of others where one for the radio is at hand, and Gaussians start on the skins of
+    posed bodies; off: they start around the bodies' places, knowing nothing but whether somebody
+    stands or sits."""
 
     def __post_init__(self) -> None:
         """Refuses values that no option may have.

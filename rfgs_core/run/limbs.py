@@ -19,7 +19,7 @@ from rfgs_core.bodies.separation import each_alone
 from rfgs_core.bodies.tracks import Tracks
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.fit.frame import OnSkins, followed
-from rfgs_core.limbs.evidence.tell import long_enough, looks, tell
+from rfgs_core.limbs.evidence.tell import long_enough, looks, stands, tell
 from rfgs_core.limbs.propose import SMOOTH_S, Joints, propose, smoothed
 from rfgs_core.limbs.skins import PosedPeople
 from rfgs_core.limbs.weights import Trained, own_network
@@ -105,8 +105,9 @@ def find_limbs(
 ) -> Limbs | None:
     """Follows people through a run's frames and poses them; what is kept is read.
 
-    Evidence tells those of one person who walks, the network those of everybody else. Frames of
-    the sequence beside those of the run, near enough to smooth them, are read as well.
+    Evidence tells those of people who walk, the network those of everybody else; where it tells
+    some, others stand. Frames of the sequence beside those of the run, near enough to smooth them,
+    are read as well.
 
     Args:
         run: The run.
@@ -135,10 +136,19 @@ def find_limbs(
         seen.append(run.observations(frame))
         tracks.append(followed(tracks[-1] if tracks else None, seen[-1], config, seed))
         on_frame()
-    walks = evidence_tells(run, frames)
-    joints = _by_evidence(seen, tracks, config.seed, on_frame) if walks else None
-    if joints is None and trained is not None:
-        joints = _by_network(trained, seen, tracks, config, seeds)
+    # A vehicle is a body too, and does not walk.
+    walks = evidence_tells(run, frames) and len(tracks[0].axes_xy) == known_people(run)
+    alone = [
+        _alone(observations, track.axes_xy, config, seed)
+        for observations, track, seed in zip(seen, tracks, seeds, strict=True)
+    ]
+    told: list[Joints | None] = [None] * len(alone[0])
+    if walks:
+        told = _by_evidence(alone, tracks, config.seed, on_frame)
+    if trained is not None:
+        said = _by_network(trained, alone, tracks) if None in told else told
+        told = [one or other for one, other in zip(told, said, strict=True)]
+    joints = _together(told, alone, tracks)
     if joints is None:
         return None
     own = [frames.index(frame) for frame in run.frames]
@@ -156,57 +166,70 @@ def find_limbs(
 
 
 def evidence_tells(run: Run, frames: list[int]) -> bool:
-    """Whether frames are those of one person and show enough of a walk."""
+    """Whether frames are those of people and show enough of a walk."""
     sequence = run.sequence
     time_s = np.array([sequence.time_s(frame) for frame in frames])
-    return known_people(run) == 1 and long_enough(time_s)
+    return known_people(run) > 0 and long_enough(time_s)
 
 
 def looks_at(run: Run) -> int:
     """How often `find_limbs` calls `on_frame`, if somebody walks wherever evidence may tell."""
     frames = frames_read(run)
-    return len(frames) + (looks(len(frames)) if evidence_tells(run, frames) else 0)
+    people = known_people(run) if evidence_tells(run, frames) else 0
+    return len(frames) + people * looks(len(frames))
 
 
-def _by_evidence(
-    seen: list[Observations], tracks: list[Tracks], seed: int, on_frame: Callable[[], Any]
-) -> Joints | None:
-    """Joints of one person in all frames; None where evidence tells nothing."""
-    if any(len(track.axes_xy) != 1 for track in tracks):
-        return None
-    told = tell(seen, np.array([track.axes_xy[0] for track in tracks]), seed, on_frame)
-    return None if told is None else told.joints
-
-
-def _by_network(
-    trained: Trained,
-    seen: list[Observations],
-    tracks: list[Tracks],
-    config: TrainConfig,
-    seeds: list[int],
-) -> Joints:
-    """Joints of everybody in all frames, on curves through them."""
-    said = [
-        _everybody(trained, observations, track.axes_xy, config, seed)
-        for observations, track, seed in zip(seen, tracks, seeds, strict=True)
-    ]
-    joints = Joints(*(np.array(values) for values in zip(*said, strict=True)))
-    return smoothed(joints, np.array([track.time_s for track in tracks]))
-
-
-def _everybody(
-    trained: Trained,
+def _alone(
     observations: Observations,
     axes_xy: Float64[np.ndarray, "body 2"],
     config: TrainConfig,
     seed: int,
-) -> Joints:
-    """Joints of all bodies of a frame, each asked for without the echoes of the others."""
+) -> list[Observations]:
+    """A frame once for each body, without the echoes of the others."""
     if len(axes_xy) == 1:
-        return propose(trained.network, observations, axes_xy)
-    alone = each_alone(observations, pair_maps(observations), axes_xy, config, seed)
-    each = [propose(trained.network, heard, axes_xy[[body]]) for body, heard in enumerate(alone)]
-    return Joints(*(np.concatenate(values) for values in zip(*each, strict=True)))
+        return [observations]
+    return each_alone(observations, pair_maps(observations), axes_xy, config, seed)
+
+
+def _by_evidence(
+    alone: list[list[Observations]], tracks: list[Tracks], seed: int, on_frame: Callable[[], Any]
+) -> list[Joints | None]:
+    """Joints of each person in all frames; None of somebody of whom evidence tells nothing."""
+    axes_xy = np.array([track.axes_xy for track in tracks])
+    found = []
+    for body in range(axes_xy.shape[1]):
+        told = tell([frame[body] for frame in alone], axes_xy[:, body], seed, on_frame)
+        found.append(None if told is None else told.joints)
+    return found
+
+
+def _by_network(
+    trained: Trained, alone: list[list[Observations]], tracks: list[Tracks]
+) -> list[Joints | None]:
+    """Joints of each person in all frames, on curves through them."""
+    time_s = np.array([track.time_s for track in tracks])
+    found: list[Joints | None] = []
+    for body in range(len(alone[0])):
+        said = [
+            propose(trained.network, frame[body], track.axes_xy[[body]])
+            for frame, track in zip(alone, tracks, strict=True)
+        ]
+        joints = Joints(*(np.array(values) for values in zip(*said, strict=True)))
+        found.append(smoothed(joints, time_s))
+    return found
+
+
+def _together(
+    told: list[Joints | None], alone: list[list[Observations]], tracks: list[Tracks]
+) -> Joints | None:
+    """Everybody's joints, standing where nothing is known of somebody; None if of nobody is."""
+    if not any(told):
+        return None
+    whole = []
+    for body, joints in enumerate(told):
+        axes_xy = np.array([track.axes_xy[body] for track in tracks])
+        whole.append(joints or stands([frame[body] for frame in alone], axes_xy))
+    return Joints(*(np.concatenate(values, axis=1) for values in zip(*whole, strict=True)))
 
 
 def frames_read(run: Run) -> list[int]:

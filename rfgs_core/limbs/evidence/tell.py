@@ -46,6 +46,8 @@ _HERE = np.zeros((1, 3))
 _FINE = np.array([[x, y, 0.0] for x in range(-1, 2) for y in range(-1, 2)]) * 0.02
 #: A joint is known no better than this [m].
 _SUREST_M = 0.055
+#: Joints of a standing body are so far off those of people of whom nothing else is known [m].
+_STANDING_M = 0.11
 #: Phases this far from the likeliest one are in doubt [share of a stride].
 _DOUBT = 0.08
 #: A frame agrees with a walk if it is likeliest this near to its phase [share of a stride]; of a
@@ -134,6 +136,22 @@ def tell(
     if found is None or found.lead <= 0.0 or found.agree < _AGREE:
         return None
     return found
+
+
+def stands(seen: list[Observations], axes_xy: Float[np.ndarray, "frame 2"]) -> Joints:
+    """Joints of somebody of whom no walk is told: a body that stands, facing the way of the places.
+
+    Args:
+        seen: Frames in the order of time.
+        axes_xy: Where the person was found in each [m].
+    """
+    way = way_of(np.asarray(axes_xy, np.float64), np.array([one.time_s for one in seen]))
+    body = people().body(np.zeros(0))
+    own, floor_m = body.joints17(upright(body)), float(seen[0].bounds_m[0, 2])
+    turned = np.array([own @ about_z(heading).T for heading in way.heading])
+    spots = np.column_stack([way.xy, np.full(len(way.xy), floor_m)])
+    xyz = (turned + spots[:, None])[:, None]
+    return Joints(xyz, np.full(xyz.shape[:3], _STANDING_M))
 
 
 def best_walk(

@@ -28,6 +28,7 @@ from rfgs_core.run import Run
 from rfgs_core.run import limbs as limbs_of_run
 from rfgs_core.run.folder import LIMBS_FILE
 from rfgs_core.run.limbs import frames_read, read_limbs
+from rfgs_core.run.training import train_sequence
 from rfgs_core.settings import TrainConfig
 
 CONFIG = TrainConfig(num_gaussians=400, solver_steps=2, iterations=0, posture="standing")
@@ -131,6 +132,39 @@ def test_without_a_network_evidence_tells_who_walks(
         pelvis = limbs.people.joints17()[:, 0, 0, :2]
         found = np.array([track.axes_xy[0] for track in limbs.tracks])
         assert np.abs(pelvis - found).max() < 0.1
+
+
+def test_of_two_people_one_walks_and_the_other_stands(
+    tiny_dataset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each is asked for without the echoes of the other; a network would tell the second."""
+    heard: list[np.ndarray] = []
+    body = people().body(np.zeros(0))
+    neutral = body.joints17(Pose(body.heads[0], body.neutral))
+
+    def tell(seen: list, axes_xy: np.ndarray, *_: object) -> Told | None:
+        heard.append(np.array([one.delta for one in seen]))
+        if len(heard) > 1:
+            return None
+        xyz = neutral + np.column_stack([axes_xy, np.zeros(len(axes_xy))])[:, None, None]
+        return Told(Joints(xyz, np.full((len(seen), 1, 17), 0.06)), 5.0, 1.0)
+
+    monkeypatch.setattr(weights, "OWN", tmp_path / "none")
+    monkeypatch.setattr(limbs_of_run, "long_enough", lambda time_s: True)
+    monkeypatch.setattr(limbs_of_run, "tell", tell)
+    data, out = open_dataset(tiny_dataset), tmp_path / "run"
+    train_sequence(data, data.sequence(), "wifi", [1, 2], CONFIG, out, people=2)
+    limbs = read_limbs(out)
+    assert limbs is not None and len(heard) == 2
+    assert np.abs(heard[0] - heard[1]).max() > 0.0
+    assert (limbs.joints.sigma_m[:, 0] == 0.06).all() and (limbs.joints.sigma_m[:, 1] > 0.1).all()
+    standing = limbs.joints.xyz[:, 1] - limbs.joints.xyz[:, 1, :1]
+    # It stands upright where it was found, whichever way it faces.
+    np.testing.assert_allclose(
+        standing[..., 2], np.broadcast_to(neutral[:, 2] - neutral[0, 2], (2, 17)), atol=1e-9
+    )
+    found = np.array([track.axes_xy[1] for track in limbs.tracks])
+    assert np.linalg.norm(limbs.joints.xyz[:, 1, 0, :2] - found, axis=1).max() < 0.1
 
 
 def test_two_frames_are_too_short_a_walk_for_evidence(

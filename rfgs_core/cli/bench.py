@@ -33,7 +33,8 @@ class BenchArgs:
     network, which saw synthetic radio alone.
     live: six receivers of 1,000 packets/s each over UDP, made here: packets lost, latency, updates.
     fields: the grid search that settings of neural fields, our baselines, were taken from.
-    table1: the paper's table 1, methods x Wi-Fi and mmWave, resumable; see --size and --out.
+    table1, table2, table3: the paper's tables, resumable: methods x Wi-Fi and mmWave; its recipe
+    less one part at a time; Wi-Fi, mmWave, UWB and SAR beside baselines. See --size and --out.
     scaling: how the cost of the fast tracer and of propagation grows over two decades of facets,
     Gaussians, links and subcarriers: CPU seconds and exponents, some two minutes.
     performance: a page of how fast the kernels are here, some five minutes; see --out.
@@ -53,6 +54,8 @@ class BenchArgs:
             "live",
             "fields",
             "table1",
+            "table2",
+            "table3",
             "scaling",
             "performance",
         ]
@@ -83,12 +86,13 @@ class BenchArgs:
     """Adam steps for the parts `training` (left out: until the loss stands still) and `fields`."""
     device: Device = "cpu"
     """Where the parts `propagation` and `training` run: cpu, or cuda, the current GPU."""
-    size: Literal["smoke", "paper-cpu"] = "smoke"
-    """For the part `table1`: one scene, or the study's four with the paper's steps (hours)."""
+    size: Literal["smoke", "paper-cpu", "full"] = "smoke"
+    """For the paper's tables: one scene; the study's four with the paper's steps (hours); or these
+    with five seeds and larger neural fields (days)."""
     seeds: int | None = None
-    """For the part `table1`: trainings of each method; left out: what the size has."""
+    """For the paper's tables: trainings of each method; left out: what the size has."""
     out: Path | None = None
-    """For the part `table1`: folder of its datasets, runs and cells; what is finished is kept. For
+    """For the paper's tables: folder of datasets, runs and cells; what is finished is kept. For
     the part `performance`: the page; left out, it is printed."""
     json: Path | None = None
     """Also write the numbers to this file: one flat dictionary, except for `performance`."""
@@ -308,10 +312,10 @@ def run(args: BenchArgs) -> int:
 
         call("dataset_factory", "tracers", *(["--json", args.json] if args.json else []))
         return 0
-    if args.part == "table1":
-        from rfgs_core.cli.table1 import make_table1
+    if args.part in ("table1", "table2", "table3"):
+        from rfgs_core.cli.tables import make_table
 
-        return make_table1(args.out, args.size, args.seeds, args.json)
+        return make_table(args.part, args.out, args.size, args.seeds, args.json)
     if args.part == "performance":
         return _performance(args)
     if args.part in ("propagation", "raster", "blender"):

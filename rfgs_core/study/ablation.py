@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from rfgs_core.settings import Density, Part
 from rfgs_core.study.table import number
 
 
@@ -18,20 +19,33 @@ class Variant:
     """Name of its folder."""
     label: str
     """The paper's words."""
-    options: tuple[str, ...]
-    """What `rfgs train` is told."""
     claimed_db: float
     """Picture PSNR that the paper claims; nobody has reproduced it."""
+    without: tuple[Part, ...] = ()
+    """Parts that are left out."""
+    density: Density | None = None
+    """How Gaussians come and go; None: as the paper says."""
+
+    @property
+    def method(self) -> str:
+        """Its name in the paper's tables."""
+        return "paper" if self.name == "full" else f"paper_{self.name}"
+
+    @property
+    def options(self) -> tuple[str, ...]:
+        """What `rfgs train` is told."""
+        density = ("--density", self.density) if self.density else ()
+        return (*(("--without", *self.without) if self.without else ()), *density)
 
 
 VARIANTS = (
-    Variant("full", "full", (), 33.7),
-    Variant("no_weights", "w/o RF-weighted loss", ("--without", "rf_weights"), 28.3),
-    Variant("no_densify", "w/o adaptive densify", ("--without", "densify"), 30.1),
-    Variant("no_gradients", "w/o feature gradients", ("--without", "feature_gradients"), 29.8),
-    Variant("no_pruning", "w/o pruning", ("--without", "prune"), 31.2),
-    Variant("fixed", "fixed density", ("--density", "none"), 26.9),
-    Variant("standard", "standard 3DGS densify", ("--density", "3dgs"), 24.1),
+    Variant("full", "full", 33.7),
+    Variant("no_weights", "w/o RF-weighted loss", 28.3, without=("rf_weights",)),
+    Variant("no_densify", "w/o adaptive densify", 30.1, without=("densify",)),
+    Variant("no_gradients", "w/o feature gradients", 29.8, without=("feature_gradients",)),
+    Variant("no_pruning", "w/o pruning", 31.2, without=("prune",)),
+    Variant("fixed", "fixed density", 26.9, density="none"),
+    Variant("standard", "standard 3DGS densify", 24.1, density="3dgs"),
 )
 
 

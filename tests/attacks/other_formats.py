@@ -27,8 +27,8 @@ from rfgs_core.live.counts import Counts
 from rfgs_core.live.records import READERS, Packets, decode
 from rfgs_core.run import open_run
 from rfgs_core.seals import write_sealed_json
-from rfgs_core.study.table1 import SIZES, cells, settings_of, stored
-from rfgs_core.study.table1_rows import method_rows, method_table
+from rfgs_core.study.cell_rows import method_rows, method_table
+from rfgs_core.study.cells import SIZES, TABLES, cells, settings_of, stored
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "rfgs_core/live"))
 from sending import esp32_stream, feitcsi_stream, picoscenes_stream
@@ -148,7 +148,7 @@ def _reports(folder: Path) -> list[Format]:
 def _cell(folder: Path) -> Format:
     """One method of table 1."""
     size = SIZES["smoke"]
-    cell = cells(size, ("wifi",), 1)[0]
+    cell = cells(TABLES["table1"], size, 1)[0]
     groups = {"geometry": {"f05": 0.5, "centroid_m": None}, "rf": {"element_snr_db": 3.0}}
     made = {**asdict(cell), "settings": settings_of(cell, size), "train_s": 1.5}
     file = folder / f"cells/{cell.name}.json"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cells of table 1: methods × radios × seeds on generated scenes, each in a file of its own."""
+"""Cells of the paper's tables: methods × radios × seeds on generated scenes, a file each."""
 
 from __future__ import annotations
 
@@ -16,17 +16,23 @@ from rfgs_core.evaluate.field_run import Given, fit_fields
 from rfgs_core.evaluate.metrics import METHOD, evaluate_method, evaluate_run
 from rfgs_core.evaluate.provenance import hardware, now, versions
 from rfgs_core.evaluate.residual import GAUSSIANS_ALONE
+from rfgs_core.evaluate.scene import EvaluatedRun
 from rfgs_core.links import refuse_link
 from rfgs_core.measure.observations import observe
 from rfgs_core.neural.settings import FieldSettings
+from rfgs_core.radio import preset
 from rfgs_core.records import record
+from rfgs_core.render.bench import frames_per_second
+from rfgs_core.run import Run
 from rfgs_core.run.training import train_sequence
 from rfgs_core.seals import read_sealed_json, write_sealed_json
 from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import TrainConfig, TrainOptions
+from rfgs_core.study.ablation import VARIANTS
 from rfgs_core.study.cases import SCENES
 
-SizeName = Literal["smoke", "paper-cpu"]
+SizeName = Literal["smoke", "paper-cpu", "full"]
+TableName = Literal["table1", "table2", "table3"]
 
 #: Settings of neural fields that `rfgs bench fields` found best, see `docs/results/fields.json`.
 TUNED: dict[tuple[str, str], dict[str, Any]] = {
@@ -64,6 +70,7 @@ class Size:
 SIZES: dict[SizeName, Size] = {
     "smoke": Size(("living_room_walk",), 2, "10:40:30", 200, 64, 500, 32, 2),
     "paper-cpu": Size(tuple(SCENES), 3, None, 2000, 128, 10_000, 64, 0),
+    "full": Size(tuple(SCENES), 5, None, 10_000, 256, 10_000, 64, 0),
 }
 
 #: Methods of ours that are trained, and the options that make them.
@@ -71,6 +78,13 @@ TRAINED: dict[str, TrainOptions] = {
     "rfgs": TrainOptions(),
     "rfgs_no_limbs": TrainOptions(limbs="off"),
     "paper": TrainOptions(recipe="paper", objective="paper", limbs="off"),
+}
+#: The paper's recipe whole and less one part at a time; whole, it is table 1's `paper`.
+ABLATED: dict[str, TrainOptions] = {
+    row.method: TrainOptions(
+        recipe="paper", objective="paper", limbs="off", without=row.without, density=row.density
+    )
+    for row in VARIANTS
 }
 #: Methods with neural fields.
 FIELDS: dict[str, FieldSettings] = {
@@ -86,13 +100,30 @@ FIELDS: dict[str, FieldSettings] = {
 
 
 @dataclass(frozen=True)
+class Table:
+    """What one of the paper's tables compares."""
+
+    radios: tuple[str, ...]
+    """Radios."""
+    methods: tuple[str, ...]
+    """Names of `TRAINED`, `ABLATED` or `FIELDS`."""
+
+
+TABLES: dict[TableName, Table] = {
+    "table1": Table(("wifi", "mmwave"), (*TRAINED, *FIELDS)),
+    "table2": Table(("wifi",), tuple(ABLATED)),
+    "table3": Table(("wifi", "mmwave", "uwb", "sar"), ("rfgs",)),
+}
+
+
+@dataclass(frozen=True)
 class Cell:
     """One method on one scene and radio with one seed."""
 
     scene: str
     radio: str
     method: str
-    """A name of `TRAINED` or `FIELDS`; `rfgs` brings all baselines that need no training."""
+    """A name of `TRAINED`, `ABLATED` or `FIELDS`; `rfgs` brings all baselines without training."""
     seed: int
 
     @property
@@ -106,12 +137,18 @@ class Cell:
         return f"{self.scene}-{self.radio}-{self.method}-seed{self.seed}"
 
     def generate(self, out: Path, size: Size) -> tuple[str, ...]:
-        """Arguments of the command that makes the dataset: fast tracer, people over walls too."""
-        scene = SCENES[self.scene]
+        """Arguments of the command that makes the dataset: fast tracer, people over walls too.
+
+        The fast tracer's antennas stand still, and Sionna RT traces those that move. Where a radio
+        is not traced over walls, people are heard directly.
+        """
+        scene, radio = SCENES[self.scene], preset(self.radio)
+        depth = min(max(2, scene.least_depth), radio.deepest)
+        tracer = "sionna" if radio.antennas_move else "fast"
         return (
             *("dataset_factory", "generate", self.scene, "--radio", self.radio),
-            *("--frames", size.frames or scene.frames, "--no-images", "--tracer", "fast"),
-            *("--depth", str(max(2, scene.least_depth)), "--out", str(out / self.dataset)),
+            *("--frames", size.frames or scene.frames, "--no-images", "--tracer", tracer),
+            *("--depth", str(depth), "--out", str(out / self.dataset)),
         )
 
 
@@ -141,16 +178,22 @@ class _Made(Struct):
     settings: dict[str, Any]
     methods: dict[str, _Groups]
     train_s: float
+    gaussians: int | None = None
+    render_fps: float | None = None
 
 
-def cells(size: Size, radios: tuple[str, ...], seeds: int) -> list[Cell]:
-    """All cells: first one seed of everything, of each dataset ours first."""
+def cells(table: Table, size: Size, seeds: int) -> list[Cell]:
+    """All cells: first one seed of everything, of each dataset ours first.
+
+    A scene that nobody is heard in by as few bounces as a radio is traced over has no cell of it.
+    """
     return [
         Cell(scene, radio, method, seed)
         for seed in range(seeds)
         for scene in size.scenes
-        for radio in radios
-        for method in (*TRAINED, *FIELDS)
+        for radio in table.radios
+        if SCENES[scene].least_depth <= preset(radio).deepest
+        for method in table.methods
     ]
 
 
@@ -184,7 +227,8 @@ def settings_of(cell: Cell, size: Size) -> dict[str, Any]:
 
 def train_config(cell: Cell, size: Size) -> TrainConfig:
     """Settings of a training, or of what a neural field takes from one."""
-    options = TRAINED.get(cell.method, TrainOptions(recipe="paper", objective="paper"))
+    fields = TrainOptions(recipe="paper", objective="paper")
+    options = {**TRAINED, **ABLATED}.get(cell.method, fields)
     steps = size.paper_steps if options.recipe == "paper" else None
     config = TrainConfig.chosen(replace(options, seed=cell.seed), iterations=steps)
     if options.recipe == "paper":
@@ -207,14 +251,15 @@ def make(cell: Cell, out: Path, size: Size) -> dict[str, Any]:
     """
     dataset = open_dataset(out / cell.dataset)
     maker = _field if cell.method in FIELDS else _trained
-    groups, train_s = maker(cell, dataset, out, size)
+    run, groups = maker(cell, dataset, out, size)
     result = {
         **asdict(cell),
         "settings": settings_of(cell, size),
         "dataset": dataset.fingerprint,
         "trace_depth": dataset.sequence().trace_depth(cell.radio),
         "methods": groups,
-        "train_s": train_s,
+        "train_s": run.config.train_s,
+        **_rendering(run),
         "hardware": hardware(),
         "versions": versions(),
         "date": now(),
@@ -223,7 +268,17 @@ def make(cell: Cell, out: Path, size: Size) -> dict[str, Any]:
     return result
 
 
-def _trained(cell: Cell, dataset: Dataset, out: Path, size: Size) -> tuple[dict[str, Any], float]:
+def _rendering(run: EvaluatedRun) -> dict[str, Any]:
+    """How many moving Gaussians the first frame has, and how fast it is drawn."""
+    if not isinstance(run, Run):
+        return {}
+    gaussians = run.moving(run.frames[0])
+    return {"gaussians": len(gaussians), "render_fps": frames_per_second(gaussians)}
+
+
+def _trained(
+    cell: Cell, dataset: Dataset, out: Path, size: Size
+) -> tuple[EvaluatedRun, dict[str, Any]]:
     """Gaussians; with `rfgs` all baselines that are looked at the same frames."""
     sequence = dataset.sequence()
     (out / "runs").mkdir(parents=True, exist_ok=True)
@@ -232,7 +287,7 @@ def _trained(cell: Cell, dataset: Dataset, out: Path, size: Size) -> tuple[dict[
         out / "runs" / cell.name,
     )  # fmt: skip
     if cell.method != "rfgs":
-        return _named(cell.method, evaluate_method(run)), run.config.train_s
+        return run, _named(cell.method, evaluate_method(run))
     metrics = evaluate_run(run, oracle=False)
     own = {group: metrics[group] for group in ("geometry", "rf")}
     others = {
@@ -240,10 +295,12 @@ def _trained(cell: Cell, dataset: Dataset, out: Path, size: Size) -> tuple[dict[
         for name, values in metrics["baselines"].items()
         if any(value is not None for group in own for value in values[group].values())
     }
-    return {"rfgs": own, **others}, run.config.train_s
+    return run, {"rfgs": own, **others}
 
 
-def _field(cell: Cell, dataset: Dataset, out: Path, size: Size) -> tuple[dict[str, Any], float]:
+def _field(
+    cell: Cell, dataset: Dataset, out: Path, size: Size
+) -> tuple[EvaluatedRun, dict[str, Any]]:
     """A neural field per frame."""
     sequence = dataset.sequence()
     people = sum(1 for row in sequence.instances if row["class"] == "person")
@@ -253,7 +310,7 @@ def _field(cell: Cell, dataset: Dataset, out: Path, size: Size) -> tuple[dict[st
         dataset, cell.radio, sequence.frames, field_settings(cell, size), config,
         lambda frame, _: _given(dataset.path, cell.radio, frame, shared), out,
     )  # fmt: skip
-    return _named(cell.method, evaluate_method(run)), run.config.train_s
+    return run, _named(cell.method, evaluate_method(run))
 
 
 def _named(method: str, groups: dict[str, Any]) -> dict[str, Any]:

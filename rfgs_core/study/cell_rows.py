@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Table 1 as rows and as Markdown: means and deviations over seeds beside what the paper claims."""
+"""Cells as rows and as Markdown: means and deviations over seeds beside what the paper claims."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from rfgs_core.study.ablation import VARIANTS
+from rfgs_core.study.cells import ABLATED, FIELDS, TRAINED
 from rfgs_core.study.table import number
-from rfgs_core.study.table1 import FIELDS, TRAINED
 
 #: Columns: group and key of the metrics, header, format.
 COLUMNS = (
@@ -21,8 +22,15 @@ COLUMNS = (
     ("rf", "element_snr_db", "elements [dB]", ".1f"),
     ("rf", "subcarrier_snr_db", "subcarriers [dB]", ".1f"),
 )
+#: Of what is trained alone: key, header, format.
+TRAINED_COLUMNS = (
+    ("gaussians", "Gaussians", ".0f"),
+    ("render_fps", "drawn per second", ".0f"),
+    ("train_s", "training [s]", ".0f"),
+)
 #: Picture PSNR that the paper claims [dB].
 CLAIMED_DB = {
+    **{(row.method, "wifi"): row.claimed_db for row in VARIANTS},
     ("rfgs", "wifi"): 33.7,
     ("nerf", "wifi"): 21.4,
     ("mip", "wifi"): 23.1,
@@ -35,6 +43,7 @@ _LABELS = {
     "rfgs": "RF-GS",
     "rfgs_no_limbs": "RF-GS without limbs",
     "paper": "paper's recipe, from our start",
+    **{row.method: f"paper's recipe, {row.label}" for row in VARIANTS[1:]},
     "nerf": "RF-NeRF",
     "mip": "RF-MipNeRF",
     "ngp": "RF-InstantNGP",
@@ -50,7 +59,7 @@ class MethodRow:
     method: str
     seeds: int
     mean: dict[str, float | None]
-    """Means over seeds by column key, and `train_s`."""
+    """Means over seeds by key of a column."""
     deviation: dict[str, float | None]
     """Sample deviation over seeds; None of fewer than two."""
     claimed_psnr_db: float | None
@@ -64,7 +73,7 @@ def method_rows(results: Iterable[Mapping[str, Any]]) -> list[MethodRow]:
         for method, values in result["methods"].items():
             row = {key: values[group].get(key) for group, key, *_ in COLUMNS}
             own = method == result["method"]
-            row["train_s"] = result["train_s"] if own else None
+            row |= {key: result.get(key) if own else None for key, *_ in TRAINED_COLUMNS}
             groups.setdefault((result["scene"], result["radio"], method), []).append(row)
     return [_row(*names, rows) for names, rows in groups.items()]
 
@@ -91,22 +100,45 @@ def label(method: str) -> str:
 
 
 def method_table(rows: Sequence[MethodRow]) -> str:
-    """One table per scene and radio."""
+    """One table per scene and radio, below it who is strongest beside ours."""
     titles = [title for _, _, title, _ in COLUMNS]
-    head = ("method", *titles, "training [s]", "claimed PSNR [dB], not reproduced")
+    titles += [title for _, title, _ in TRAINED_COLUMNS]
+    head = ("method", *titles, "claimed PSNR [dB], not reproduced")
     lines: list[str] = []
     for scene, radio in dict.fromkeys((row.scene, row.radio) for row in rows):
         lines += [f"{scene}, `{radio}`:", "", f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
         here = [row for row in rows if (row.scene, row.radio) == (scene, radio)]
         lines += [f"| {' | '.join(_cells(row))} |" for row in sorted(here, key=_order)]
-        lines.append("")
+        lines += ["", *strongest(here)]
     return "\n".join([*lines, _NOTES, ""])
+
+
+def strongest(rows: Sequence[MethodRow]) -> list[str]:
+    """RF-GS beside the best of whatever is not ours, per column; nothing where either is missing.
+
+    Args:
+        rows: Rows of one scene and radio.
+    """
+    ours = next((row for row in rows if row.method == "rfgs"), None)
+    if ours is None:
+        return []
+    others = [row for row in rows if row.method.partition(", ")[0] not in TRAINED]
+    parts = []
+    for _, key, title, form in COLUMNS:
+        sign = -1.0 if key == "centroid_m" else 1.0
+        ranked = [(sign * v, row) for row in others if (v := row.mean[key]) is not None]
+        own = ours.mean[key]
+        if own is None or not ranked:
+            continue
+        value, best = max(ranked, key=lambda pair: pair[0])
+        parts.append(f"{title} {label(best.method)} {sign * value:{form}} (RF-GS {own:{form}})")
+    return [f"Strongest beside RF-GS: {'; '.join(parts)}.", ""] if parts else []
 
 
 def _order(row: MethodRow) -> int:
     """Ours, neural fields, then what needs no training."""
     name = row.method.partition(", ")[0]
-    known = (*TRAINED, *FIELDS)
+    known = (*TRAINED, *ABLATED, *FIELDS)
     return known.index(name) if name in known else len(known)
 
 
@@ -115,7 +147,7 @@ def _cells(row: MethodRow) -> list[str]:
     return [
         label(row.method),
         *shown,
-        _with(row, "train_s", ".0f"),
+        *(_with(row, key, form) for key, _, form in TRAINED_COLUMNS),
         number(row.claimed_psnr_db, ".1f"),
     ]
 
@@ -131,5 +163,6 @@ def _with(row: MethodRow, key: str, form: str) -> str:
 _NOTES = """\
 Mean and sample deviation over seeds of trainings. Elements and subcarriers: signal over error of
 csi − csi_static on entries that no method has seen; methods with Gaussians or fields carry on what
-is left of the visible channel as well, and stand in a second row without that. The claimed PSNR is
+is left of the visible channel as well, and stand in a second row without that. Drawn per second:
+the moving Gaussians of the first frame at 256 × 256 pixels, on this machine. The claimed PSNR is
 that of pictures, a quantity that none of these columns is."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Table 1 has every method once, keeps what is finished, and says what the cells say."""
+"""The paper's tables have every method once, keep what is finished, and say what the cells say."""
 
 from __future__ import annotations
 
@@ -12,8 +12,20 @@ import pytest
 from rfgs_core.cli.bench import BenchArgs, run
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json
-from rfgs_core.study.table1 import FIELDS, SIZES, TRAINED, Cell, Size, cells, make, stored
-from rfgs_core.study.table1_rows import method_rows, method_table
+from rfgs_core.study.ablation import VARIANTS
+from rfgs_core.study.cell_rows import method_rows, method_table, strongest
+from rfgs_core.study.cells import (
+    FIELDS,
+    SIZES,
+    TABLES,
+    TRAINED,
+    Cell,
+    Size,
+    cells,
+    make,
+    settings_of,
+    stored,
+)
 
 TINY = Size(("living_room_walk",), 2, "1:2", 3, 8, 2, 6, 0)
 
@@ -31,7 +43,7 @@ def result(seed: int, f10: float, **others: float) -> dict[str, Any]:
 
 
 def test_every_cell_once_and_one_seed_of_everything_first() -> None:
-    chosen = cells(SIZES["smoke"], ("wifi", "mmwave"), 2)
+    chosen = cells(TABLES["table1"], SIZES["smoke"], 2)
     assert len(chosen) == len({cell.name for cell in chosen}) == 2 * 2 * (len(TRAINED) + 12)
     assert [cell.seed for cell in chosen] == sorted(cell.seed for cell in chosen)
     assert len({cell.dataset for cell in chosen}) == 2
@@ -52,9 +64,41 @@ def test_rows_are_means_over_seeds_beside_the_claim() -> None:
     assert ours.mean["centroid_m"] is None
     text = method_table(rows)
     assert "| RF-GS | 0.425 ± 0.035 | 0.850 ± 0.071 |" in text and "| clean |" in text
+    assert "F10 clean 0.400 (RF-GS 0.850)" in text
 
 
-@pytest.mark.parametrize("method", ["paper", "nerf_features", "ngp_propagation_prior"])
+def test_the_strongest_of_others_is_named_even_where_it_wins() -> None:
+    rows = method_rows([result(0, 0.8, clean=0.4, omp=0.9)])
+    (line, _) = strongest(rows)
+    assert "F10 omp 0.900 (RF-GS 0.800)" in line and "centroid" not in line
+    assert strongest([row for row in rows if row.method != "rfgs"]) == []
+
+
+def test_ablations_differ_by_what_they_leave_out() -> None:
+    chosen = cells(TABLES["table2"], SIZES["smoke"], 1)
+    assert len(chosen) == len(VARIANTS) == 7
+    train = [settings_of(cell, SIZES["smoke"])["train"] for cell in chosen]
+    # The whole recipe is the row of table 1, so that its cell is shared.
+    assert chosen[0].method == "paper" and train[0]["without"] == []
+    for other in train[1:]:
+        changed = {key for key, value in other.items() if value != train[0][key]}
+        assert changed in ({"without"}, {"density"})
+    assert len({str(one) for one in train}) == 7
+
+
+def test_every_radio_is_traced_as_deep_as_it_can_be() -> None:
+    chosen = cells(TABLES["table3"], SIZES["paper-cpu"], 1)
+    assert {cell.radio for cell in chosen} == {"wifi", "mmwave", "uwb", "sar"}
+    # Behind a wall nobody is heard directly, and these two are traced no deeper.
+    behind = {cell.radio for cell in chosen if cell.scene == "through_wall"}
+    assert behind == {"wifi", "mmwave"}
+    sar = Cell("living_room_walk", "sar", "rfgs", 0).generate(Path("x"), SIZES["smoke"])
+    assert sar[sar.index("--depth") + 1] == "1" and sar[sar.index("--tracer") + 1] == "sionna"
+
+
+@pytest.mark.parametrize(
+    "method", ["paper", "paper_fixed", "nerf_features", "ngp_propagation_prior"]
+)
 def test_a_cell_is_kept_until_its_settings_change(
     method: str, tiny_dataset: Path, tmp_path: Path
 ) -> None:
@@ -69,6 +113,11 @@ def test_a_cell_is_kept_until_its_settings_change(
     assert stored(cell, tmp_path, other) is None
     again = read_json(tmp_path / "cells" / f"{cell.name}.json")
     assert again["settings"]["train"]["seed"] == 0 and again["dataset"]
+    if method.startswith("paper"):
+        assert again["gaussians"] > 0 and again["render_fps"] > 0.0
+        # A run that is there already gives the same row, whenever it was cut off.
+        (tmp_path / "cells" / f"{cell.name}.json").unlink()
+        assert make(cell, tmp_path, TINY)["methods"] == made["methods"]
 
 
 def test_a_table_without_a_folder_is_refused() -> None:

@@ -25,7 +25,9 @@ RAMPED = {
 
 
 #: Powers within this span tell nothing apart: bodies whose limbs were told reflect alike [dB].
-_LEAST_SPAN_DB = 0.5
+_LEAST_SPAN_DB = 3.0
+#: Display colours within this are one, as where no picture was fitted.
+_LEAST_COLOUR = 1e-4
 
 #: What the colours of a cloud say is kept with it, for the legend.
 SCALE = "rfgs_scale"
@@ -124,13 +126,20 @@ def encoded_colors(mesh: bpy.types.Mesh) -> np.ndarray:
 
 
 def _chosen(meshes: Sequence[bpy.types.Mesh]) -> str:
-    """Power where it tells Gaussians of a frame apart, or nothing does; else display colours."""
+    """Power where it tells Gaussians of a frame apart, else display colours, else features."""
     powers = [attributes.get(mesh, "rf_power_db") for mesh in meshes]
     known = [values[np.isfinite(values)] for values in powers if values is not None]
     spans_db = [float(np.ptp(values)) for values in known if len(values)]
+    if max(spans_db, default=0.0) >= _LEAST_SPAN_DB:
+        return "POWER"
     colours = [float(np.ptp(encoded_colors(mesh))) for mesh in meshes if len(mesh.vertices)]
-    plain = max(colours, default=0.0) < 1e-4
-    return "POWER" if spans_db and (max(spans_db) >= _LEAST_SPAN_DB or plain) else "DISPLAY"
+    if max(colours, default=0.0) >= _LEAST_COLOUR:
+        return "DISPLAY"
+    tables = [table for table in map(_features, meshes) if table is not None and len(table)]
+    alike = len({table.shape[1] for table in tables}) == 1
+    if alike and any(np.ptp(table, axis=0).any() for table in tables):
+        return "FEATURES"
+    return "POWER" if spans_db else "DISPLAY"
 
 
 def _needed(meshes: Sequence[bpy.types.Mesh], name: str, remedy: str) -> list[np.ndarray]:

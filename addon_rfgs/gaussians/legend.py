@@ -29,6 +29,8 @@ _MODES: dict[str, tuple[str, tuple[float, int, str] | None]] = {
     "COVERAGE": ("Path gain to an isotropic antenna", (1.0, 0, "dB")),
 }
 _STEPS = 48
+#: Ends of a scale that spans less are written with a decimal [dB].
+_FINE_DB = 10.0
 #: Place and size of the bar, from the lower left corner [px].
 _LEFT_PX, _BOTTOM_PX, _WIDTH_PX, _HEIGHT_PX, _TEXT_PX = 24, 40, 220, 12, 12
 #: How far one legend stands above another [px].
@@ -64,6 +66,8 @@ def legend_of(scale: Scale) -> Legend:
         return Legend(title, None, None)
     factor, decimals, name = unit
     low, high = (-180.0, 180.0) if scale.mode == "PHASE" else (scale.low, scale.high)
+    if name == "dB" and high - low < _FINE_DB:
+        decimals = 1
     ends = tuple(f"{factor * end:.{decimals}f} {name}".strip() for end in (low, high))
     steps = np.linspace(0.0, 1.0, _STEPS)
     hues = scale.mode == "PHASE"

@@ -36,7 +36,7 @@ COLOR_MODES = [
     (
         "AUTO",
         "Automatic",
-        "Reflected power where it differs, else display colours",
+        "Reflected power where it spans 3 dB, else display colours, else features",
         0,
     ),
     ("DISPLAY", "Display RGB", "Colours fitted to pictures, for display alone", 1),

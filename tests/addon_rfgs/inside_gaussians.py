@@ -274,6 +274,24 @@ def test_power_that_is_the_same_everywhere_is_no_colour(settings) -> None:
     assert np.ptp(colors(5)) > 0.1
 
 
+def test_features_colour_what_neither_power_nor_pictures_tell_apart(settings) -> None:
+    """A scale of one decibel would show differences that mean nothing."""
+    for frame in FRAMES:
+        mesh = cloud(frame).data
+        powers = np.linspace(30.0, 31.0, len(mesh.vertices), dtype=np.float32)
+        mesh.attributes["rf_power_db"].data.foreach_set("value", powers)
+        for index in range(3):
+            grey = np.zeros(len(mesh.vertices), np.float32)
+            mesh.attributes[f"ply_f_dc_{index}"].data.foreach_set("value", grey)
+    settings.color_by = "DISPLAY"
+    settings.color_by = "AUTO"
+    assert Scale.of(cloud(5).data).mode == "FEATURES"
+    assert np.ptp(colors(5)) > 0.1
+    settings.color_by = "POWER"
+    low, high = legend_of(Scale.of(cloud(5).data)).ends or ("", "")
+    assert "." in low and "." in high and low != high
+
+
 def test_a_comparison_is_kept_until_other_gaussians_come(settings) -> None:
     scene = bpy.context.scene
     assert kept_result(scene) == []

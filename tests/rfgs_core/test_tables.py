@@ -76,6 +76,7 @@ def test_the_strongest_of_others_is_named_even_where_it_wins() -> None:
 
 def test_ablations_differ_by_what_they_leave_out() -> None:
     chosen = cells(TABLES["table2"], SIZES["smoke"], 1)
+    assert chosen.pop(0).method == "rfgs"
     assert len(chosen) == len(VARIANTS) == 7
     train = [settings_of(cell, SIZES["smoke"])["train"] for cell in chosen]
     # The whole recipe is the row of table 1, so that its cell is shared.

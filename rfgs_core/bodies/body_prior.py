@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the surface of a body is likely before the radio is asked: one who stands, or sits.
+"""Where the surface of a body is likely before the radio is asked: one who stands, sits or lies.
 
 A body is a few limbs, straight lines with a normal distribution around them. One who stands is a
-single upright limb; one who sits has a trunk, two thighs and two shins, and knees that point
-somewhere.
+single upright limb, one who lies a single level one; one who sits has a trunk, two thighs and two
+shins, and knees that point somewhere.
 """
 
 from __future__ import annotations
@@ -25,6 +25,8 @@ SEAT_M = 0.5
 TRUNK_RADIUS_M, THIGH_RADIUS_M, SHIN_RADIUS_M = 0.18, 0.09, 0.08
 #: From the axis to the knees, and from the middle to each leg [m].
 THIGH_M, LEG_SPREAD_M = 0.42, 0.10
+#: Length of the line in somebody who lies, arms and legs spread, and deviation around it [m].
+LYING_LENGTH_M, LYING_RADIUS_M = 1.5, 0.14
 
 
 @dataclass(frozen=True)
@@ -32,9 +34,12 @@ class Bodies:
     """Bodies on the ground and how they hold themselves."""
 
     axes_xy: Float64[np.ndarray, "body 2"]
-    """Where head and trunk are, seen from above [m]."""
+    """Where head and trunk are, the middle of who lies, seen from above [m]."""
     knees_rad: Float64[np.ndarray, "body"]
-    """Where the knees of who sits point, from x towards y [rad]; NaN of who stands."""
+    """Where the knees of who sits point, from x towards y [rad]; NaN of everybody else."""
+    lying: Float64[np.ndarray, "body 2"] | None = None
+    """Of who lies the way of the body, from x towards y, head or feet ahead [rad], and its height
+    above the ground [m]; NaN of everybody else, None where nobody lies."""
 
     @staticmethod
     def standing(axes_xy: Float[np.ndarray, "body 2"]) -> Bodies:
@@ -49,9 +54,20 @@ class Bodies:
         """Who sits."""
         return np.isfinite(self.knees_rad)
 
+    @property
+    def lies(self) -> Bool[np.ndarray, "body"]:
+        """Who lies."""
+        return np.isfinite(self.ways[:, 0])
+
+    @property
+    def ways(self) -> Float64[np.ndarray, "body 2"]:
+        """`lying` with a row for everybody."""
+        return np.full((len(self), 2), np.nan) if self.lying is None else self.lying
+
     def only(self, body: int) -> Bodies:
         """One of them."""
-        return Bodies(self.axes_xy[[body]], self.knees_rad[[body]])
+        lying = None if self.lying is None else self.lying[[body]]
+        return Bodies(self.axes_xy[[body]], self.knees_rad[[body]], lying)
 
 
 @dataclass(frozen=True)
@@ -84,6 +100,11 @@ def _limbs(bodies: Bodies, body: int) -> list[_Limb]:
     """The limbs of one body; its feet stand on the ground, z = 0."""
     axis = np.append(bodies.axes_xy[body], 0.0)
     up = np.array([0.0, 0.0, 1.0])
+    if bodies.lies[body]:
+        way_rad, height_m = bodies.ways[body]
+        half = 0.5 * LYING_LENGTH_M * np.array([np.cos(way_rad), np.sin(way_rad), 0.0])
+        middle = axis + height_m * up
+        return [_Limb(middle - half, middle + half, LYING_RADIUS_M)]
     if not bodies.sits[body]:
         return [_Limb(axis, axis + STANDING_HEIGHT_M * up, STANDING_RADIUS_M)]
     angle = bodies.knees_rad[body]

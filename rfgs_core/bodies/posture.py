@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a body stands or sits, and where its knees point: the likeliest of a few.
+"""Whether a body stands or sits, and where its knees point: the likeliest of a few postures.
 
 Gaussians of equal expected power, drawn as for the fit, make the channel of a device pair a normal
 vector of covariance s (A Aᴴ + n I), A their responses. Its likelihood, at the best level s and
@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Complex64, Float, Float64
@@ -21,7 +21,7 @@ from scipy.linalg import eigh
 from rfgs_core.bodies.body_prior import Bodies, outward_normals
 from rfgs_core.bodies.localise import PairMaps, pair_maps
 from rfgs_core.bodies.separation import each_alone
-from rfgs_core.bodies.start import StartCells
+from rfgs_core.bodies.start import StartCells, StartDensity
 from rfgs_core.measure.observations import Observations
 from rfgs_core.model.head import SHARPNESS, dimming
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
@@ -133,82 +133,99 @@ def pair_samples(observations: Observations, seed: int) -> list[PairSample]:
     return result
 
 
+@dataclass(frozen=True)
+class PostureEvidence:
+    """Entries of a frame, and how likely they are if bodies hold themselves in some way."""
+
+    rounds: list[list[PairSample]]
+    """Of each round, entries of each device pair."""
+    seed: int
+    """Seed of the Gaussians that stand for bodies, the same for all postures."""
+
+    @staticmethod
+    def of(observations: Observations, seed: int) -> PostureEvidence:
+        """Draws entries: of few device pairs in several rounds."""
+        pairs = max(len(observations.pairs[1]), 1)
+        rounds = int(np.clip(ENTRIES // (pairs * MOST_ENTRIES), 1, MOST_ROUNDS))
+        drawn = [pair_samples(observations, sub_seed(seed, number)) for number in range(rounds)]
+        return PostureEvidence(drawn, seed)
+
+    def of_density(self, density: StartDensity, bodies: Bodies) -> Float64[np.ndarray, "pair"]:
+        """Log evidence of each device pair for bodies whose Gaussians are drawn from a density."""
+        logs = []
+        for number, samples in enumerate(self.rounds):
+            points = density.draw(GAUSSIANS, np.random.default_rng(sub_seed(self.seed, number)))
+            normals = outward_normals(points, bodies)
+            logs.append([sample.log_likelihood(points, normals) for sample in samples])
+        return np.mean(logs, axis=0)
+
+    def lead(self, log: Float64[np.ndarray, "pair"], other: Float64[np.ndarray, "pair"]) -> float:
+        """By how much one posture is likelier than another, no pair having all the say [nat]."""
+        most = MOST_PER_PAIR if len(self.rounds[0]) >= FEWEST_PAIRS else np.inf
+        return float(np.clip(log - other, -most, most).sum())
+
+    def all(
+        self, likely: Callable[[Bodies], Float64[np.ndarray, "pair"]], bodies: list[Bodies]
+    ) -> list[Float64[np.ndarray, "pair"]]:
+        """Evidence of each; numpy lets other threads go on while it multiplies."""
+        with ThreadPoolExecutor(2) as pool:
+            return list(pool.map(likely, bodies))
+
+
 def tell_postures(
     observations: Observations,
     maps: PairMaps,
-    axes_xy: Float64[np.ndarray, "body 2"],
+    bodies: Bodies,
     config: TrainConfig,
     seed: int,
 ) -> Bodies:
-    """Who stands and who sits, of bodies whose places are known.
+    """Who stands and who sits, of bodies whose places are known and who do not lie.
 
     Args:
         observations: The frame; without phases all are taken to stand.
         maps: Its matched-filter maps.
-        axes_xy: Where bodies are [m].
+        bodies: Where they are and who of them lies.
         config: How reflectivities are fitted, and whether postures are told at all.
         seed: Seed of the Gaussians that stand for bodies.
     """
     if config.posture == "standing" or observations.kind != "complex":
-        return Bodies.standing(axes_xy)
-    knees = np.full(len(axes_xy), np.nan)
+        return Bodies.standing(bodies.axes_xy)
+    axes_xy, knees = bodies.axes_xy, np.full(len(bodies), np.nan)
     for body, alone in enumerate(each_alone(observations, maps, axes_xy, config, seed)):
+        if bodies.lies[body]:
+            continue
         own_maps = maps if alone is observations else pair_maps(alone)
         knees[body] = _knees(alone, own_maps, axes_xy[[body]], sub_seed(seed, "posture", body))
-    return Bodies(axes_xy, knees)
+    return replace(bodies, knees_rad=knees)
 
 
 def _knees(
     observations: Observations, maps: PairMaps, axis_xy: Float[np.ndarray, "1 2"], seed: int
 ) -> float:
     """Where the knees of one body point [rad]; NaN if it stands."""
-    pairs = max(len(observations.pairs[1]), 1)
-    rounds = int(np.clip(ENTRIES // (pairs * MOST_ENTRIES), 1, MOST_ROUNDS))
-    samples = [pair_samples(observations, sub_seed(seed, number)) for number in range(rounds)]
+    evidence = PostureEvidence.of(observations, seed)
     cells = StartCells.around(maps, axis_xy, observations.bounds_m)
 
-    def evidence(bodies: Bodies) -> Float64[np.ndarray, "pair"]:
-        density, logs = cells.density(bodies), []
-        for number, drawn in enumerate(samples):
-            # The same seed for all postures.
-            points = density.draw(GAUSSIANS, np.random.default_rng(sub_seed(seed, number)))
-            normals = outward_normals(points, bodies)
-            logs.append([sample.log_likelihood(points, normals) for sample in drawn])
-        return np.mean(logs, axis=0)
+    def likely(bodies: Bodies) -> Float64[np.ndarray, "pair"]:
+        return evidence.of_density(cells.density(bodies), bodies)
 
     def seated(knees_rad: float) -> Bodies:
         return Bodies(axis_xy, np.array([knees_rad]))
 
-    most = MOST_PER_PAIR if pairs >= FEWEST_PAIRS else np.inf
     step = 2 * np.pi / DIRECTIONS
     angles = step * np.arange(DIRECTIONS)
-    upright, *sitting = _all(evidence, [Bodies.standing(axis_xy), *map(seated, angles)])
-    best = int(np.argmax([_lead(log, upright, most) for log in sitting]))
-    if _lead(sitting[best], upright, most) <= TO_SIT:
+    upright, *sitting = evidence.all(likely, [Bodies.standing(axis_xy), *map(seated, angles)])
+    best = int(np.argmax([evidence.lead(log, upright) for log in sitting]))
+    if evidence.lead(sitting[best], upright) <= TO_SIT:
         return np.nan
     around = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     shifted = [Bodies.standing(axis_xy + far * away) for far in SHIFTS_M for away in around]
-    rivals = [upright, *_all(evidence, shifted)]
-    rival = max(rivals, key=lambda log: _lead(log, upright, most))
-    if _lead(sitting[best], rival, most) <= TO_SIT:
+    rivals = [upright, *evidence.all(likely, shifted)]
+    rival = max(rivals, key=lambda log: evidence.lead(log, upright))
+    if evidence.lead(sitting[best], rival) <= TO_SIT:
         return np.nan
     between = [step * (best - 0.5), step * (best + 0.5)]
     found = [(sitting[best], angles[best])]
-    found += zip(_all(evidence, [*map(seated, between)]), between, strict=True)
-    likeliest = max(found, key=lambda row: _lead(row[0], upright, most))
+    found += zip(evidence.all(likely, [*map(seated, between)]), between, strict=True)
+    likeliest = max(found, key=lambda row: evidence.lead(row[0], upright))
     return float(likeliest[1] % (2 * np.pi))
-
-
-def _lead(
-    log: Float64[np.ndarray, "pair"], other: Float64[np.ndarray, "pair"], most: float
-) -> float:
-    """By how much one posture's evidence is above another's, with at most `most` per pair [nat]."""
-    return float(np.clip(log - other, -most, most).sum())
-
-
-def _all(
-    evidence: Callable[[Bodies], Float64[np.ndarray, "pair"]], bodies: list[Bodies]
-) -> list[Float64[np.ndarray, "pair"]]:
-    """Evidence of each; numpy lets other threads go on while it multiplies."""
-    with ThreadPoolExecutor(2) as pool:
-        return list(pool.map(evidence, bodies))

@@ -11,8 +11,9 @@ from jaxtyping import Float, Float64
 from rfgs_core.bodies.body_prior import Bodies, nearest_axis, surface_prior
 from rfgs_core.bodies.localise import PairMaps
 
-#: Nothing is drawn further than this from all axes along x or y, or above this height [m].
-REACH_M, REACH_HEIGHT_M = 0.8, 2.1
+#: Nothing is drawn further than this from all axes along x or y, where somebody lies, or above
+#: this height [m].
+REACH_M, LYING_REACH_M, REACH_HEIGHT_M = 0.8, 1.1, 2.1
 #: Exponent of the matched filter against the prior, chosen on a room that is not in the demo.
 EVIDENCE_EXPONENT = 0.25
 #: How much of that moves Gaussians from one height to another: what is below or above the
@@ -44,7 +45,7 @@ class StartDensity:
     @staticmethod
     def of(maps: PairMaps, bodies: Bodies, bounds_m: Float64[np.ndarray, "2 3"]) -> StartDensity:
         """The density of some bodies."""
-        return StartCells.around(maps, bodies.axes_xy, bounds_m).density(bodies)
+        return StartCells.of(maps, bodies, bounds_m).density(bodies)
 
     def draw(self, count: int, rng: np.random.Generator) -> Float64[np.ndarray, "count 3"]:
         """Positions [m]: cells by chance, anywhere within them."""
@@ -76,15 +77,22 @@ class StartCells:
     """Upper corner that nothing is drawn beyond [m]."""
 
     @staticmethod
+    def of(maps: PairMaps, bodies: Bodies, bounds_m: Float64[np.ndarray, "2 3"]) -> StartCells:
+        """The cells that bodies may fill as they hold themselves."""
+        reach_m = LYING_REACH_M if bodies.lies.any() else REACH_M
+        return StartCells.around(maps, bodies.axes_xy, bounds_m, reach_m)
+
+    @staticmethod
     def around(
         maps: PairMaps,
         axes_xy: Float[np.ndarray, "body 2"],
         bounds_m: Float64[np.ndarray, "2 3"],
+        reach_m: float = REACH_M,
     ) -> StartCells:
-        """The cells that bodies at `axes_xy` may fill."""
+        """The cells that bodies at `axes_xy` may fill, this far around them [m]."""
         floor_m = bounds_m[0, 2]
-        low = np.maximum([*(axes_xy.min(axis=0) - REACH_M), floor_m], bounds_m[0])
-        high = np.minimum([*(axes_xy.max(axis=0) + REACH_M), floor_m + REACH_HEIGHT_M], bounds_m[1])
+        low = np.maximum([*(axes_xy.min(axis=0) - reach_m), floor_m], bounds_m[0])
+        high = np.minimum([*(axes_xy.max(axis=0) + reach_m), floor_m + REACH_HEIGHT_M], bounds_m[1])
         axes = [np.arange(low[k] + CELL_M / 2, high[k], CELL_M) for k in range(3)]
         points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
         evidence = np.log(maps.at(points.reshape(-1, 3)) + 1e-3).mean(axis=0)

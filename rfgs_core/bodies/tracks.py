@@ -29,7 +29,9 @@ class Tracks:
     time_s: float
     """When [s]."""
     knees_rad: Float64[np.ndarray, "body"]
-    """Where the knees of who sits point, see `Bodies`; NaN of who stands."""
+    """Where the knees of who sits point, see `Bodies`; NaN of everybody else."""
+    lying: Float64[np.ndarray, "body 2"] | None = None
+    """How those lie who do, see `Bodies`; None where nobody does."""
 
     @staticmethod
     def begun(axes_xy: Float64[np.ndarray, "body 2"], time_s: float) -> Tracks:
@@ -40,7 +42,7 @@ class Tracks:
     @property
     def bodies(self) -> Bodies:
         """The bodies as they hold themselves."""
-        return Bodies(self.axes_xy, self.knees_rad)
+        return Bodies(self.axes_xy, self.knees_rad, self.lying)
 
     def expected(
         self, time_s: float
@@ -51,6 +53,15 @@ class Tracks:
         elapsed_s = time_s - self.time_s
         doubt_m_s = np.where(known, TURNING_M_S, FASTEST_M_S)
         return self.axes_xy + elapsed_s * velocity, REACH_M + abs(elapsed_s) * doubt_m_s
+
+    def laid(self, bodies: Bodies) -> Tracks:
+        """The same tracks where some are found to lie, who do not walk.
+
+        Args:
+            bodies: The same bodies, those who lie where they do.
+        """
+        velocity_xy = np.where(bodies.lies[:, None], 0.0, self.velocity_xy)
+        return replace(self, axes_xy=bodies.axes_xy, velocity_xy=velocity_xy, lying=bodies.lying)
 
     def moved(self, axes_xy: Float64[np.ndarray, "body 2"], time_s: float) -> Tracks:
         """The same bodies at another time, held as before."""

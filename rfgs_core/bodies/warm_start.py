@@ -44,8 +44,8 @@ def carry_over(
 ) -> tuple[Float64[np.ndarray, "M 3"], Int64[np.ndarray, "M"]]:
     """Moves Gaussians along with their bodies; the least supported third is fresh.
 
-    Whoever has sat down or stood up is drawn anew: no Gaussian of one posture has a place in the
-    other.
+    Whoever has sat down, lain down or stood up is drawn anew: no Gaussian of one posture has a
+    place in the other.
 
     Args:
         before: The fitted frame before.
@@ -53,13 +53,13 @@ def carry_over(
         cells: What the channel says around them.
         density: Where all of them are drawn.
         fresh: Points drawn from it [m].
-        rng: Draws who has sat down or stood up.
+        rng: Draws who has changed posture.
 
     Returns:
         Points [m], and their track numbers.
     """
     points = _moved_along(before, bodies)
-    changed = before.bodies.sits != bodies.sits
+    changed = (before.bodies.sits != bodies.sits) | (before.bodies.lies != bodies.lies)
     anew = changed[before.body]
     count = min(len(points) // 3, len(fresh), int((~anew).sum()))
     weakest = np.argsort(np.where(anew, np.inf, density.at(points)))[:count]
@@ -74,8 +74,12 @@ def carry_over(
 
 
 def _moved_along(before: Moving, bodies: Bodies) -> Float64[np.ndarray, "M 3"]:
-    """Points that keep their place on a body that walks, or turns on its seat."""
-    turn = np.nan_to_num(bodies.knees_rad - before.bodies.knees_rad)[before.body]
+    """Points that keep their place on a body that walks, or turns on its seat or where it lies."""
+    rolled = bodies.ways[:, 0] - before.bodies.ways[:, 0]
+    # A body looks alike with head and feet exchanged.
+    rolled = (rolled + 0.5 * np.pi) % np.pi - 0.5 * np.pi
+    turn = bodies.knees_rad - before.bodies.knees_rad
+    turn = (np.nan_to_num(turn) + np.nan_to_num(rolled))[before.body]
     points = before.points.copy()
     x, y = (points[:, :2] - before.bodies.axes_xy[before.body]).T
     turned = np.stack([np.cos(turn) * x - np.sin(turn) * y, np.sin(turn) * x + np.cos(turn) * y])

@@ -13,6 +13,7 @@ from torch import Tensor
 
 from rfgs_core.bodies.body_prior import outward_normals
 from rfgs_core.bodies.localise import PairMaps, locate_bodies, pair_maps
+from rfgs_core.bodies.lying import with_lying
 from rfgs_core.bodies.motion_density import novelty, speeds_m_s, wanted_counts
 from rfgs_core.bodies.posture import tell_postures
 from rfgs_core.bodies.separation import separated
@@ -139,9 +140,9 @@ def start_frame(
     rng = np.random.default_rng(seed)
     maps = pair_maps(observations)
     tracks = _followed(None if before is None else before.tracks, maps, observations, config, seed)
-    bodies = tell_postures(observations, maps, tracks.axes_xy, config, seed)
+    bodies = tell_postures(observations, maps, tracks.bodies, config, seed)
     tracks = replace(tracks, knees_rad=bodies.knees_rad)
-    cells = StartCells.around(maps, bodies.axes_xy, observations.bounds_m)
+    cells = StartCells.of(maps, bodies, observations.bounds_m)
     density = cells.density(bodies)
     points = density.draw(config.num_gaussians, rng)
     track_id, goes_on, next_track = np.arange(len(points), dtype=np.int64), None, 0
@@ -220,11 +221,13 @@ def _followed(
     bounds_m, time_s = observations.bounds_m, observations.time_s
     if before is None:
         axes_xy = locate_bodies(maps, bounds_m, config.bodies)
-        return Tracks.begun(separated(observations, maps, axes_xy, config, seed), time_s)
-    near, reach_m = before.expected(time_s)
-    axes_xy = locate_bodies(maps, bounds_m, config.bodies, near, reach_m)
-    axes_xy = separated(observations, maps, axes_xy, config, seed, near, reach_m)
-    return before.moved(axes_xy, time_s)
+        tracks = Tracks.begun(separated(observations, maps, axes_xy, config, seed), time_s)
+    else:
+        near, reach_m = before.expected(time_s)
+        axes_xy = locate_bodies(maps, bounds_m, config.bodies, near, reach_m)
+        axes_xy = separated(observations, maps, axes_xy, config, seed, near, reach_m)
+        tracks = before.moved(axes_xy, time_s)
+    return tracks.laid(with_lying(observations, maps, axes_xy, config, seed))
 
 
 def solve_reflectivity(

@@ -43,7 +43,7 @@ class StartPrior:
             RfgsError: Nobody changes the channel.
         """
         tracks, maps = followed(None, observations, config, seed), pair_maps(observations)
-        bodies = tell_postures(observations, maps, tracks.axes_xy, config, seed)
+        bodies = tell_postures(observations, maps, tracks.bodies, config, seed)
         return StartPrior(bodies, StartDensity.of(maps, bodies, observations.bounds_m))
 
     def log(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N"]:

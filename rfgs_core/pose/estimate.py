@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float64
 
+from rfgs_core.bodies.body_prior import Bodies
 from rfgs_core.errors import RfgsError
 from rfgs_core.pose.body import index_of, joints_of
-from rfgs_core.pose.fit import Cloud, fit_body, standing
+from rfgs_core.pose.fit import Cloud, fit_body, lying, standing
 from rfgs_core.radio.levels import power_of
 from rfgs_core.run import Run
 from rfgs_core.run.limbs import Limbs, read_limbs
@@ -64,7 +65,8 @@ def estimate_poses(run: Run, on_step: Callable[[], Any] = lambda: None) -> PoseE
         return _told(limbs, clouds, centroid, time_s, floor_m)
     joints = np.zeros((*centroid.shape[:2], 17, 3))
     baseline = np.zeros_like(joints)
-    knees_rad = np.array([_knees(run, frame) for frame in run.frames])
+    held = [_bodies(run, frame) for frame in run.frames]
+    knees_rad = np.array([bodies.knees_rad for bodies in held])
     sits = np.isfinite(knees_rad)
     for body in range(centroid.shape[1]):
         headings = headings_of(time_s, centroid[:, body, :2])
@@ -77,12 +79,15 @@ def estimate_poses(run: Run, on_step: Callable[[], Any] = lambda: None) -> PoseE
             if k and sits[k, body] != sits[k - 1, body]:
                 # Limbs of another posture are no start for this one.
                 before = None
-            seated = bool(sits[k, body])
-            found = fit_body(cloud, headings[k], before, elapsed_s, seed, seated=seated)
-            before = found.parameters
-            joints[k, body] = joints_of(found.parameters, floor_m)
+            if held[k].lies[body]:
+                parameters, before = lying(cloud, *held[k].ways[body]), None
+            else:
+                seated = bool(sits[k, body])
+                found = fit_body(cloud, headings[k], before, elapsed_s, seed, seated=seated)
+                parameters = before = found.parameters
+            joints[k, body] = joints_of(parameters, floor_m)
             # Of a body at rest the baseline is told the fit's own heading.
-            own = float(found.parameters[index_of("heading")])
+            own = float(parameters[index_of("heading")])
             looks = headings[k][0] if len(headings[k]) == 1 else own
             baseline[k, body] = joints_of(standing(cloud, looks), floor_m)
             on_step()
@@ -115,10 +120,10 @@ def _told(
     return PoseEstimate(limbs.frames, time_s, centroid, joints, seated, baseline, sigma_m)
 
 
-def _knees(run: Run, frame: int) -> Float64[np.ndarray, "body"]:
-    """Where knees of who sits point [rad]; NaN of who stands, or where the run does not tell."""
-    bodies = run.bodies(frame)
-    return np.full(run.config.settings.bodies, np.nan) if bodies is None else bodies.knees_rad
+def _bodies(run: Run, frame: int) -> Bodies:
+    """How people hold themselves; all stand where the run does not tell."""
+    found = run.bodies(frame)
+    return Bodies.standing(np.zeros((run.config.settings.bodies, 2))) if found is None else found
 
 
 def headings_of(

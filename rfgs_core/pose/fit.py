@@ -10,7 +10,7 @@ from jaxtyping import Float64
 from scipy.optimize import least_squares
 from scipy.spatial import KDTree
 
-from rfgs_core.pose.body import BONES, PARAMETERS, distance_to_bones, index_of, joints_of
+from rfgs_core.pose.body import BONES, HIP, PARAMETERS, distance_to_bones, index_of, joints_of
 
 #: Mean and standard deviation of each parameter before anything is seen; x, y and heading are
 #: open. Heights of adults; angles of standing, walking and sitting people.
@@ -87,6 +87,34 @@ def standing(cloud: Cloud, heading: float) -> Float64[np.ndarray, "15"]:
     values |= dict.fromkeys(("sink", "pitch", "left_knee", "right_knee"), 0.0)
     values |= dict.fromkeys(("left_elbow", "right_elbow"), 0.0)
     return np.array([values[name] for name in PARAMETERS])
+
+
+def lying(cloud: Cloud, way_rad: float, height_m: float) -> Float64[np.ndarray, "15"]:
+    """A straight body of average height that lies along a way, its head where it fits better.
+
+    Args:
+        cloud: Its Gaussians.
+        way_rad: From feet to head or from head to feet, from x towards y [rad].
+        height_m: Of its middle above the floor [m].
+    """
+    tall = _PRIOR["height"][0]
+    flat = {"height": tall, "sink": HIP * tall - height_m, "pitch": 0.5 * np.pi}
+    # Legs and arms point to where the feet are.
+    flat |= dict.fromkeys(("left_hip", "right_hip"), -0.5 * np.pi)
+    flat |= dict.fromkeys(("left_shoulder", "right_shoulder"), -0.5 * np.pi)
+    tried = []
+    for heading in (way_rad, way_rad + np.pi):
+        # The middle of the body is that of the cloud.
+        pelvis = cloud.centre[:2] + (HIP - 0.5) * tall * np.array(
+            [np.cos(heading), np.sin(heading)]
+        )
+        values = {"x": pelvis[0], "y": pelvis[1], "heading": heading, **flat}
+        tried.append(np.array([values.get(name, 0.0) for name in PARAMETERS]))
+    away = [
+        np.abs(distance_to_bones(cloud.points, joints_of(one, cloud.floor_m)).min(axis=1))
+        for one in tried
+    ]
+    return tried[int(np.argmin([far @ cloud.power for far in away]))]
 
 
 def fit_body(

@@ -33,15 +33,19 @@ _CHECKPOINT: dict[str, Shape] = {
     **{f"head.{name}": shape for name, shape in HEAD_SHAPES.items()},
 }
 
+#: Where somebody lies.
+_LYING: dict[str, Shape] = {"lying": ("body", 2)}
+
 _CHECKPOINT_TYPES = {
     **dict.fromkeys([*GAUSSIAN_SHAPES, "power"], "f4"),
-    **dict.fromkeys(("axes_xy", "velocity_xy", "time_s", "knees_rad"), "f8"),
+    **dict.fromkeys(("axes_xy", "velocity_xy", "time_s", "knees_rad", "lying"), "f8"),
     **dict.fromkeys(("track_id", "next_track"), "i8"),
     **{f"head.{name}": kind for name, kind in HEAD_TYPES.items()},
 }
 
-#: Velocities are not known in a first frame, and who stands has no knees that point anywhere.
-_MAY_BE_NAN = ("velocity_xy", "knees_rad")
+#: Velocities are not known in a first frame, and who stands neither lies nor has knees that point
+#: anywhere.
+_MAY_BE_NAN = ("velocity_xy", "knees_rad", "lying")
 
 
 def partial_path(run: Run, frame: int) -> Path:
@@ -81,7 +85,8 @@ def store_frame(
     arrays = {name: value.numpy() for name, value in state.gaussians.items()}
     arrays |= {"power": state.power.numpy(), "track_id": state.track_id}
     arrays["next_track"] = np.array(state.unused_track)
-    arrays |= {name: np.asarray(value) for name, value in asdict(state.tracks).items()}
+    tracks = {name: value for name, value in asdict(state.tracks).items() if value is not None}
+    arrays |= {name: np.asarray(value) for name, value in tracks.items()}
     arrays |= {f"head.{name}": value for name, value in head.items()}
     save_arrays(checkpoint_path(run.path, frame), arrays)
     partial_path(run, frame).unlink(missing_ok=True)
@@ -93,7 +98,9 @@ def finished_frame(run: Run, frame: int) -> FrameState | None:
     if not path.exists():
         return None
     remedy = "delete it to fit this frame again"
-    arrays = load_arrays(path, remedy, _CHECKPOINT, _MAY_BE_NAN, types=_CHECKPOINT_TYPES)
+    arrays = load_arrays(
+        path, remedy, _CHECKPOINT, _MAY_BE_NAN, types=_CHECKPOINT_TYPES, optional=_LYING
+    )
     fields = {name: torch.from_numpy(arrays[name]) for name in GAUSSIAN_SHAPES}
     return FrameState(
         gaussians=Gaussians(**fields),
@@ -104,6 +111,7 @@ def finished_frame(run: Run, frame: int) -> FrameState | None:
             velocity_xy=arrays["velocity_xy"],
             time_s=float(arrays["time_s"]),
             knees_rad=arrays["knees_rad"],
+            lying=arrays.get("lying"),
         ),
         track_id=arrays["track_id"],
         next_track=int(arrays["next_track"]),

@@ -197,8 +197,10 @@ class Run:
             return None
         shapes = {"axes_xy": ("body", 2), "knees_rad": ("body",)}
         types = dict.fromkeys(shapes, "f8")
-        stored = load_arrays(path, _REMEDY, shapes, ("knees_rad",), types=types)
-        return Bodies(stored["axes_xy"], stored["knees_rad"])
+        types["lying"] = "f8"
+        may_be_nan, lying = ("knees_rad", "lying"), {"lying": ("body", 2)}
+        stored = load_arrays(path, _REMEDY, shapes, may_be_nan, types=types, optional=lying)
+        return Bodies(stored["axes_xy"], stored["knees_rad"], stored.get("lying"))
 
     @property
     def head(self) -> RadioHead:

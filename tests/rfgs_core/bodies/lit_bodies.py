@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Channels of upright bodies whose surface is random scatterers, lit from one side."""
+"""Channels of bodies whose surface is random scatterers, lit from one side."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from rfgs_core.bodies.body_prior import Bodies, outward_normals
+from rfgs_core.bodies.localise import PairMaps
+from rfgs_core.bodies.start import StartDensity
 from rfgs_core.measure.observations import Observations
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
@@ -36,3 +39,23 @@ def lit(observations: Observations, bodies: list[tuple[float, float]], seed: int
                 ends.append(seen[:, None] * np.exp(-1j * k * distance[:, None]))
             delta += gamma * ends[0][:, None] * ends[1][None]
     return observations.with_delta(delta * observations.layout.measured[..., None])
+
+
+def echoing(empty: Observations, bodies: Bodies, seed: int) -> Observations:
+    """Random scatterers drawn from the prior, an antenna behind the tangent plane sees nothing."""
+    rng = np.random.default_rng(seed)
+    flat = PairMaps(np.ones((1, 4, 4, 4), np.float32), np.zeros(3), 1.0, *np.zeros((2, 1, 3)))
+    points = StartDensity.of(flat, bodies, empty.bounds_m).draw(400, rng)
+    normals = outward_normals(points, bodies)
+    gamma = rng.standard_normal(400) + 1j * rng.standard_normal(400)
+    k = 2 * np.pi * empty.freq_hz / SPEED_OF_LIGHT
+    legs = []
+    for xyz in (empty.layout.tx_xyz, empty.layout.rx_xyz):
+        towards = xyz - points[:, None]
+        distance = np.linalg.norm(towards, axis=2)
+        seen = (np.einsum("mac,mc->ma", towards, normals) > 0) / distance
+        legs.append(seen[..., None] * np.exp(-1j * k * distance[..., None]))
+    delta = np.einsum("m,mtf,mrf->trf", gamma, *legs)
+    noise = 0.03 * np.abs(delta).mean()
+    delta += noise * (rng.standard_normal(delta.shape) + 1j * rng.standard_normal(delta.shape))
+    return empty.with_delta(delta * empty.links[..., None])

@@ -9,19 +9,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from lit_bodies import echoing
 
 from rfgs_core.bodies import posture
-from rfgs_core.bodies.body_prior import Bodies, outward_normals
-from rfgs_core.bodies.localise import PairMaps, pair_maps
+from rfgs_core.bodies.body_prior import Bodies
+from rfgs_core.bodies.localise import pair_maps
 from rfgs_core.bodies.posture import NOISE_SHARES, PairSample, pair_samples, tell_postures
-from rfgs_core.bodies.start import StartDensity
 from rfgs_core.measure.observations import Observations
 from rfgs_core.propagation import Links, Subcarriers, scatter
-from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.settings import TrainConfig
 
 ROOM_M = np.array([[0.0, 0.0, 0.0], [4.0, 3.5, 2.5]])
 AXIS = np.array([[2.2, 1.6]])
+UPRIGHT = Bodies.standing(AXIS)
 
 
 @pytest.fixture
@@ -124,35 +124,15 @@ def test_pairs_that_hear_nothing_keep_their_place_and_say_nothing(
     samples = pair_samples(quiet, 0)
     assert len(samples) == len(names) == 4
     assert samples[0].log_likelihood(*cloud) == 0.0 != samples[2].log_likelihood(*cloud)
-    told = tell_postures(quiet, pair_maps(quiet), AXIS, TrainConfig(), 0)
+    told = tell_postures(quiet, pair_maps(quiet), UPRIGHT, TrainConfig(), 0)
     assert told.knees_rad.shape == (1,)
-
-
-def echoing(empty: Observations, bodies: Bodies, seed: int) -> Observations:
-    """Random scatterers drawn from the prior, an antenna behind the tangent plane sees nothing."""
-    rng = np.random.default_rng(seed)
-    flat = PairMaps(np.ones((1, 4, 4, 4), np.float32), np.zeros(3), 1.0, AXIS, AXIS)
-    points = StartDensity.of(flat, bodies, empty.bounds_m).draw(400, rng)
-    normals = outward_normals(points, bodies)
-    gamma = rng.standard_normal(400) + 1j * rng.standard_normal(400)
-    k = 2 * np.pi * empty.freq_hz / SPEED_OF_LIGHT
-    legs = []
-    for xyz in (empty.layout.tx_xyz, empty.layout.rx_xyz):
-        towards = xyz - points[:, None]
-        distance = np.linalg.norm(towards, axis=2)
-        seen = (np.einsum("mac,mc->ma", towards, normals) > 0) / distance
-        legs.append(seen[..., None] * np.exp(-1j * k * distance[..., None]))
-    delta = np.einsum("m,mtf,mrf->trf", gamma, *legs)
-    noise = 0.03 * np.abs(delta).mean()
-    delta += noise * (rng.standard_normal(delta.shape) + 1j * rng.standard_normal(delta.shape))
-    return empty.with_delta(delta * empty.links[..., None])
 
 
 @pytest.mark.usefixtures("fewer_entries")
 @pytest.mark.parametrize("knees", [np.nan, 1.5 * np.pi])
 def test_posture_is_told(make_observations: Callable[..., Observations], knees: float) -> None:
     seen = echoing(make_observations(), Bodies(AXIS, np.array([knees])), seed=3)
-    told = tell_postures(seen, pair_maps(seen), AXIS, TrainConfig(), 0)
+    told = tell_postures(seen, pair_maps(seen), UPRIGHT, TrainConfig(), 0)
     np.testing.assert_array_equal(told.axes_xy, AXIS)
     np.testing.assert_array_equal(told.sits, [np.isfinite(knees)])
     if told.sits[0]:
@@ -167,7 +147,9 @@ def test_an_error_of_the_place_is_not_taken_for_legs(
     empty = make_observations(freq_min_hz=5.4e9, freq_max_hz=6.4e9)
     seen = echoing(empty, Bodies.standing(AXIS), seed=6)
     off = AXIS + np.array([0.3, 0.0])
-    assert not tell_postures(seen, pair_maps(seen), off, TrainConfig(), 0).sits.any()
+    assert not tell_postures(
+        seen, pair_maps(seen), Bodies.standing(off), TrainConfig(), 0
+    ).sits.any()
 
 
 @pytest.mark.parametrize("change", ["no phases", "asked to stand"])
@@ -180,4 +162,4 @@ def test_everybody_stands_where_nothing_is_told(
         seen = replace(seen, kind="power")
     else:
         config = TrainConfig(posture="standing")
-    assert not tell_postures(seen, maps, AXIS, config, 0).sits.any()
+    assert not tell_postures(seen, maps, UPRIGHT, config, 0).sits.any()

@@ -45,6 +45,30 @@ def test_gaussians_keep_their_place_on_a_body_that_walks_or_turns(knees, turn) -
     np.testing.assert_array_equal(where[:, 2], offset[:, 2])
 
 
+def test_who_lies_turns_by_less_than_a_quarter_whichever_end_is_ahead() -> None:
+    """170° and 10° are lines 20° apart."""
+    first, later = (
+        Bodies(np.array([[2.0, 2.0]]), np.array([np.nan]), np.array([[way, 0.13]]))
+        for way in np.radians([170.0, 10.0])
+    )
+    before = fitted(first)
+    points, track_id = carried(before, later)
+    stay = track_id < COUNT + 7
+    offset, where = before.points[stay, :2] - 2.0, points[stay, :2] - 2.0
+    c, s = np.cos(np.radians(20.0)), np.sin(np.radians(20.0))
+    np.testing.assert_allclose(where, offset @ np.array([[c, s], [-s, c]]), atol=1e-9)
+
+
+@pytest.mark.parametrize("lies_down", [True, False])
+def test_who_lies_down_or_gets_up_is_drawn_anew(lies_down: bool) -> None:
+    axes = np.array([[2.0, 2.0]])
+    upright = Bodies.standing(axes)
+    flat = Bodies(axes, np.array([np.nan]), np.array([[0.0, 0.13]]))
+    points, track_id = carried(*((fitted(upright), flat) if lies_down else (fitted(flat), upright)))
+    assert track_id.min() >= COUNT + 7
+    assert (np.quantile(points[:, 2], 0.9) < 0.5) == lies_down
+
+
 @pytest.mark.parametrize("sits_down", [True, False])
 def test_who_sits_down_or_stands_up_is_drawn_anew_and_nobody_else(sits_down: bool) -> None:
     axes = np.array([[1.2, 2.0], [3.6, 2.0]])

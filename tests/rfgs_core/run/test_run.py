@@ -158,6 +158,12 @@ def test_bodies_are_those_of_the_checkpoint(own_run: Path) -> None:
     assert bodies is not None
     np.testing.assert_array_equal(bodies.axes_xy, arrays["axes_xy"])
     assert bodies.knees_rad.tolist() == [0.5]
+    assert not bodies.lies.any()
+    lying = np.array([[0.3, 0.13]])
+    save_arrays(path, {**arrays, "lying": lying})
+    bodies = open_run(own_run).bodies(1)
+    assert bodies is not None and bodies.lies.all()
+    np.testing.assert_array_equal(bodies.ways, lying)
     # Versions that told no postures kept none.
     save_arrays(path, {name: value for name, value in arrays.items() if name != "knees_rad"})
     with pytest.raises(

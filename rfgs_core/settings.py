@@ -77,14 +77,14 @@ class TrainOptions:
     temporal: float = 0.0
     """Weight with which Gaussians are held to their place on the body from frame to frame."""
     posture: Posture = "told"
-    """told: the radio decides in every frame who stands and who sits, and where the knees point;
-    standing: everybody stands, as is assumed without phases anyway."""
+    """told: the radio decides in every frame who stands, who sits and where the knees point, and
+    who lies and which way; standing: everybody stands, as is assumed without phases anyway."""
 
     limbs: Limbs = "auto"
     """auto: evidence tells the limbs of people who walk, a network that was trained on random
     worlds those of others where one for the radio is at hand, and Gaussians start on the skins of
     posed bodies; off: they start around the bodies' places, knowing nothing but whether somebody
-    stands or sits."""
+    stands, sits or lies."""
 
     def __post_init__(self) -> None:
         """Refuses values that no option may have.

@@ -41,7 +41,7 @@ class PoseEstimate:
     joints: Float64[np.ndarray, "frame body 17 3"]
     """Fitted joints [m]."""
     seated: Bool[np.ndarray, "frame body"]
-    """Which bodies the run takes to sit."""
+    """Which bodies the run takes to sit or lie."""
     standing: Float64[np.ndarray, "frame body 17 3"]
     """Joints of the baseline: a standing body of average height at the same centroid, which
     looks where the track leads [m]."""
@@ -91,7 +91,8 @@ def estimate_poses(run: Run, on_step: Callable[[], Any] = lambda: None) -> PoseE
             looks = headings[k][0] if len(headings[k]) == 1 else own
             baseline[k, body] = joints_of(standing(cloud, looks), floor_m)
             on_step()
-    return PoseEstimate(list(run.frames), time_s, centroid, joints, sits, baseline)
+    low = sits | np.array([bodies.lies for bodies in held])
+    return PoseEstimate(list(run.frames), time_s, centroid, joints, low, baseline)
 
 
 def _told(

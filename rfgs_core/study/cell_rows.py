@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from rfgs_core.evaluate.residual import GAUSSIANS_ALONE
 from rfgs_core.study.ablation import VARIANTS
 from rfgs_core.study.cells import ABLATED, FIELDS, TRAINED
 from rfgs_core.study.table import number
@@ -42,6 +43,7 @@ CLAIMED_DB = {
 _LABELS = {
     "rfgs": "RF-GS",
     "rfgs_no_limbs": "RF-GS without limbs",
+    GAUSSIANS_ALONE: "RF-GS, its Gaussians alone",
     "paper": "paper's recipe, from our start",
     **{row.method: f"paper's recipe, {row.label}" for row in VARIANTS[1:]},
     "nerf": "RF-NeRF",
@@ -122,7 +124,8 @@ def strongest(rows: Sequence[MethodRow]) -> list[str]:
     ours = next((row for row in rows if row.method == "rfgs"), None)
     if ours is None:
         return []
-    others = [row for row in rows if row.method.partition(", ")[0] not in TRAINED]
+    own_names = (*TRAINED, GAUSSIANS_ALONE)
+    others = [row for row in rows if row.method.partition(", ")[0] not in own_names]
     parts = []
     for _, key, title, form in COLUMNS:
         sign = -1.0 if key == "centroid_m" else 1.0

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # Has numba and Dr.Jit compile their kernels once, in one process after the other, by making, fitting
-# and measuring a few frames that are thrown away, a random world for the fast tracer, every kernel
-# in double precision, and a pose. Runs and their workers then load them from caches.
+# and measuring a few frames that are thrown away, a random world for the fast tracer, and a pose.
+# Runs and their workers then load them from caches.
 set -euo pipefail
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
@@ -17,7 +17,6 @@ example=$("$bin"/python -c 'from rfgs_core.example import example_folder; print(
 "$bin"/python -m rfgs_core.cli eval "$folder/run"
 "$bin"/python -m dataset_factory worlds --radio wifi_commodity --count 1 --people 1 --frames 2 \
   --depth 2 --out "$folder/worlds"
-"$bin"/python -m rfgs_core.cli selftest
 "$bin"/python -c 'import numpy as np
 from rfgs_core.articulated import fit_pose, people
 from rfgs_core.limbs.evidence.library import upright

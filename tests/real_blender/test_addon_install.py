@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`rfgs addon install` in a real Blender: what lies there afterwards counts, not what Blender says."""
+"""`rfgs addon install` in a real Blender: what lies there counts, not what Blender says."""
 
 from __future__ import annotations
 

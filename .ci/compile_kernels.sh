@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # Has numba and Dr.Jit compile their kernels once, in one process after the other, by making, fitting
-# and measuring a few frames that are thrown away. Runs and their workers then load them from caches.
+# and measuring a few frames that are thrown away, a random world for the fast tracer, and a pose.
+# Runs and their workers then load them from caches.
 set -euo pipefail
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
@@ -14,3 +15,10 @@ example=$("$bin"/python -c 'from rfgs_core.example import example_folder; print(
 "$bin"/python -m rfgs_core.cli train "$example/dataset" --radio small_wifi --frames 10:26:8 \
   --gaussians 1000 --out "$folder/run"
 "$bin"/python -m rfgs_core.cli eval "$folder/run"
+"$bin"/python -m dataset_factory worlds --radio wifi_commodity --count 1 --people 1 --frames 2 \
+  --depth 2 --out "$folder/worlds"
+"$bin"/python -c 'import numpy as np
+from rfgs_core.articulated import fit_pose, people
+from rfgs_core.limbs.evidence.library import upright
+body = people().body(np.zeros(0))
+fit_pose(body, body.joints17(upright(body)), np.ones(17), None)'

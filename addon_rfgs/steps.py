@@ -58,7 +58,8 @@ class Step(Tab):
         told = lacking or ("" if body is not None else self.taken(context.scene))
         if told:
             aside = header.row()
-            aside.active, aside.alignment = False, "RIGHT"
+            # What it waits for is dim, as the step is; what came of it is to be read.
+            aside.active, aside.alignment = not lacking, "RIGHT"
             aside.label(text=told)
         if body is not None:
             self.draw_step(context, body)

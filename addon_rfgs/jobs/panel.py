@@ -39,10 +39,8 @@ class RFGS_UL_jobs(bpy.types.UIList):
         _active_data: object,
         _active_property: str,
     ) -> None:
-        """Shows state and title."""
-        row = layout.split(factor=0.7)
-        row.label(text=item.title, icon=_ICONS.get(item.state, "DOT"))
-        row.label(text=item.state)
+        """Shows the title; its icon is the state, for which a narrow sidebar has no words left."""
+        layout.label(text=item.title, icon=_ICONS.get(item.state, "DOT"))
 
 
 class RFGS_PT_generate(Step, bpy.types.Panel):

@@ -23,9 +23,19 @@ _PATIENCE_S = 300
 #: Entries of an archive have the same time on every machine, so that equal files give equal bytes.
 _TIME = (2020, 1, 1, 0, 0, 0)
 
-#: Writes where jobs run into the preferences of the add-on and saves them.
+#: Writes where jobs run into the preferences of the add-on and saves them, if that is the add-on
+#: of the archive. Blender ends with 0 whether it installed or not, and on a busy machine loses the
+#: line that says which: only what lies there tells.
 _TELL = """
-import bpy, sys
+import bpy, pathlib, sys, zipfile
+if {extension!r} not in sys.modules:
+    sys.exit("the add-on was not installed")
+folder = pathlib.Path(sys.modules[{extension!r}].__file__).parent
+with zipfile.ZipFile({archive!r}) as archive:
+    for name in archive.namelist():
+        file = folder / name
+        if not file.is_file() or file.read_bytes() != archive.read(name):
+            sys.exit("an older add-on is still there")
 stored = bpy.context.preferences.addons[{extension!r}].preferences
 stored.python = {python!r}
 bpy.ops.wm.save_userpref()
@@ -65,13 +75,13 @@ def run(args: AddonArgs) -> int:
     with tempfile.TemporaryDirectory(prefix="rfgs-") as folder:
         file = build_extension(Path(folder))
         install = ("extension", "install-file", "-r", "user_default", "-e", file)
-        _run(program, "Installed", "-b", "--command", *install)
-    python = str(Path(sys.prefix)) if sys.prefix != sys.base_prefix else sys.executable
-    tell = _TELL.format(extension=EXTENSION, python=python)
-    with tempfile.TemporaryDirectory(prefix="rfgs-") as folder:
+        refused = _run(program, "", "-b", "--command", *install)
+        python = str(Path(sys.prefix)) if sys.prefix != sys.base_prefix else sys.executable
         script = Path(folder, "tell.py")
-        script.write_text(tell, "utf-8")
-        _run(program, "rfgs-told", "-b", "--python-exit-code", "1", "--python", script)
+        words = _TELL.format(extension=EXTENSION, python=python, archive=str(file))
+        script.write_text(words, "utf-8")
+        tell = ("-b", "--python-exit-code", "1", "--python", script)
+        _run(program, "rfgs-told", *tell, instead=refused)
     sys.stdout.write(
         f"installed into {program}; jobs run in {python}. Open Blender, press N in the 3D view and "
         "choose the tab RF-GS\n"
@@ -141,11 +151,20 @@ def _find_blender(wanted: Path | None) -> Path:
     return found.absolute()
 
 
-def _run(program: Path, said: str, *arguments: str | Path) -> None:
-    """Runs Blender until it has said that it did what it was asked to.
+def _run(program: Path, said: str, *arguments: str | Path, instead: str = "") -> str:
+    """Runs Blender.
+
+    Args:
+        program: Blender.
+        said: What it says when it did what it was asked to; "" if it says nothing of the kind.
+        *arguments: What it is asked to do.
+        instead: What is told in place of its last words if it did not.
+
+    Returns:
+        Its first line about an error, "" if there is none.
 
     Raises:
-        RfgsError: It did not; its last words follow.
+        RfgsError: It did not do it; its last words follow.
     """
     try:
         done = subprocess.run(
@@ -160,6 +179,7 @@ def _run(program: Path, said: str, *arguments: str | Path) -> None:
         raise RfgsError(f"{program}: cannot be started ({error.strerror})") from error
     except subprocess.TimeoutExpired as error:
         raise RfgsError(f"{program}: no answer within {_PATIENCE_S} s") from error
+    lines = [line.strip() for line in (done.stdout + done.stderr).splitlines() if line.strip()]
     if done.returncode or said not in done.stdout:
-        lines = [line for line in (done.stdout + done.stderr).splitlines() if line.strip()]
-        raise RfgsError(f"{program}: {lines[-1].strip() if lines else 'it said nothing'}")
+        raise RfgsError(f"{program}: {instead or (lines[-1] if lines else 'it said nothing')}")
+    return next((line for line in lines if line.upper().startswith("ERROR")), "")

@@ -73,17 +73,21 @@ class HashGrid(nn.Module):
     def forward(self, x: Float[Tensor, "N 3"]) -> Float[Tensor, "N out"]:
         """Readings at places in [−1, 1]; those outside read the border."""
         unit = (0.5 * (x + 1.0)).clamp(0.0, 1.0)
-        read = [self._level(level, unit * side) for level, side in enumerate(self.sides)]
+        # Taken apart once: the gradient of every reading is then of its own level's table alone.
+        read = [self._level(level, table, unit) for level, table in enumerate(self.tables.unbind())]
         return torch.cat(read, dim=1)
 
-    def _level(self, level: int, cell: Float[Tensor, "N 3"]) -> Float[Tensor, "N width"]:
+    def _level(
+        self, level: int, table: Float[Tensor, "rows width"], unit: Float[Tensor, "N 3"]
+    ) -> Float[Tensor, "N width"]:
+        cell = unit * self.sides[level]
         low = cell.floor().clamp(max=self.sides[level] - 1)
         part, low = cell - low, low.long()
-        total = cell.new_zeros(len(cell), self.tables.shape[2])
+        total = cell.new_zeros(len(cell), table.shape[1])
         for corner in range(8):
             step = torch.tensor([corner >> axis & 1 for axis in range(3)], device=cell.device)
             weight = torch.where(step.bool(), part, 1.0 - part).prod(dim=1, keepdim=True)
-            total = total + weight * self.tables[level][self._rows(level, low + step)]
+            total = total + weight * table[self._rows(level, low + step)]
         return total
 
     def _rows(self, level: int, corner: Int64[Tensor, "N 3"]) -> Int64[Tensor, "N"]:

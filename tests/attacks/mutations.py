@@ -9,6 +9,7 @@ import json
 import random
 import re
 import zipfile
+import zlib
 from collections.abc import Callable
 from typing import Any
 
@@ -141,6 +142,10 @@ def numbers_of(data: bytes, state: random.Random) -> bytes:
     return head[: word.start()] + other + head[word.end() :] + body
 
 
+#: Stands for the bomb among the members of an archive.
+BOMB = b"bomb"
+
+
 def arrays_of(data: bytes, state: random.Random) -> bytes:
     """Damages an archive, or one array within it so that the archive is whole again."""
     if state.random() < 0.35:
@@ -158,7 +163,7 @@ def arrays_of(data: bytes, state: random.Random) -> bytes:
     elif kind == 3:
         return _flagged(_packed(members), state)
     elif kind == 4:
-        members[state.choice(("extra.npy", name))] = bomb()
+        members[state.choice(("extra.npy", name))] = BOMB
     elif kind == 5:
         other = state.choice(list(members))
         members[name], members[other] = members[other], members[name]
@@ -171,19 +176,37 @@ def _packed(members: dict[str, bytes]) -> bytes:
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         for name, value in members.items():
-            if value is bomb():
-                archive.writestr(name, value, compresslevel=9)
+            if value is BOMB:
+                _add_bomb(archive, name)
             else:
                 archive.writestr(name, value)
     return stream.getvalue()
 
 
+def _add_bomb(archive: zipfile.ZipFile, name: str) -> None:
+    """Adds an array of zeros that unpacks to 320 MB; packing it anew each time takes a second."""
+    packed, size, crc = _packed_bomb()
+    info = zipfile.ZipInfo(name)
+    info.compress_type, info.header_offset = zipfile.ZIP_DEFLATED, archive.fp.tell()
+    info.file_size, info.compress_size, info.CRC = size, len(packed), crc
+    archive.fp.write(info.FileHeader() + packed)
+    archive.filelist.append(info)
+    archive.NameToInfo[name] = info
+    archive.start_dir = archive.fp.tell()
+
+
 @functools.cache
-def bomb() -> bytes:
-    """An array of zeros that packs to almost nothing."""
-    stream = io.BytesIO()
-    np.save(stream, np.zeros(40_000_000))
-    return stream.getvalue()
+def _packed_bomb() -> tuple[bytes, int, int]:
+    """The array as one deflated stream, its length unpacked, and its checksum."""
+    head = io.BytesIO()
+    np.lib.format.write_array_header_1_0(
+        head, {"descr": "<f8", "fortran_order": False, "shape": (40_000_000,)}
+    )
+    packer = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS)
+    pieces = [head.getvalue(), *[bytes(8_000_000)] * 40]
+    packed = b"".join([packer.compress(piece) for piece in pieces]) + packer.flush()
+    crc = functools.reduce(lambda crc, piece: zlib.crc32(piece, crc), pieces, 0)
+    return packed, sum(map(len, pieces)), crc
 
 
 def _flagged(data: bytes, state: random.Random) -> bytes:

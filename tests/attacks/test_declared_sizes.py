@@ -119,9 +119,9 @@ def test_an_extra_member_is_not_read_and_a_bomb_is_refused(tmp_path: Path) -> No
     zeros = bytes(2**20)
     with zipfile.ZipFile(file, "a", zipfile.ZIP_DEFLATED) as archive:
         with archive.open("extra.npy", "w", force_zip64=True) as stream:
-            for _ in range(1500):
+            for _ in range(600):
                 stream.write(zeros)
-    assert file.stat().st_size < 2**21
+    assert file.stat().st_size < 2**20
     assert list(load_arrays(file, "", {"wanted": ("M",)}, seal=False)) == ["wanted"]
     with pytest.raises(RfgsFormatError, match="expected up to 268435456"):
         load_arrays(file, "", seal=False)

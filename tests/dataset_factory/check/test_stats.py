@@ -50,9 +50,9 @@ def test_numbers_of_a_known_dataset(tiny_dataset: Path) -> None:
 
 
 def test_the_command_prints_a_table_and_json(
-    factory: Callable[..., subprocess.CompletedProcess[str]], tiny_dataset: Path
+    factory_here: Callable[..., subprocess.CompletedProcess[str]], tiny_dataset: Path
 ) -> None:
-    table = factory("stats", str(tiny_dataset))
+    table = factory_here("stats", str(tiny_dataset))
     assert table.returncode == 0 and "radios.wifi.dynamic_to_static_db" in table.stdout
-    value = json.loads(factory("stats", str(tiny_dataset), "--json").stdout)
+    value = json.loads(factory_here("stats", str(tiny_dataset), "--json").stdout)
     assert value["sequences"]["tiny"]["radios"]["wifi"]["subcarriers"] == 16

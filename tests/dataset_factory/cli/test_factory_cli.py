@@ -155,13 +155,13 @@ def test_a_place_that_cannot_be_made_is_refused_first(
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
-def test_truncated_chunk_is_named(factory: Factory, box_copy: Path) -> None:
+def test_truncated_chunk_is_named(factory_here: Factory, box_copy: Path) -> None:
     file = chunk_file(box_copy / "box_room/radio/wifi/csi.zarr", 1)
     file.write_bytes(file.read_bytes()[:100])
-    answer = factory("validate", str(box_copy))
+    answer = factory_here("validate", str(box_copy))
     assert answer.returncode == 1
     assert f"fault: {file}: truncated" in answer.stdout
-    assert str(file) in one_line(factory("preview", str(box_copy)))
+    assert str(file) in one_line(factory_here("preview", str(box_copy)))
 
 
 def test_ambiguous_sequence(factory_here: Factory, box_copy: Path) -> None:

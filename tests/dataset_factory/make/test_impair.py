@@ -107,13 +107,13 @@ def test_damaged_impaired_channels_are_named(tiny_copy: Path) -> None:
 
 
 def test_the_command_impairs_and_explains(
-    factory: Callable[..., object], tiny_copy: Path, tmp_path: Path
+    factory_here: Callable[..., Any], tiny_copy: Path, tmp_path: Path
 ) -> None:
     file = tmp_path / "mine.json"
     file.write_text(json.dumps({"loss_rate": 2}))
-    wrong = factory("impair", str(tiny_copy), "--impairments", str(file))
+    wrong = factory_here("impair", str(tiny_copy), "--impairments", str(file))
     assert wrong.returncode == 2 and "loss_rate: expected 0 to 0.99" in wrong.stderr
-    right = factory("impair", str(tiny_copy), "--impairments", "lab", "--radio", "wifi")
+    right = factory_here("impair", str(tiny_copy), "--impairments", "lab", "--radio", "wifi")
     assert right.returncode == 0, right.stderr
     assert "csi_impaired" in open_dataset(tiny_copy).has
 

@@ -19,7 +19,8 @@ from rfgs_core.files import sha256
 
 Factory = Callable[..., subprocess.CompletedProcess[str]]
 
-ASKED = ("worlds", "--radio", "wifi_commodity", "--frames", "2", "--depth", "1", "--count", "4")
+ASKED = ("worlds", "--radio", "wifi_commodity", "--frames", "2", "--depth", "1")
+FOUR = (*ASKED, "--count", "4")
 
 
 def digests(out: Path) -> dict[str, str]:
@@ -32,14 +33,14 @@ def digests(out: Path) -> dict[str, str]:
 def alone(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """Four worlds by one process."""
     out = tmp_path_factory.mktemp("worlds") / "alone"
-    assert main([*ASKED, "--out", str(out)]) == 0
+    assert main([*FOUR, "--out", str(out)]) == 0
     return digests(out)
 
 
-def test_two_workers_make_the_same_worlds(alone: dict[str, str], tmp_path: Path) -> None:
+def test_two_workers_make_the_same_worlds(two_worlds: Path, tmp_path: Path) -> None:
     out = tmp_path / "two"
-    assert main([*ASKED, "--workers", "2", "--out", str(out)]) == 0
-    assert digests(out) == alone
+    assert main([*ASKED, "--count", "2", "--workers", "2", "--out", str(out)]) == 0
+    assert digests(out) == digests(two_worlds)
     assert sorted(path.name for path in (out / "log/0-1").iterdir()) == [
         "worker0.log",
         "worker1.log",
@@ -52,7 +53,7 @@ def test_a_cluster_that_loses_a_worker_makes_the_same_worlds(
     alone: dict[str, str], cluster: Any, tmp_path: Path
 ) -> None:
     out = tmp_path / "cluster"
-    command = [*ASKED, "--scheduler", cluster.scheduler_address, "--out", str(out)]
+    command = [*FOUR, "--scheduler", cluster.scheduler_address, "--out", str(out)]
     with subprocess.Popen([sys.executable, "-m", "dataset_factory", *command]) as process:
         while process.poll() is None and not list(out.glob("world_*")):
             time.sleep(0.01)
@@ -67,7 +68,7 @@ def test_stopped_workers_go_on_to_the_same_worlds(
     alone: dict[str, str], tmp_path: Path, number: signal.Signals
 ) -> None:
     out, log = tmp_path / "stopped", tmp_path / "log"
-    command = [sys.executable, "-m", "dataset_factory", *ASKED, "--workers", "2", "--out", str(out)]
+    command = [sys.executable, "-m", "dataset_factory", *FOUR, "--workers", "2", "--out", str(out)]
     with log.open("w") as stream:
         process = subprocess.Popen(command, stderr=stream, stdout=subprocess.DEVNULL)
     while process.poll() is None and not list(out.glob("world_*")):
@@ -79,7 +80,7 @@ def test_stopped_workers_go_on_to_the_same_worlds(
         assert code == 0 or log.read_text().count("stopped; finished work is kept") == 1
     kept = {name: value for name, value in digests(out).items() if name in alone}
     assert kept.items() <= alone.items(), "a world is whole or not there"
-    assert main([*ASKED, "--workers", "2", "--out", str(out)]) == 0
+    assert main([*FOUR, "--workers", "2", "--out", str(out)]) == 0
     assert digests(out) == alone
     assert not list(out.glob(".work*")) and not list(out.glob(".tmp*"))
 
@@ -94,7 +95,7 @@ def test_workers_that_are_not_there_are_named_before_anything_is_made(
         (("--workers", "0"), "--workers 0: expected 1 to 256"),
         (("--worker-memory", "-1"), "--worker-memory -1.0: expected GB"),
     ):
-        assert main([*ASKED, *more, "--out", str(out)]) != 0
+        assert main([*FOUR, *more, "--out", str(out)]) != 0
         assert said in capsys.readouterr().err
     assert not out.exists()
 
@@ -105,7 +106,7 @@ def test_a_world_that_no_room_has_is_named_by_workers_too(
     radio = tmp_path / "coarse.yaml"
     radio.write_text("like: wifi_commodity\nnum_subcarriers: 4\n")
     out = tmp_path / "out"
-    command = [*ASKED, "--radio", str(radio), "--workers", "2", "--out", str(out)]
+    command = [*FOUR, "--radio", str(radio), "--workers", "2", "--out", str(out)]
     assert main(command) != 0
     error = capsys.readouterr().err.splitlines()[-1]
     assert error.startswith("error: world ") and ": none of 40 rooms has space" in error

@@ -38,9 +38,9 @@ def data_of_page(text: str) -> list[Any]:
 
 
 def test_the_page_holds_everything_and_needs_nothing(
-    factory: Callable[..., subprocess.CompletedProcess[str]], box_copy: Path
+    factory_here: Callable[..., subprocess.CompletedProcess[str]], box_copy: Path
 ) -> None:
-    answer = factory("preview", str(box_copy))
+    answer = factory_here("preview", str(box_copy))
     assert answer.returncode == 0, answer.stderr
     file = Path(answer.stdout.strip())
     text = file.read_text()

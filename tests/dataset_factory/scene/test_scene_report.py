@@ -16,9 +16,9 @@ Factory = Callable[..., subprocess.CompletedProcess[str]]
 BuildScene = Callable[..., Path]
 
 
-def test_table_and_json_say_the_same(factory: Factory, box_room: Path, tmp_path: Path) -> None:
+def test_table_and_json_say_the_same(factory_here: Factory, box_room: Path, tmp_path: Path) -> None:
     file = tmp_path / "check.json"
-    answer = factory("check", str(box_room), "--radio", "wifi", "--json", str(file))
+    answer = factory_here("check", str(box_room), "--radio", "wifi", "--json", str(file))
     assert answer.returncode == 0, answer.stderr
     report = json.loads(file.read_text())
     assert answer.stdout == table(report) + "\n"

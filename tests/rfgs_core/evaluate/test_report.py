@@ -15,13 +15,14 @@ from PIL import Image
 
 from rfgs_core.cli.compare import CompareArgs
 from rfgs_core.cli.compare import run as compare
-from rfgs_core.errors import RfgsError, RfgsFormatError
+from rfgs_core.errors import MissingToolError, RfgsError, RfgsFormatError
 from rfgs_core.evaluate.baselines import BASELINES
 from rfgs_core.figures.shapes import colouring
 from rfgs_core.report import write_demo_report, write_run_report
 from rfgs_core.report.cards import WORDS, headline_cards, in_words
 from rfgs_core.report.tables import metric_tables, show, text_table
 from rfgs_core.seals import write_sealed_json
+from rfgs_core.view.browser import find_chromium, open_page
 
 HEADINGS = (
     "What the radio measures",
@@ -52,6 +53,26 @@ def test_run_report_has_every_section_and_nothing_missing(evaluated_run) -> None
     for name in ("matched_filter", "template", "oracle_init", "silhouette", "nearest_element"):
         assert name in html
     assert "loses to" in html
+
+
+#: Lines that the value of each row takes whose words hold a number and a unit.
+LINES = """[...document.querySelectorAll('table.facts td')]
+    .filter(cell => /^[\\d.]+ (m|s|min \\d+ s)$/.test(cell.textContent.trim()))
+    .map(cell => { const range = document.createRange(); range.selectNodeContents(cell);
+                   return new Set([...range.getClientRects()].map(box => box.top)).size })"""
+
+
+@pytest.mark.slow
+def test_a_phone_scrolls_down_only_and_breaks_no_short_value(evaluated_run) -> None:
+    try:
+        find_chromium()
+    except MissingToolError as error:
+        pytest.skip(str(error))
+    page_file = write_run_report(evaluated_run)
+    with open_page(page_file.as_uri(), 420, 900) as page:
+        assert page.evaluate("document.documentElement.scrollWidth") == 420
+        lines = page.evaluate(LINES)
+    assert len(lines) >= 3 and set(lines) == {1}
 
 
 def test_demo_report_shows_runs_times_and_the_blender_picture(

@@ -24,8 +24,8 @@ def score_poses(estimate: PoseEstimate, sequence: Sequence) -> dict[str, Any]:
     pelvis. `mpjpe_m` is the mean distance per joint, `aligned_m` the same with pelvis on pelvis;
     `identity_kept` is the share of matches with the person that a body had at first, and
     `tracked` the share of people with their body within half a metre. `posture_right` is the share
-    of matches of which the run says rightly whether they sit or lie, `seated` the number who do. Values
-    are None where no joint is known.
+    of matches of which the run says rightly whether they sit or lie, `seated` the number who do.
+    Values are None where no joint is known.
     """
     truth = [sequence.joints(frame).astype(np.float64) for frame in estimate.frames]
     matches = [_matched(estimate.joints[k], true) for k, true in enumerate(truth)]

@@ -2,8 +2,8 @@
 """Where the surface of a body is likely before the radio is asked: one who stands, sits or lies.
 
 A body is a few limbs, straight lines with a normal distribution around them. One who stands is a
-single upright limb, one who lies a single level one; one who sits has a trunk, two thighs and two
-shins, and knees that point somewhere.
+single upright limb, one who lies a level trunk with arms and narrower legs; one who sits has a
+trunk, two thighs and two shins, and knees that point somewhere.
 """
 
 from __future__ import annotations
@@ -25,8 +25,9 @@ SEAT_M = 0.5
 TRUNK_RADIUS_M, THIGH_RADIUS_M, SHIN_RADIUS_M = 0.18, 0.09, 0.08
 #: From the axis to the knees, and from the middle to each leg [m].
 THIGH_M, LEG_SPREAD_M = 0.42, 0.10
-#: Length of the line in somebody who lies, arms and legs spread, and deviation around it [m].
-LYING_LENGTH_M, LYING_RADIUS_M = 1.5, 0.14
+#: Lengths from the hips of who lies to head and feet, and deviations around trunk and legs [m].
+LYING_TRUNK_M, LYING_LEGS_M = 0.75, 0.8
+LYING_TRUNK_RADIUS_M, LYING_LEGS_RADIUS_M = 0.17, 0.10
 
 
 @dataclass(frozen=True)
@@ -34,12 +35,12 @@ class Bodies:
     """Bodies on the ground and how they hold themselves."""
 
     axes_xy: Float64[np.ndarray, "body 2"]
-    """Where head and trunk are, the middle of who lies, seen from above [m]."""
+    """Where head and trunk are, the hips of who lies, seen from above [m]."""
     knees_rad: Float64[np.ndarray, "body"]
     """Where the knees of who sits point, from x towards y [rad]; NaN of everybody else."""
     lying: Float64[np.ndarray, "body 2"] | None = None
-    """Of who lies the way of the body, from x towards y, head or feet ahead [rad], and its height
-    above the ground [m]; NaN of everybody else, None where nobody lies."""
+    """Of who lies where the head points, from x towards y [rad], and the height of the body's
+    middle above the ground [m]; NaN of everybody else, None where nobody lies."""
 
     @staticmethod
     def standing(axes_xy: Float[np.ndarray, "body 2"]) -> Bodies:
@@ -102,9 +103,12 @@ def _limbs(bodies: Bodies, body: int) -> list[_Limb]:
     up = np.array([0.0, 0.0, 1.0])
     if bodies.lies[body]:
         way_rad, height_m = bodies.ways[body]
-        half = 0.5 * LYING_LENGTH_M * np.array([np.cos(way_rad), np.sin(way_rad), 0.0])
-        middle = axis + height_m * up
-        return [_Limb(middle - half, middle + half, LYING_RADIUS_M)]
+        ahead = np.array([np.cos(way_rad), np.sin(way_rad), 0.0])
+        hips = axis + height_m * up
+        return [
+            _Limb(hips, hips + LYING_TRUNK_M * ahead, LYING_TRUNK_RADIUS_M),
+            _Limb(hips - LYING_LEGS_M * ahead, hips, LYING_LEGS_RADIUS_M),
+        ]
     if not bodies.sits[body]:
         return [_Limb(axis, axis + STANDING_HEIGHT_M * up, STANDING_RADIUS_M)]
     angle = bodies.knees_rad[body]

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float64
 
-from rfgs_core.bodies.body_prior import LYING_LENGTH_M, Bodies
+from rfgs_core.bodies.body_prior import LYING_LEGS_M, LYING_TRUNK_M, Bodies
 from rfgs_core.bodies.localise import SEPARATION_M, PairMaps, pair_maps
 from rfgs_core.bodies.posture import DIRECTIONS, PostureEvidence
 from rfgs_core.bodies.separation import each_alone
@@ -28,10 +28,13 @@ REACH_M = 1.2
 #: Ways of bars that are tried, half a turn apart at most, and distance of their places [m].
 WAYS, STEP_M = 8, 0.08
 #: Places along a bar at which maps are read, and heights around its own [m].
-_ALONG, _AROUND_M = np.linspace(-0.47, 0.47, 12) * LYING_LENGTH_M, np.array([-0.03, 0.07, 0.17])
+_ALONG_M, _AROUND_M = np.linspace(-0.7, 0.7, 12), np.array([-0.03, 0.07, 0.17])
 #: Heights at which somebody upright, seated or not, is louder than who lies [m].
 _CHEST_M = np.array([0.9, 1.1, 1.3])
-#: Bars whose likelihood is asked for at each height: the loudest that differ by a place or a turn.
+#: A bar that is quieter than that by this logarithm of power is not asked for.
+CHEST_LOG = 0.5
+#: Bars whose likelihood is asked for at each height, with the head at either end: the loudest that
+#: differ by a place or a turn.
 BARS, APART_M, APART_RAD = 3, 0.3, 0.5
 #: Steps along and across a bar [m] and turns [rad] by which the likeliest one is improved, in turn.
 NUDGES = (*2 * ((0.2, 0.15, np.pi / WAYS),), (0.1, 0.08, 0.5 * np.pi / WAYS))
@@ -45,6 +48,7 @@ def with_lying(
     axes_xy: Float64[np.ndarray, "body 2"],
     config: TrainConfig,
     seed: int,
+    before: Bodies | None = None,
 ) -> Bodies:
     """Bodies that stand, but for those who lie, who are moved to where they do.
 
@@ -54,6 +58,7 @@ def with_lying(
         axes_xy: Where columns were found [m].
         config: How echoes are told apart, and whether postures are told at all.
         seed: Seed of the Gaussians that stand for bodies.
+        before: The bodies in the frame before: who lay there may lie on.
     """
     standing = Bodies.standing(axes_xy)
     if config.posture == "standing" or observations.kind != "complex":
@@ -65,7 +70,8 @@ def with_lying(
     for body, alone in enumerate(each_alone(observations, maps, axes_xy, config, seed)):
         if low[body]:
             own_maps = maps if alone is observations else pair_maps(alone)
-            here = _lies(alone, own_maps, axes_xy, body, sub_seed(seed, "lying", body))
+            lay = [before.only(body)] if before is not None and before.lies[body] else []
+            here = _lies(alone, own_maps, axes_xy, body, lay, sub_seed(seed, "lying", body))
             if here is not None:
                 found = _put(found, body, here)
     return found
@@ -84,10 +90,11 @@ def _may_lie(
     axes_xy: Float64[np.ndarray, "body 2"],
     body: int,
 ) -> bool:
-    """Whether a level bar around a body is louder than anything at the height of a chest."""
+    """Whether a level bar around a body is about as loud as anything at the height of a chest."""
     ground = _ground(bounds_m, axes_xy, body)
     chest = np.log(maps.upright(ground, bounds_m[0, 2] + _CHEST_M) + 0.05).mean(axis=0).max()
-    return any(_loudness(maps, bounds_m, ground, height).max() > chest for height in HEIGHTS_M)
+    loudest = max(_loudness(maps, bounds_m, ground, height).max() for height in HEIGHTS_M)
+    return bool(loudest > chest - CHEST_LOG)
 
 
 def _ground(
@@ -112,10 +119,10 @@ def _loudness(
     levels = bounds_m[0, 2] + height_m + _AROUND_M
     loud = np.full((WAYS, len(ground)), -np.inf)
     for k, way in enumerate(np.arange(WAYS) * np.pi / WAYS):
-        places = ground[:, None] + _ALONG[:, None] * np.array([np.cos(way), np.sin(way)])
+        places = ground[:, None] + _ALONG_M[:, None] * _ahead(way)
         inside = ((places >= bounds_m[0, :2]) & (places <= bounds_m[1, :2])).all(axis=(1, 2))
         power = maps.upright(places[inside].reshape(-1, 2), levels)
-        log = np.log(power + 0.05).reshape(len(power), -1, len(_ALONG))
+        log = np.log(power + 0.05).reshape(len(power), -1, len(_ALONG_M))
         loud[k, inside] = log.mean(axis=(0, 2))
     return loud
 
@@ -123,7 +130,7 @@ def _loudness(
 def _loudest(
     loud: Float64[np.ndarray, "way P"], ground: Float64[np.ndarray, "P 2"], height_m: float
 ) -> list[Bodies]:
-    """Bodies on the loudest bars that differ by a place or a turn."""
+    """Bodies on the loudest bars that differ by a place or a turn, the head at either end."""
     found: list[tuple[np.ndarray, float]] = []
     for index in np.argsort(-loud, axis=None):
         k, place = np.unravel_index(index, loud.shape)
@@ -135,7 +142,16 @@ def _loudest(
             for other, angle in found
         ):
             found.append((spot, way))
-    return [_lying(spot, way, height_m) for spot, way in found]
+    # The hips are not quite in the middle.
+    return [
+        _lying(spot - 0.5 * (LYING_TRUNK_M - LYING_LEGS_M) * _ahead(angle), angle, height_m)
+        for spot, way in found
+        for angle in (way, way + np.pi)
+    ]
+
+
+def _ahead(way_rad: float) -> Float64[np.ndarray, "2"]:
+    return np.array([np.cos(way_rad), np.sin(way_rad)])
 
 
 def _turn(angle: float) -> float:
@@ -147,7 +163,7 @@ def _lying(spot: np.ndarray, way_rad: float, height_m: float) -> Bodies:
     return Bodies(
         np.asarray(spot, dtype=np.float64)[None],
         np.array([np.nan]),
-        np.array([[way_rad % np.pi, height_m]]),
+        np.array([[way_rad % (2 * np.pi), height_m]]),
     )
 
 
@@ -156,9 +172,10 @@ def _lies(
     maps: PairMaps,
     axes_xy: Float64[np.ndarray, "body 2"],
     body: int,
+    lay: list[Bodies],
     seed: int,
 ) -> Bodies | None:
-    """Where one body lies; None if it does not."""
+    """Where one body lies, tried where it lay before as well; None if it does not."""
     bounds_m, ground = observations.bounds_m, _ground(observations.bounds_m, axes_xy, body)
     evidence = PostureEvidence.of(observations, seed)
 
@@ -170,7 +187,7 @@ def _lies(
     rivals = evidence.all(
         likely, [upright, *(Bodies(upright.axes_xy, np.array([angle])) for angle in angles)]
     )
-    bars = [
+    bars = lay + [
         bar
         for height in HEIGHTS_M
         for bar in _loudest(_loudness(maps, bounds_m, ground, height), ground, height)
@@ -189,17 +206,15 @@ def _lies(
 
 
 def _nudged(bodies: Bodies, nudge: tuple[float, float, float]) -> list[Bodies]:
-    """A lying body moved along or across itself, or turned."""
+    """A lying body moved along or across itself, or turned a little or end for end."""
     along_m, across_m, turn_rad = nudge
     way_rad, height_m = bodies.ways[0]
-    ahead = np.array([np.cos(way_rad), np.sin(way_rad)])
+    ahead = _ahead(way_rad)
     aside = np.array([-ahead[1], ahead[0]])
     steps = [side * step for step in (along_m * ahead, across_m * aside) for side in (-1.0, 1.0)]
     moved = [_lying(bodies.axes_xy[0] + step, way_rad, height_m) for step in steps]
-    turned = [
-        _lying(bodies.axes_xy[0], way_rad + side * turn_rad, height_m) for side in (-1.0, 1.0)
-    ]
-    return moved + turned
+    turns = (-turn_rad, turn_rad, np.pi)
+    return moved + [_lying(bodies.axes_xy[0], way_rad + turn, height_m) for turn in turns]
 
 
 def _inside(bodies: Bodies, bounds_m: Float64[np.ndarray, "2 3"]) -> bool:

@@ -75,11 +75,8 @@ def carry_over(
 
 def _moved_along(before: Moving, bodies: Bodies) -> Float64[np.ndarray, "M 3"]:
     """Points that keep their place on a body that walks, or turns on its seat or where it lies."""
-    rolled = bodies.ways[:, 0] - before.bodies.ways[:, 0]
-    # A body looks alike with head and feet exchanged.
-    rolled = (rolled + 0.5 * np.pi) % np.pi - 0.5 * np.pi
-    turn = bodies.knees_rad - before.bodies.knees_rad
-    turn = (np.nan_to_num(turn) + np.nan_to_num(rolled))[before.body]
+    seated = np.nan_to_num(bodies.knees_rad - before.bodies.knees_rad)
+    turn = (seated + np.nan_to_num(bodies.ways[:, 0] - before.bodies.ways[:, 0]))[before.body]
     points = before.points.copy()
     x, y = (points[:, :2] - before.bodies.axes_xy[before.body]).T
     turned = np.stack([np.cos(turn) * x - np.sin(turn) * y, np.sin(turn) * x + np.cos(turn) * y])

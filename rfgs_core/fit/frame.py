@@ -227,7 +227,8 @@ def _followed(
         axes_xy = locate_bodies(maps, bounds_m, config.bodies, near, reach_m)
         axes_xy = separated(observations, maps, axes_xy, config, seed, near, reach_m)
         tracks = before.moved(axes_xy, time_s)
-    return tracks.laid(with_lying(observations, maps, axes_xy, config, seed))
+    lay = None if before is None else before.bodies
+    return tracks.laid(with_lying(observations, maps, axes_xy, config, seed, lay))
 
 
 def solve_reflectivity(

@@ -90,31 +90,21 @@ def standing(cloud: Cloud, heading: float) -> Float64[np.ndarray, "15"]:
 
 
 def lying(cloud: Cloud, way_rad: float, height_m: float) -> Float64[np.ndarray, "15"]:
-    """A straight body of average height that lies along a way, its head where it fits better.
+    """A straight body of average height that lies at the cloud's centroid.
 
     Args:
         cloud: Its Gaussians.
-        way_rad: From feet to head or from head to feet, from x towards y [rad].
+        way_rad: Where the head points, from x towards y [rad].
         height_m: Of its middle above the floor [m].
     """
     tall = _PRIOR["height"][0]
-    flat = {"height": tall, "sink": HIP * tall - height_m, "pitch": 0.5 * np.pi}
+    pelvis = cloud.centre[:2] + (HIP - 0.5) * tall * np.array([np.cos(way_rad), np.sin(way_rad)])
+    values = {"x": pelvis[0], "y": pelvis[1], "height": tall, "heading": way_rad}
+    values |= {"sink": HIP * tall - height_m, "pitch": 0.5 * np.pi}
     # Legs and arms point to where the feet are.
-    flat |= dict.fromkeys(("left_hip", "right_hip"), -0.5 * np.pi)
-    flat |= dict.fromkeys(("left_shoulder", "right_shoulder"), -0.5 * np.pi)
-    tried = []
-    for heading in (way_rad, way_rad + np.pi):
-        # The middle of the body is that of the cloud.
-        pelvis = cloud.centre[:2] + (HIP - 0.5) * tall * np.array(
-            [np.cos(heading), np.sin(heading)]
-        )
-        values = {"x": pelvis[0], "y": pelvis[1], "heading": heading, **flat}
-        tried.append(np.array([values.get(name, 0.0) for name in PARAMETERS]))
-    away = [
-        np.abs(distance_to_bones(cloud.points, joints_of(one, cloud.floor_m)).min(axis=1))
-        for one in tried
-    ]
-    return tried[int(np.argmin([far @ cloud.power for far in away]))]
+    values |= dict.fromkeys(("left_hip", "right_hip"), -0.5 * np.pi)
+    values |= dict.fromkeys(("left_shoulder", "right_shoulder"), -0.5 * np.pi)
+    return np.array([values.get(name, 0.0) for name in PARAMETERS])
 
 
 def fit_body(

@@ -26,6 +26,9 @@ from rfgs_core.radio.delay import band_window, delay_profile
 OVERSAMPLING = 2
 #: Beams point up to this sine away from broadside.
 WIDEST_SINE = 0.95
+#: An aperture of more beams than this has no far field in a room. Places that an antenna takes in
+#: turn are then split into runs that are no wider than so many wavelengths, a map each.
+MOST_BEAMS, RUN_WAVELENGTHS = 4096, 8.0
 
 
 @dataclass(frozen=True)
@@ -50,10 +53,29 @@ def _beam_sines(extent_m: float, wavelength_m: float) -> Float64[np.ndarray, "be
     return np.linspace(-WIDEST_SINE, WIDEST_SINE, count)
 
 
+def _along(virtual: Float64[np.ndarray, "element 3"]) -> Float64[np.ndarray, "element 2"]:
+    """Places of a planar array's elements along its two axes [m]."""
+    _, _, axes = np.linalg.svd(virtual - virtual.mean(axis=0))
+    return (virtual - virtual.mean(axis=0)) @ axes[:2].T
+
+
+def _runs(virtual: Float64[np.ndarray, "element 3"], wavelength_m: float) -> list[slice]:
+    """An array whole, or runs of elements where it is too wide; see `MOST_BEAMS`."""
+    sines = [_beam_sines(float(extent), wavelength_m) for extent in np.ptp(_along(virtual), axis=0)]
+    if len(sines[0]) * len(sines[1]) <= MOST_BEAMS:
+        return [slice(0, len(virtual))]
+    runs, first = [], 0
+    for end in range(1, len(virtual) + 1):
+        wide = end < len(virtual) and np.linalg.norm(np.ptp(virtual[first : end + 1], axis=0))
+        if end == len(virtual) or wide > RUN_WAVELENGTHS * wavelength_m:
+            runs.append(slice(first, end))
+            first = end
+    return runs
+
+
 def _beams(virtual: Float64[np.ndarray, "element 3"], wavelength_m: float) -> np.ndarray:
     """Steering vectors of a planar (virtual) array over directions in front of it."""
-    _, _, axes = np.linalg.svd(virtual - virtual.mean(axis=0))
-    along = (virtual - virtual.mean(axis=0)) @ axes[:2].T
+    along = _along(virtual)
     first = _beam_sines(float(np.ptp(along[:, 0])), wavelength_m)
     second = _beam_sines(float(np.ptp(along[:, 1])), wavelength_m)
     sines = np.stack(np.meshgrid(first, second, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -64,6 +86,8 @@ def _beams(virtual: Float64[np.ndarray, "element 3"], wavelength_m: float) -> np
 
 def power_maps(observations: Observations) -> list[PowerMap]:
     """Delay–angle power of every pair of a transmitting and a receiving device.
+
+    An aperture that is too wide for one far field makes several maps.
 
     Transmitting elements add to the aperture within a device; between devices each makes a
     map of its own. A pair that nothing changes, say behind furniture, has no map: it tells no
@@ -81,12 +105,13 @@ def power_maps(observations: Observations) -> list[PowerMap]:
             t, r = tx[group], rx[group]
             tx_xyz, rx_xyz = observations.layout.tx_xyz[t], observations.layout.rx_xyz[r]
             virtual = (rx_xyz - rx_xyz.mean(axis=0)) + (tx_xyz - tx_xyz.mean(axis=0))
-            beams = _beams(virtual, wavelength_m)
             profile = delay_profile(observations.delta[t, r], window, OVERSAMPLING, peak=True)
-            power = np.abs(beams @ profile).T ** 2
-            if not power.any():
-                continue
-            maps.append(PowerMap(power.astype(np.float32), beams, tx_xyz, rx_xyz))
+            for run in _runs(virtual, wavelength_m):
+                beams = _beams(virtual[run], wavelength_m)
+                power = np.abs(beams @ profile[run]).T ** 2
+                if power.any():
+                    ends = tx_xyz[run], rx_xyz[run]
+                    maps.append(PowerMap(power.astype(np.float32), beams, *ends))
     return maps
 
 

@@ -56,7 +56,7 @@ def test_the_second_training_is_refused_in_one_line(
         while not (out / "config.json").exists():
             assert time.monotonic() < end and first.poll() is None
             time.sleep(0.05)
-        assert main(asked(tiny_dataset, out, "--iterations", "100000")) == 2
+        assert main(asked(tiny_dataset, out, "--iterations", "1")) == 2
         assert complaints(capsys.readouterr().err) == [
             f"error: {out}: another rfgs train is working on it; wait until it ends, or choose "
             "another --out"

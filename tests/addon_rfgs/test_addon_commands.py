@@ -270,6 +270,11 @@ def test_mistakes_get_one_line_and_exit_code_2(scenes: Path, addon) -> None:
     assert len(lines) == 1 and lines[0].startswith("error: ") and "invalid choice" in lines[0]
 
 
+def test_help_of_a_command_is_sentences(scenes: Path, addon) -> None:
+    done = addon(scenes / "room.blend", "import", "--help")
+    assert "back beside the scene. Brings the Gaussians" in " ".join(done.stdout.split())
+
+
 @pytest.mark.parametrize("content", [None, b"", b"not a blend file at all", b"BLENDER-v405garbage"])
 def test_missing_or_damaged_blend_is_refused(addon, tmp_path: Path, content: bytes | None) -> None:
     path = tmp_path / "scene.blend"

@@ -82,9 +82,13 @@ def add_command(tasks: Any, command: Command, kind: type | None) -> None:
         kind: Its operator; None if it has none.
     """
     text = (command.help or kind.bl_description).replace("%", "%%")
-    first = text.partition("\n")[0].removesuffix(".")
+    line, _, more = text.partition("\n")
+    first = line.removesuffix(".")
+    # One paragraph to argparse: the first line ends like a sentence.
     parser = tasks.add_parser(
-        command.name.split()[-1], help=f"{first[0].lower()}{first[1:]}", description=text
+        command.name.split()[-1],
+        help=f"{first[0].lower()}{first[1:]}",
+        description=f"{first}. {more}".rstrip(),
     )
     options = list(options_of(command, kind))
     for option in options:

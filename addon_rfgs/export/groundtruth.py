@@ -22,6 +22,7 @@ from ..scene.content import Content, content_ready
 from ..scene.findings import refuse
 from ..scene.frames import file_label, unit_scale
 from ..scene.lights import lights_ready
+from ..scene.outlines import give_to_renders
 from ..scene.overrides import Overrides
 from ..scene.state import Keeper
 from .exr import read_exr, write_exr
@@ -74,6 +75,7 @@ def render_groundtruth(
         with lights_ready(scene, content.space is not None and content.space.walled):
             views = find_views(scene, cameras, resolution, content.ring)[0]
             _number_instances(keeper, content)
+            give_to_renders(keeper, (surface.source for surface in content.moving))
             _configure(keeper, scene, views[0])
             if empty:
                 for surface in content.moving:

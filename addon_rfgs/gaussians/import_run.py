@@ -18,6 +18,7 @@ from ..saving import save_copy
 from ..scene.cameras import picture_size
 from ..scene.frames import file_label
 from ..scene.lights import lights_ready
+from ..scene.outlines import RAYS
 from ..scene.state import Keeper, kept, show_what_renders
 from ..scene.survey import survey
 from .clouds import Imported, Inspection, import_gaussians
@@ -25,9 +26,6 @@ from .compare import compare_with_mesh, keep_result
 from .display import Display, set_display
 from .opening import show_at_opening
 from .viewpoint import cameras_of, choose_camera
-
-#: Kinds of rays that may see an object.
-_RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
 
 
 @dataclass(frozen=True)
@@ -169,7 +167,7 @@ def _invisible(items: list[bpy.types.Object]) -> Iterator[None]:
     keeper = Keeper()
     try:
         for item in items:
-            for kind in _RAYS:
+            for kind in RAYS:
                 keeper.set(item, f"visible_{kind}", False)
         yield
     finally:

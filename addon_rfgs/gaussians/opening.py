@@ -10,6 +10,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..ownership import found_collection, own_collection
+from ..scene.outlines import take_from_renders
 from .clouds import COLLECTION, Imported
 from .display import Display
 from .viewpoint import choose_camera, shown_points, sight_lines
@@ -62,7 +63,8 @@ def show_at_opening(
 
 
 def _outline(item: bpy.types.Object) -> None:
-    """Draws a true mesh as few thin lines; renders do not change."""
+    """Draws a true mesh as few thin lines, and lets renders show the Gaussians alone."""
+    take_from_renders(item)
     item.display_type, item.color = "WIRE", _TRUTH
     if item.type == "MESH" and len(item.data.polygons) > _TRUTH_FACES:
         fewer: Any = item.modifiers.new("RFGS outline", "DECIMATE")

@@ -83,7 +83,9 @@ def run(args: ViewArgs) -> int:
         find_chromium()
     path = chosen_run(args.run, args.example)
     trained = _first_frame(path) if args.wait else open_run(path)
-    with running_server(args.host, args.port) as server:
+    # Only the own browser asks for a page that is drawn: no viewer that is open is in its way.
+    host, port = ("127.0.0.1", 0) if files else (args.host, args.port)
+    with running_server(host, port) as server:
         viewer = Viewer(
             trained, server, args.frame, args.color, args.show, play=args.play and not files
         )

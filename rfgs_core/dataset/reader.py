@@ -102,4 +102,8 @@ class Dataset:
         """
         missing = [name for name in contents if name not in self.info.has]
         if missing:
-            raise RfgsError(f"{self.path}: this dataset holds no {', '.join(missing)}")
+            remedy = "; it has them if made by `rfgs-factory generate --paths`"
+            raise RfgsError(
+                f"{self.path}: this dataset holds no {', '.join(missing)}"
+                f"{remedy if missing == ['paths'] else ''}"
+            )

@@ -192,6 +192,29 @@ def test_an_inspection_opens_in_colour_through_a_camera_past_the_walls(
     assert seen["said"][0].startswith("Median ") and "in 3 frames" in seen["said"][1]
 
 
+_RENDERED = """
+import bpy, sys
+bpy.ops.wm.open_mainfile(filepath=sys.argv[1], use_scripts=False)
+truth = [i for i in bpy.context.scene.objects if i.display_type == "WIRE"]
+sys.stdout.write(f"\\n{len(truth)} {sum(i.visible_camera or i.visible_shadow for i in truth)}\\n")
+"""
+
+
+def test_renders_of_an_inspection_lack_the_truth_and_pictures_of_a_dataset_do_not(
+    scenes: Path, addon, python, tmp_path: Path
+) -> None:
+    write_run(tmp_path / "run", (3,))
+    blend = tmp_path / "inspect.blend"
+    done = addon(scenes / "room.blend", "import", tmp_path / "run", "--out", blend)
+    assert done.returncode == 0, done.stderr
+    assert python("-c", _RENDERED, blend).stdout.splitlines()[-1] == "1 0"
+    arguments = ("--frames", "2:3:2", "--cameras", "1", "--samples", "1", "--passes")
+    done = addon(blend, "groundtruth", "--out", tmp_path / "truth", *arguments)
+    assert done.returncode == 0, done.stderr
+    index = read_passes(tmp_path / "truth" / "cam00" / "000002.exr")["IndexOB.X"]
+    assert set(np.unique(index)) == {0.0, 1.0}
+
+
 _LOOK = """
 import bpy, json, sys
 bpy.ops.wm.open_mainfile(filepath=sys.argv[1], use_scripts=False)
@@ -245,6 +268,11 @@ def test_mistakes_get_one_line_and_exit_code_2(scenes: Path, addon) -> None:
     assert done.returncode == 2
     lines = done.stderr.strip().splitlines()
     assert len(lines) == 1 and lines[0].startswith("error: ") and "invalid choice" in lines[0]
+
+
+def test_help_of_a_command_is_sentences(scenes: Path, addon) -> None:
+    done = addon(scenes / "room.blend", "import", "--help")
+    assert "back beside the scene. Brings the Gaussians" in " ".join(done.stdout.split())
 
 
 @pytest.mark.parametrize("content", [None, b"", b"not a blend file at all", b"BLENDER-v405garbage"])

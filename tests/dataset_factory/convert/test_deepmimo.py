@@ -124,5 +124,5 @@ def test_the_same_paths_give_the_same_bytes(
 
 
 def test_datasets_without_paths_are_refused(tiny_dataset: Path, tmp_path: Path) -> None:
-    with pytest.raises(RfgsError, match="holds no paths"):
+    with pytest.raises(RfgsError, match=r"holds no paths; .* `rfgs-factory generate --paths`"):
         convert(tiny_dataset, "deepmimo", tmp_path / "out")

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import io
+import socket
 import subprocess
 import time
 from collections.abc import Callable, Iterator
@@ -130,8 +131,12 @@ def test_the_page_asks_nobody_else(browser: Browser) -> None:
 def test_a_picture_of_the_page(python: Python, known_run: Run, tmp_path: Path) -> None:
     file = tmp_path / "page.png"
     # In a process of its own: one browser at a time is driven from a thread.
-    arguments = ["view", known_run.path, "--port", "0", "--picture", file]
-    python("-m", "rfgs_core.cli", *arguments, must_work=True)
+    with socket.socket() as another_viewer:
+        another_viewer.bind(("127.0.0.1", 0))
+        another_viewer.listen()
+        port = another_viewer.getsockname()[1]
+        arguments = ["view", known_run.path, "--port", port, "--picture", file]
+        python("-m", "rfgs_core.cli", *arguments, must_work=True)
     with Image.open(file) as image:
         assert image.size == (WIDTH_PX, HEIGHT_PX)
         picture = np.asarray(image.convert("RGB")).astype(int)

@@ -3,14 +3,19 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 import torch
 
 from rfgs_core.measure.observations import Observations
-from rfgs_core.model.delay_power import DelayPowerModel, power_maps
+from rfgs_core.model.delay_power import RUN_WAVELENGTHS, DelayPowerModel, power_maps
 from rfgs_core.propagation import Links, Subcarriers, scatter
-from rfgs_core.radio import preset
+from rfgs_core.radio import Layout, layout, place_devices, preset
+from rfgs_core.radio.constants import SPEED_OF_LIGHT
+
+BOUNDS_M = np.array([[0.0, 0.0, 0.0], [4.0, 3.0, 2.2]])
 
 POINTS = np.array([[1.2, 1.0, 0.8], [2.4, 2.0, 1.2], [1.9, 1.6, 1.6], [2.7, 1.1, 0.5]])
 #: The model takes spreading and delay at the centre of an array of 8 cm, and one wavelength.
@@ -107,3 +112,35 @@ def test_clocks_do_not_matter(observations: Observations) -> None:
         np.testing.assert_allclose(
             second.power, first.power, rtol=1e-3, atol=1e-6 * first.power.max()
         )
+
+
+@pytest.fixture
+def circling() -> Observations:
+    """An antenna that goes around the points, far out: wider than any far field."""
+    radio = preset("sar")
+    places = place_devices(radio, BOUNDS_M)[::4]
+    each = [layout(radio, places, number) for number in range(len(places))]
+    count, names = len(places), [f.name for f in fields(Layout) if f.name != "measured"]
+    elements = Layout(
+        **{name: np.concatenate([getattr(one, name) for one in each]) for name in names},
+        measured=np.eye(count, dtype=bool),
+    )
+    nothing = np.zeros((count, count, 64), np.complex64)
+    freq_hz = np.linspace(9.6e9, 10.4e9, 64)
+    every = np.ones(64, bool)
+    return Observations(nothing, nothing, elements.measured, every, elements, freq_hz, BOUNDS_M)
+
+
+def test_a_wide_aperture_makes_several_maps(circling: Observations) -> None:
+    """Of one point each map is the expectation, though the aperture as a whole has no far field."""
+    wavelength_m = SPEED_OF_LIGHT / circling.centre_hz
+    for index, csi in enumerate(channels(circling, POINTS)):
+        model = DelayPowerModel(circling.with_delta(csi), POINTS)
+        assert sum(len(entry.tx_xyz) for entry in model.maps) == len(circling.layout.tx_xyz)
+        assert len(model.maps) > 5
+        power = np.zeros(len(POINTS), np.float32)
+        power[index] = 1.0
+        for part, (_, _, data) in enumerate(model.parts):
+            width_m = np.linalg.norm(np.ptp(model.maps[part].tx_xyz, axis=0))
+            assert width_m <= RUN_WAVELENGTHS * wavelength_m
+            assert np.abs(model.expected(part, power) - data).max() < TOLERANCE * data.max()

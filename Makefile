@@ -89,7 +89,7 @@ $(READY): pyproject.toml constraints.txt
 
 # Once, so that neither the first run nor each of its workers waits for compilers.
 $(KERNELS): $(READY) | system
-	@echo "Compiling kernels once (some four minutes) ..."
+	@echo "Compiling kernels once (some three minutes) ..."
 	@bash .ci/compile_kernels.sh $(VENV)
 	@touch $(KERNELS)
 

@@ -73,7 +73,7 @@ class TrainOptions:
     """Where reflectivities are solved and Gaussians refined: cpu, or cuda, the current GPU."""
     without: tuple[Part, ...] = ()
     """Leave out parts of the paper's recipe, as its table 2 does: rf_weights (in eq. 5), densify,
-    feature_gradients (their condition for new Gaussians), prune; see `rfgs ablate`."""
+    feature_gradients (their condition for new Gaussians), prune; see `rfgs bench table2`."""
     temporal: float = 0.0
     """Weight with which Gaussians are held to their place on the body from frame to frame."""
     posture: Posture = "told"

@@ -20,7 +20,6 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "report": ("report", "ReportArgs"),
     "compare": ("compare", "CompareArgs"),
     "study": ("study", "StudyArgs"),
-    "ablate": ("ablate", "AblateArgs"),
     "predict": ("predict", "PredictArgs"),
     "csi": ("csi", "CsiArgs"),
     "room": ("room", "RoomArgs"),

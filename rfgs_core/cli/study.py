@@ -46,8 +46,10 @@ def run(args: StudyArgs) -> int:
     from rfgs_core.errors import RfgsError
     from rfgs_core.files import write_json, write_text
     from rfgs_core.report.metrics_file import read_metrics
-    from rfgs_core.study import cases, study_table, summarise
+    from rfgs_core.study.cases import cases
     from rfgs_core.study.price import price_line, timed_work
+    from rfgs_core.study.summary import summarise
+    from rfgs_core.study.table import study_table
 
     chosen = cases(args.scenes, args.conditions, args.radios, args.seeds)
     if args.out.exists() and not args.out.is_dir():

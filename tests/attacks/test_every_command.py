@@ -34,7 +34,6 @@ _GENERATE = "rfgs-factory generate living_room_walk --radio wifi"
 #: What a command fills, and a link in it where the command would read or write.
 FOLDERS = {
     "rfgs study OUT --scenes living_room_walk --conditions clean --radios wifi --seeds 1": "runs",
-    "rfgs ablate DATA --radio wifi --iterations 1 --out OUT": "full",
     "rfgs bench table1 --size smoke --seeds 1 --out OUT": "cells",
     "rfgs demo --out OUT": "settings.json",
     "rfgs demo --frames 10:20:10 --out OUT": "dataset",
@@ -84,7 +83,6 @@ PIPES = [
     "rfgs export PIPE --out OUT.ply",
     "rfgs compare PIPE RUN",
     "rfgs compare RUN PIPE",
-    "rfgs ablate PIPE --radio wifi --out OUT",
     "rfgs predict PIPE --tx 1,1,1 --rx 2,2,1",
     "rfgs predict RUN --tx 1,1,1 --rx 2,2,1 --also PIPE",
     "rfgs import PIPE --layout LAYOUT --out OUT",

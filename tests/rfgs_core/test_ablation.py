@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The paper's ablation: each variant leaves out what it says, and the table tells what it cost."""
+"""The paper's ablation: each variant leaves out what it says."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import torch
 from rfgs_core.fit.density import DensityRule
 from rfgs_core.fit.losses import SamplePoints, position_loss
 from rfgs_core.gaussians import Gaussians
-from rfgs_core.study.ablation import VARIANTS, ablation_row, ablation_table
 
 
 def test_parts_leave_the_rule_one_by_one() -> None:
@@ -33,14 +32,3 @@ def test_without_weights_every_point_counts_alike() -> None:
     points.features[1, 0] = 1.0
     assert position_loss(gaussians, points, nearest).item() == pytest.approx(9.0)
     assert position_loss(gaussians, points, nearest, weighted=False).item() == pytest.approx(5.0)
-
-
-def test_the_table_tells_what_each_part_is_worth() -> None:
-    rows = [
-        ablation_row(variant, {"geometry": {"f05": 0.5, "f10": 0.7 - 0.1 * k}, "train_s": 60}, 100)
-        for k, variant in enumerate(VARIANTS[:2])
-    ]
-    lines = ablation_table(rows).splitlines()
-    assert lines[2] == "| full | 0.500 | 0.700 | – | 100 | 60 s | 33.7 |"
-    assert lines[3] == "| w/o RF-weighted loss | 0.500 | 0.600 | -0.100 | 100 | 60 s | 28.3 |"
-    assert "claimed, not reproduced" in lines[-1] + lines[-2]

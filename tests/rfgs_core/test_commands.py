@@ -151,24 +151,6 @@ def test_a_run_that_lacks_frames_is_refused_before_work_on_all_of_them(
 
 
 @pytest.mark.parametrize(
-    ("extra", "message"),
-    [
-        (["--radio", "radar"], "no radio 'radar'; it holds wifi"),
-        (["--radio", "wifi", "--frames", "9"], "--frames '9': none of these is there"),
-        (["--radio", "wifi", "--frames", "2:1"], "expected FIRST <= LAST"),
-        (["--radio", "wifi", "--iterations", "-3"], "--iterations -3: expected at least 0"),
-    ],
-)
-def test_ablate_refuses_what_no_variant_could_be_trained_on(
-    tiny_dataset: Path, tmp_path: Path, capsys, extra: list[str], message: str
-) -> None:
-    out = tmp_path / "out"
-    line = error_line(["ablate", str(tiny_dataset), "--out", str(out), *extra], capsys)
-    assert message in line
-    assert not out.exists()
-
-
-@pytest.mark.parametrize(
     ("part", "option"),
     [("propagation", "gaussians"), ("training", "gaussians"), ("training", "steps")],
 )
@@ -265,7 +247,6 @@ def test_blender_is_taken_from_the_environment(
 
 #: Every command that writes what OUT names, with what it must be told before that.
 WRITING: dict[str, tuple[str, ...]] = {
-    "ablate": ("data", "--radio", "wifi"),
     "addon": ("build",),
     "bench": ("table1",),
     "compare": ("run", "run"),

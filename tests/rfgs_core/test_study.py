@@ -14,8 +14,10 @@ from rfgs_core.cli.study import StudyArgs, run
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import write_json
 from rfgs_core.seals import write_sealed_json
-from rfgs_core.study import CONDITIONS, RADIOS, SCENES, Case, cases, study_table, summarise
+from rfgs_core.study.cases import CONDITIONS, RADIOS, SCENES, Case, cases
 from rfgs_core.study.price import price_line, timed_work
+from rfgs_core.study.summary import summarise
+from rfgs_core.study.table import study_table
 
 
 def metrics(f10: float, **changes: float) -> dict[str, Any]:

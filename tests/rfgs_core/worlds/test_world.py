@@ -135,9 +135,9 @@ def test_segments_move_with_their_joints(worlds) -> None:
 
 def test_a_stream_hears_people_and_its_workers_share_it() -> None:
     settings = WorldSettings(frames=1, depth=1)
-    every = list(islice(soundings(preset("wifi_commodity"), settings, seed=1), 3))
-    (third,) = islice(soundings(preset("wifi_commodity"), settings, seed=1, first=2, step=3), 1)
-    np.testing.assert_array_equal(every[2].csi, third.csi)
+    every = list(islice(soundings(preset("wifi_commodity"), settings, seed=1), 2))
+    (second,) = islice(soundings(preset("wifi_commodity"), settings, seed=1, first=1, step=2), 1)
+    np.testing.assert_array_equal(every[1].csi, second.csi)
     for heard in every:
         links = heard.csi_static.shape
         assert heard.csi.shape == (1, *links) and np.isfinite(heard.csi).all()

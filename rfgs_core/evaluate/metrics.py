@@ -35,6 +35,8 @@ from rfgs_core.seals import write_sealed_json
 SCHEMA = "rfgs-metrics/2"
 #: Name of the evaluated method among the baselines while they are computed alike.
 METHOD = "method"
+#: The bar of the first frame, which also waits for kernels: nothing tells what is left yet.
+_FIRST_FRAME = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}]"
 MEDIANS = ("element_snr_median_db", "subcarrier_snr_median_db")
 
 
@@ -55,10 +57,13 @@ def evaluate_run(run: EvaluatedRun, *, oracle: bool = True) -> dict[str, Any]:
     sys.stderr.write(f"{price_line(run, len(pictures), oracle=oracle)}\n")
     steps = len(run.frames) * (1 + len(BASELINES)) + len(pictures)
     with tqdm(total=steps, desc="evaluate", unit="step") as bar:
+        usual = bar.bar_format
+        bar.bar_format = usual or _FIRST_FRAME
         with timed(frames_stage(run)) as clock:
             for frame in run.frames:
                 _evaluate_frame(scene, frame, table, room, bar.update)
                 clock.step()
+                bar.bar_format = usual
         image, image_reasons = ({}, {})
         if pictures:
             image, image_reasons = picture_metrics(run, bar.update)

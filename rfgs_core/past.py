@@ -214,6 +214,11 @@ def size_in_words(size_bytes: float) -> str:
     return f"{size_bytes / 1e9:.1f} GB" if size_bytes >= 1e9 else f"{size_bytes / 1e6:.1f} MB"
 
 
+def count_in_words(count: int, noun: str) -> str:
+    """A number of things, one of them in the singular."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
 def _of_usual(kind: str) -> float | None:
     """What this machine took of the usual time: at work of this kind, else at any; None unknown."""
     with suppress(OSError, RfgsError):

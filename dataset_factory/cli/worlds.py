@@ -82,6 +82,7 @@ def run(args: WorldsArgs) -> int:
     from rfgs_core.extras import require
     from rfgs_core.files import refuse_place
     from rfgs_core.links import filled
+    from rfgs_core.past import count_in_words
     from rfgs_core.worlds.motion import FAMILIES
     from rfgs_core.worlds.settings_file import WorldsFile
     from rfgs_core.worlds.world import WorldSettings
@@ -116,7 +117,7 @@ def run(args: WorldsArgs) -> int:
         with tqdm(total=left, desc="worlds", unit="world", disable=not left) as bar:
             for _ in make_worlds(args.out, shared, args.radio, indices, spread):
                 bar.update()
-    sys.stdout.write(f"{args.out}: {len(indices)} worlds, {left} of them new\n")
+    sys.stdout.write(f"{args.out}: {count_in_words(len(indices), 'world')}, {left} of them new\n")
     return 0
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataset_factory.plan.job import Job
 from dataset_factory.plan.stages import Size, stages
-from rfgs_core.past import forecast, in_words, size_in_words
+from rfgs_core.past import count_in_words, forecast, in_words, size_in_words
 
 
 def price_line(job: Job, size: Size, disk_bytes: float) -> str:
@@ -17,7 +17,7 @@ def price_line(job: Job, size: Size, disk_bytes: float) -> str:
         disk_bytes: Disk that is needed, at most [B].
     """
     radios = len(job.plan.radios)
-    what = f"{size.frames} frames of {radios} radio{'s' * (radios > 1)}"
+    what = f"{count_in_words(size.frames, 'frame')} of {count_in_words(radios, 'radio')}"
     what += f", {size.pictures} pictures" if size.cameras else ", no pictures"
     time = forecast(stages(job, size))
     less = "fewer --frames" + (", --cameras" * bool(size.cameras)) + " or --depth 1 make it less"

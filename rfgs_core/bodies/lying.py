@@ -32,7 +32,7 @@ _ALONG_M, _AROUND_M = np.linspace(-0.7, 0.7, 12), np.array([-0.03, 0.07, 0.17])
 #: Heights at which somebody upright, seated or not, is louder than who lies [m].
 _CHEST_M = np.array([0.9, 1.1, 1.3])
 #: A bar that is quieter than that by this logarithm of power is not asked for.
-CHEST_LOG = 0.5
+CHEST_LOG = 0.3
 #: Bars whose likelihood is asked for at each height, with the head at either end: the loudest that
 #: differ by a place or a turn.
 BARS, APART_M, APART_RAD = 3, 0.3, 0.5
@@ -182,27 +182,32 @@ def _lies(
     def likely(bodies: Bodies) -> Float64[np.ndarray, "pair"]:
         return evidence.of_density(StartCells.of(maps, bodies, bounds_m).density(bodies), bodies)
 
-    upright = Bodies.standing(axes_xy[[body]])
-    angles = np.arange(DIRECTIONS) * (2 * np.pi / DIRECTIONS)
-    rivals = evidence.all(
-        likely, [upright, *(Bodies(upright.axes_xy, np.array([angle])) for angle in angles)]
-    )
-    bars = lay + [
-        bar
-        for height in HEIGHTS_M
-        for bar in _loudest(_loudness(maps, bounds_m, ground, height), ground, height)
+    def climbed(
+        start: tuple[Bodies, np.ndarray], tries: list[Bodies]
+    ) -> tuple[Bodies, Float64[np.ndarray, "pair"]]:
+        """The likeliest of a body as it is and in other places."""
+        inside = [one for one in tries if _inside(one, bounds_m)]
+        for one in zip(inside, evidence.all(likely, inside), strict=True):
+            if evidence.lead(one[1], start[1]) > 0.0:
+                start = one
+        return start
+
+    bars = [
+        _loudest(_loudness(maps, bounds_m, ground, height), ground, height) for height in HEIGHTS_M
     ]
-    if not bars:
+    upright = Bodies.standing(axes_xy[[body]])
+    standing = likely(upright)
+    # Of most bodies that stand the loudest bars are enough to see that.
+    best = climbed((upright, standing), [*lay, *(bar for found in bars for bar in found[:2])])
+    if best[0] is upright:
         return None
-    best, log = bars[0], likely(bars[0])
-    for tries in (bars[1:], *NUDGES):
-        if isinstance(tries, tuple):
-            tries = [one for one in _nudged(best, tries) if _inside(one, bounds_m)]
-        for one, its_log in zip(tries, evidence.all(likely, tries), strict=True):
-            if evidence.lead(its_log, log) > 0.0:
-                best, log = one, its_log
-    least = min(evidence.lead(log, rival) for rival in rivals)
-    return best if least > TO_LIE else None
+    best = climbed(best, [bar for found in bars for bar in found[2:]])
+    for nudge in NUDGES:
+        best = climbed(best, _nudged(best[0], nudge))
+    angles = np.arange(DIRECTIONS) * (2 * np.pi / DIRECTIONS)
+    seated = [Bodies(upright.axes_xy, np.array([angle])) for angle in angles]
+    rivals = [standing, *evidence.all(likely, seated)]
+    return best[0] if min(evidence.lead(best[1], rival) for rival in rivals) > TO_LIE else None
 
 
 def _nudged(bodies: Bodies, nudge: tuple[float, float, float]) -> list[Bodies]:

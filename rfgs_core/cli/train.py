@@ -67,6 +67,7 @@ def run(args: TrainArgs) -> int:
     from rfgs_core.errors import RfgsError
     from rfgs_core.frames import chosen_frames
     from rfgs_core.measure.observations import packets_to_read
+    from rfgs_core.past import count_in_words
     from rfgs_core.render.shader import ShaderConfig
     from rfgs_core.render.view import fit_run_shader
     from rfgs_core.run.calibration import calibration_text
@@ -101,8 +102,9 @@ def run(args: TrainArgs) -> int:
         seed = sub_seed(config.seed, "shader")
         fit_run_shader(trained, ShaderConfig.for_recipe(config.recipe, seed))
     sys.stdout.write(
-        f"{args.out}: {len(frames)} frames, {len(trained.moving(frames[0]))} Gaussians, "
-        f"{trained.config.train_s:.0f} s; next: rfgs eval {args.out}\n"
+        f"{args.out}: {count_in_words(len(frames), 'frame')}, "
+        f"{len(trained.moving(frames[0]))} Gaussians, {trained.config.train_s:.0f} s; "
+        f"next: rfgs eval {args.out}\n"
     )
     return 0
 

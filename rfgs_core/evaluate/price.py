@@ -8,7 +8,7 @@ from dataclasses import replace
 from rfgs_core.evaluate.baselines import BASELINES
 from rfgs_core.evaluate.oracle import MOST_FRAMES
 from rfgs_core.evaluate.scene import EvaluatedRun
-from rfgs_core.past import Speed, Stage, forecast, in_words, size_in_words
+from rfgs_core.past import Speed, Stage, count_in_words, forecast, in_words, size_in_words
 from rfgs_core.run.costs import stages as training_stages
 
 #: Time before the first frame, and of a frame of Wi-Fi with all baselines, on two cores of an AMD
@@ -53,7 +53,7 @@ def price_line(run: EvaluatedRun, pictures: int, *, oracle: bool) -> str:
     fits = f", {min(frames, MOST_FRAMES)} fits from the true surface" if oracle else ""
     less = "; --no-oracle is less" if oracle else ""
     return (
-        f"{frames} frames beside {len(BASELINES)} baselines, {pictures} pictures{fits}; about "
-        f"{size_in_words(frames * BYTES_PER_FRAME)}; about {in_words(found.total_s)}, "
-        f"{found.source}{less}"
+        f"{count_in_words(frames, 'frame')} beside {len(BASELINES)} baselines, {pictures} "
+        f"pictures{fits}; about {size_in_words(frames * BYTES_PER_FRAME)}; about "
+        f"{in_words(found.total_s)}, {found.source}{less}"
     )

@@ -12,7 +12,16 @@ from dataclasses import asdict, dataclass
 from tqdm import tqdm
 
 from rfgs_core.dataset import Sequence
-from rfgs_core.past import Clock, Speed, Stage, forecast, in_words, note_speed, size_in_words
+from rfgs_core.past import (
+    Clock,
+    Speed,
+    Stage,
+    count_in_words,
+    forecast,
+    in_words,
+    note_speed,
+    size_in_words,
+)
 from rfgs_core.run.config import RunConfig
 from rfgs_core.run.folder import Run
 
@@ -112,8 +121,9 @@ def price_line(run: Run, looks: int = 0) -> str:
     posing = [pose_stage(run, looks)] if looks and frames else []
     found = forecast([*posing, *stages(run.config, run.sequence, frames, settings.iterations)])
     return (
-        f"{frames} frames to fit, {settings.iterations} steps each, about {size}; about "
-        f"{in_words(found.total_s)}, {found.source}; fewer --frames or --iterations are less"
+        f"{count_in_words(frames, 'frame')} to fit, {settings.iterations} steps each, "
+        f"about {size}; about {in_words(found.total_s)}, {found.source}; fewer --frames or "
+        "--iterations are less"
     )
 
 

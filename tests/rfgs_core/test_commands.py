@@ -174,7 +174,7 @@ def test_train_then_other_settings_in_the_same_folder(
     out = tmp_path / "run"
     arguments = ["train", str(tiny_dataset), "--radio", "wifi", "--out", str(out), *TINY]
     assert main([*arguments, "--frames", "1"]) == 0
-    assert "1 frames, 40 Gaussians" in capsys.readouterr().out
+    assert "1 frame, 40 Gaussians" in capsys.readouterr().out
     before = (out / "gaussians/000001.ply").read_bytes()
     line = error_line([*arguments, "--frames", "1", "--seed", "1"], capsys)
     assert "holds a run with another seed;" in line

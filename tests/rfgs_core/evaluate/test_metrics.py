@@ -16,6 +16,7 @@ from rfgs_core.evaluate.metrics import evaluate_run
 from rfgs_core.evaluate.price import price_line
 from rfgs_core.evaluate.rf import RF_KEYS
 from rfgs_core.evaluate.verdicts import LOST, WON, verdicts
+from rfgs_core.past import count_in_words
 
 REQUIRED = (
     "zero",
@@ -148,7 +149,8 @@ def test_an_evaluation_says_its_price_and_learns_from_it(
     assert fit.endswith("--no-oracle is less")
     evaluate_run(surface_run, oracle=False)
     said = capsys.readouterr().err
-    assert f"{len(surface_run.frames)} frames beside {len(BASELINES)} baselines" in said
+    frames = count_in_words(len(surface_run.frames), "frame")
+    assert f"{frames} beside {len(BASELINES)} baselines" in said
     assert "evaluate" not in price_line(surface_run, 0, oracle=False)
     assert "as measured here before" in price_line(surface_run, 0, oracle=False)
     # The first frame waits for kernels too: no time left is made of it.

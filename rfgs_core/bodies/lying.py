@@ -32,7 +32,7 @@ _ALONG_M, _AROUND_M = np.linspace(-0.7, 0.7, 12), np.array([-0.03, 0.07, 0.17])
 #: Heights at which somebody upright, seated or not, is louder than who lies [m].
 _CHEST_M = np.array([0.9, 1.1, 1.3])
 #: A bar that is quieter than that by this logarithm of power is not asked for.
-CHEST_LOG = 0.3
+CHEST_LOG = 0.1
 #: Bars whose likelihood is asked for at each height, with the head at either end: the loudest that
 #: differ by a place or a turn.
 BARS, APART_M, APART_RAD = 3, 0.3, 0.5

@@ -34,6 +34,8 @@ def write_pose_chart(
             for body in estimate.joints[k]:
                 _skeleton(axes, body, METHOD)
             axes.set_aspect("equal")
+            # Who lies is no taller than the ticks of an axis.
+            axes.set_ylim(top=max(axes.get_ylim()[1], 1.0))
             axes.set_title(f"frame {estimate.frames[k]}")
             axes.set_xlabel("y [m]")
             if column == 0:

@@ -297,7 +297,7 @@ def test_other_folders_are_not_overwritten(scenes: Path, addon, tmp_path: Path) 
 )
 def test_joints_project_into_the_person_in_every_camera(addon, tmp_path: Path) -> None:
     bundle_path, out = tmp_path / "bundle", tmp_path / "truth"
-    common = ("--frames", "40:40", "--resolution", "96")
+    common = ("--frames", "10:40:30", "--resolution", "96")
     done = addon(LIVING_ROOM, "export", "--out", bundle_path, *common)
     assert done.returncode == 0, done.stderr
     arguments = (*common, "--samples", "1", "--passes")
@@ -316,4 +316,4 @@ def test_joints_project_into_the_person_in_every_camera(addon, tmp_path: Path) -
             hidden = (index == 0) & (passes["Depth.Z"][v, u] < depth[inside])  # by furniture
             assert (index[~hidden] == 1).all(), (camera["name"], frame)
             checked += int((~hidden).sum())
-    assert checked > 50
+    assert checked > 100

@@ -85,7 +85,8 @@ class BenchArgs:
     steps: int | None = None
     """Adam steps for the parts `training` (left out: until the loss stands still) and `fields`."""
     device: Device = "cpu"
-    """Where the parts `propagation` and `training` run: cpu, or cuda, the current GPU."""
+    """Where the parts `propagation`, `training` and `performance` run: cpu, or cuda, the current
+    GPU."""
     size: Literal["smoke", "paper-cpu", "full"] = "smoke"
     """For the paper's tables: one scene; the study's four with the paper's steps (hours); or these
     with five seeds and larger neural fields (days)."""
@@ -276,13 +277,18 @@ def _scaling() -> dict[str, Any]:
 def _performance(args: BenchArgs) -> int:
     from dataclasses import asdict
 
+    from rfgs_core.device import need_device
     from rfgs_core.evaluate.provenance import now
+    from rfgs_core.extras import require
     from rfgs_core.files import refuse_place, write_json, write_text
     from rfgs_core.performance import measure, page
 
+    need_device(args.device)
+    if args.device == "cuda":
+        require("gsplat")
     for place in filter(None, (args.out, args.json)):
         refuse_place(place)
-    found = measure(lambda words: _note(f"timing {words}"))
+    found = measure(args.device, lambda words: _note(f"timing {words}"))
     text = page(found, now()[:10])
     if args.out is None:
         sys.stdout.write(text)

@@ -13,6 +13,8 @@ from __future__ import annotations
 import triton
 import triton.language as tl
 
+from rfgs_core.propagation.triton_math import plus, sine_cosine_of_turns, store_three, three_rows
+
 #: Gaussians and subcarriers of one tile: sixteen terms per thread of four warps.
 ROWS, SUBCARRIERS = 64, 32
 #: Rows of the gradient: positions, covariances, real and imaginary gain, normals; then groups.
@@ -41,44 +43,16 @@ def _leg(end, px, py, pz):
 
 
 @triton.jit
-def _three(table, row, mask, total, other):
-    """Three rows of a table."""
-    return (
-        tl.load(table + row, mask, other=other),
-        tl.load(table + total + row, mask, other=other),
-        tl.load(table + 2 * total + row, mask, other=other),
-    )
-
-
-@triton.jit
 def _spread(shape, row, mask, total, qx, qy, qz):
     """Σ q and q^T Σ q of packed covariances."""
-    xx, yy, zz = _three(shape, row, mask, total, 0.0)
-    xy, xz, yz = _three(shape + 3 * total, row, mask, total, 0.0)
+    xx, yy, zz = three_rows(shape, row, mask, total, 0.0)
+    xy, xz, yz = three_rows(shape + 3 * total, row, mask, total, 0.0)
     sx, sy, sz = (
         xx * qx + xy * qy + xz * qz,
         xy * qx + yy * qy + yz * qz,
         xz * qx + yz * qy + zz * qz,
     )
     return sx, sy, sz, sx * qx + sy * qy + sz * qz
-
-
-@triton.jit
-def _sine_cosine(turns):
-    """Sine and cosine of 2 pi `turns` in [-0.5, 0.5], as in `vector_math`: no branch, no table."""
-    x = turns * turns
-    s = -0.0070283 * x + 0.08205035
-    s = s * x - 0.59925219
-    s = s * x + 2.55016332
-    s = s * x - 5.16771276
-    s = (s * x + 3.14159265) * turns
-    c = 1.83999059e-3 * x - 2.57763173e-2
-    c = c * x + 0.235325437
-    c = c * x - 1.33526232
-    c = c * x + 4.05871211
-    c = c * x - 4.93480220
-    c = c * x + 1.0
-    return 2.0 * s * c, 1.0 - 2.0 * s * s
 
 
 @triton.jit
@@ -91,7 +65,7 @@ def _echo(length_m, spread, subcarrier, SUBCARRIERS: tl.constexpr):
     offset = tl.arange(0, SUBCARRIERS).to(tl.float32)
     k = _TWO_PI * (cycles.to(tl.float32) + step.to(tl.float32) * offset)
     turns = turns[:, None] + turn[:, None] * offset[None, :]
-    sine, cosine = _sine_cosine(turns - tl.floor(turns + 0.5))
+    sine, cosine = sine_cosine_of_turns(turns - tl.floor(turns + 0.5))
     size = tl.exp(-0.5 * spread[:, None] * (k * k)[None, :])
     return size * cosine, -size * sine, k
 
@@ -125,13 +99,13 @@ def scatter_forward(
     for first in range(split * per_split, tl.minimum(total, (split + 1) * per_split), ROWS):
         row = first + tl.arange(0, ROWS)
         mask = row < total
-        px, py, pz = _three(means, row, mask, total, _FAR_M)
+        px, py, pz = three_rows(means, row, mask, total, _FAR_M)
         d_t, tx, ty, tz, by_t = _leg(ends + 6 * link, px, py, pz)
         d_r, rx, ry, rz, by_r = _leg(ends + 6 * link + 3, px, py, pz)
         _, _, _, spread = _spread(shape, row, mask, total, tx + rx, ty + ry, tz + rz)
         weight = by_t * by_r
         if FACING:
-            nx, ny, nz = _three(normals, row, mask, total, 0.0)
+            nx, ny, nz = three_rows(normals, row, mask, total, 0.0)
             weight *= tl.sigmoid(sharpness * (nx * tx + ny * ty + nz * tz))
             weight *= tl.sigmoid(sharpness * (nx * rx + ny * ry + nz * rz))
         if WEIGHED:
@@ -148,23 +122,10 @@ def scatter_forward(
 
 
 @triton.jit
-def _across(x, y, z, ux, uy, uz):
+def _perpendicular(x, y, z, ux, uy, uz):
     """Part of a vector that is perpendicular to the unit vector u."""
     along = x * ux + y * uy + z * uz
     return x - along * ux, y - along * uy, z - along * uz
-
-
-@triton.jit
-def _plus(x, y, z, weight, ux, uy, uz):
-    """A vector and a weighted one."""
-    return x + weight * ux, y + weight * uy, z + weight * uz
-
-
-@triton.jit
-def _store_three(out, row, mask, total, x, y, z):
-    tl.store(out + row, x, mask)
-    tl.store(out + total + row, y, mask)
-    tl.store(out + 2 * total + row, z, mask)
 
 
 @triton.jit
@@ -202,7 +163,7 @@ def _by_leg(scale, by_length, ux, uy, uz, inverse, vx, vy, vz):
     dd/dp = -u and du/dp = -(I - u u^T)/d for each antenna.
     """
     near = scale * inverse - by_length
-    ax, ay, az = _across(vx, vy, vz, ux, uy, uz)
+    ax, ay, az = _perpendicular(vx, vy, vz, ux, uy, uz)
     return near * ux - ax * inverse, near * uy - ay * inverse, near * uz - az * inverse
 
 
@@ -215,13 +176,13 @@ def scatter_backward(
     """Writes out[split, rows_out, gaussian], given seed[link, re/im, column] = conj(dL/dH)."""
     split, row = tl.program_id(1), tl.program_id(0) * ROWS + tl.arange(0, ROWS)
     mask = row < total
-    px, py, pz = _three(means, row, mask, total, _FAR_M)
+    px, py, pz = three_rows(means, row, mask, total, _FAR_M)
     g, h = tl.load(gain + row, mask, other=0.0), tl.load(gain + total + row, mask, other=0.0)
     none = tl.zeros([ROWS], tl.float32)
     gx, gy, gz, gxx, gyy, gzz, gxy, gxz, gyz = (none,) * 9
     by_gain_r, by_gain_i, normal_x, normal_y, normal_z, nx, ny, nz = (none,) * 8
     if FACING:
-        nx, ny, nz = _three(normals, row, mask, total, 0.0)
+        nx, ny, nz = three_rows(normals, row, mask, total, 0.0)
     base = out + (split * rows_out).to(tl.int64) * total
     for link in range(split * per_split, tl.minimum(links, (split + 1) * per_split)):
         d_t, tx, ty, tz, by_t = _leg(ends + 6 * link, px, py, pz)
@@ -243,16 +204,16 @@ def scatter_backward(
         by_gain_r, by_gain_i = by_gain_r + weight * real, by_gain_i + weight * imaginary
         by_length, by_spread, scale = weight * by_length, weight * by_spread, weight * by_weight
         twice = 2.0 * by_spread
-        gxx, gyy, gzz = _plus(gxx, gyy, gzz, by_spread, qx * qx, qy * qy, qz * qz)
-        gxy, gxz, gyz = _plus(gxy, gxz, gyz, twice, qx * qy, qx * qz, qy * qz)
+        gxx, gyy, gzz = plus(gxx, gyy, gzz, by_spread, qx * qx, qy * qy, qz * qz)
+        gxy, gxz, gyz = plus(gxy, gxz, gyz, twice, qx * qy, qx * qz, qy * qz)
         vtx, vty, vtz = twice * sx, twice * sy, twice * sz
         vrx, vry, vrz = vtx, vty, vtz  # What the directions of both legs get.
         if FACING:
             facing_t, facing_r = sharpness * scale * hide_t, sharpness * scale * hide_r
-            normal_x, normal_y, normal_z = _plus(normal_x, normal_y, normal_z, facing_t, tx, ty, tz)
-            normal_x, normal_y, normal_z = _plus(normal_x, normal_y, normal_z, facing_r, rx, ry, rz)
-            vtx, vty, vtz = _plus(vtx, vty, vtz, facing_t, nx, ny, nz)
-            vrx, vry, vrz = _plus(vrx, vry, vrz, facing_r, nx, ny, nz)
+            normal_x, normal_y, normal_z = plus(normal_x, normal_y, normal_z, facing_t, tx, ty, tz)
+            normal_x, normal_y, normal_z = plus(normal_x, normal_y, normal_z, facing_r, rx, ry, rz)
+            vtx, vty, vtz = plus(vtx, vty, vtz, facing_t, nx, ny, nz)
+            vrx, vry, vrz = plus(vrx, vry, vrz, facing_r, nx, ny, nz)
         x1, y1, z1 = _by_leg(scale, by_length, tx, ty, tz, by_t, vtx, vty, vtz)
         x2, y2, z2 = _by_leg(scale, by_length, rx, ry, rz, by_r, vrx, vry, vrz)
         gx, gy, gz = gx + x1 + x2, gy + y1 + y2, gz + z1 + z2
@@ -260,10 +221,10 @@ def scatter_backward(
             # Nobody else adds here; atomic, since a warp must see what another one has stored.
             own = (_GROUP + tl.load(group + link)) * total + row
             tl.atomic_add(base + own, by_weight * seen, mask)
-    _store_three(base, row, mask, total, gx, gy, gz)
-    _store_three(base + _SHAPE * total, row, mask, total, gxx, gyy, gzz)
-    _store_three(base + (_SHAPE + 3) * total, row, mask, total, gxy, gxz, gyz)
+    store_three(base, row, mask, total, gx, gy, gz)
+    store_three(base + _SHAPE * total, row, mask, total, gxx, gyy, gzz)
+    store_three(base + (_SHAPE + 3) * total, row, mask, total, gxy, gxz, gyz)
     tl.store(base + _GAIN * total + row, by_gain_r, mask)
     tl.store(base + (_GAIN + 1) * total + row, by_gain_i, mask)
     if FACING:
-        _store_three(base + _NORMALS * total, row, mask, total, normal_x, normal_y, normal_z)
+        store_three(base + _NORMALS * total, row, mask, total, normal_x, normal_y, normal_z)

@@ -37,7 +37,7 @@ def run(args: SelftestArgs) -> int:
     from rfgs_core.device import need_device
     from rfgs_core.extras import require
     from rfgs_core.files import refuse_place, write_json
-    from rfgs_core.selftest import PICTURES, SIZES, checks, throughput
+    from rfgs_core.selftest import PICTURES, SIZES, SPEED, checks, throughput
 
     need_device(args.device)
     if args.device == "cuda":
@@ -52,12 +52,14 @@ def run(args: SelftestArgs) -> int:
             f"{check.what:42} error {check.error:.1e}, allowed {check.bound:.0e}: {word}\n"
         )
     speed = throughput(args.device)
+    gaussians, links, subcarriers = SPEED[args.device]
     machine = hardware()
     where = (
         machine["gpu"] if args.device == "cuda" else f"{machine['cpu']}, {machine['cores']} cores"
     )
+    size = f"{gaussians:,} Gaussians x {links} links x {subcarriers} subcarriers"
     sys.stdout.write(
-        f"20,000 Gaussians x 64 links x 64 subcarriers: {1e3 * speed.forward_s:.1f} ms, "
+        f"{size}: {1e3 * speed.forward_s:.1f} ms, "
         f"{speed.rate / 1e9:.1f} of {speed.ceiling / 1e9:.1f} billion operations per second "
         f"({speed.rate / speed.ceiling:.0%} of a product of matrices) on {where}\n"
     )

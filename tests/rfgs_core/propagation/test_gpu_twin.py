@@ -23,12 +23,13 @@ BANDS = [(5.72e9, 2.5e6, 1), (60e9, 12.5e6, 1), (3.1e9, 12.3e6, 4)]
 def test_scatter_is_the_plain_sum(
     make_cloud, make_links, monkeypatch, f0, df, knots, assert_twins_agree
 ) -> None:
-    # Three splits of the Gaussians and two of the links, the last ones not full.
+    # Two splits of the Gaussians and of the links, the last ones not full.
     monkeypatch.setattr(gpu, "LEAST_GAUSSIANS", 64)
-    monkeypatch.setattr(gpu, "LEAST_LINKS", 3)
+    monkeypatch.setattr(gpu, "LEAST_LINKS", 2)
     every = make_cloud(145, f0, knots)
     cloud = {name: every[name] for name in SCATTER}
-    links, subcarriers = make_links(7), Subcarriers(f0, df, 80, blocks=((0, 35), (60, 20)))
+    # Two runs of subcarriers with hidden ones in them, and one that is all hidden between.
+    links, subcarriers = make_links(4), Subcarriers(f0, df, 110, blocks=((3, 20), (25, 4), (70, 9)))
 
     def run(values, backend):
         return scatter(
@@ -110,8 +111,8 @@ from triton.compiler import ASTSource, compile
 from rfgs_core.propagation import kernels_triton as scattering, kernels_triton_shadow as shading
 
 double = ("means", "ends", "subcarrier", "legs")
-counts = ("total", "links", "chunks", "columns", "rows_out", "per_split", "legs_in", "legs_out")
-types = {**dict.fromkeys(double, "*fp64"), "group": "*i64", "chunk": "*i32", "sharpness": "fp32"}
+counts = ("total", "links", "chunks", "rows_out", "per_split", "legs_in", "legs_out")
+types = {**dict.fromkeys(double, "*fp64"), "group": "*i64", "sharpness": "fp32"}
 types |= dict.fromkeys(counts, "i32")
 sizes = ("ROWS", "SUBCARRIERS", "LEGS", "SCREENS", "SLOPES", "GRADIENTS")
 for room, kernel, own in (
@@ -122,6 +123,7 @@ for room, kernel, own in (
 ):
     names = kernel.arg_names
     known = {"FACING": True, "WEIGHED": True, **{n: getattr(room, n, None) for n in sizes}}
+    known["SUBCARRIERS"] = 8  # A loop over all 32 written out takes the compiler much longer.
     constants = {n: known[n] for n in names if n in known}
     kinds = {**types, **own}
     signature = {n: "constexpr" if n in constants else kinds.get(n, "*fp32") for n in names}
@@ -132,10 +134,10 @@ for room, kernel, own in (
 
 
 def test_kernels_compile_for_gpus_that_are_not_there(tmp_path) -> None:
-    """For an A100, an RTX 4090 and an H100."""
+    """For an A100 and an H100."""
     environment = {k: v for k, v in os.environ.items() if k != "TRITON_INTERPRET"}
     environment["TRITON_CACHE_DIR"] = str(tmp_path)
-    program = [sys.executable, "-c", COMPILE, "80", "89", "90"]
+    program = [sys.executable, "-c", COMPILE, "80", "90"]
     done = subprocess.run(program, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    assert [int(line) > 10_000 for line in done.stdout.split()] == [True] * 12
+    assert [int(line) > 10_000 for line in done.stdout.split()] == [True] * 8

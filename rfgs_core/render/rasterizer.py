@@ -20,16 +20,21 @@ from jaxtyping import Float
 from torch import Tensor
 
 from rfgs_core.gaussians.model import Gaussians
+from rfgs_core.propagation.vector_math import FAST_REDUCTION, exponential
 from rfgs_core.render.cameras import Camera
 from rfgs_core.render.gpu import GpuSplats
-from rfgs_core.render.splat import ALPHA_MAX, ALPHA_MIN, TILE_PX, FrozenSplats, Splatted
+from rfgs_core.render.splat import ALPHA_MAX, TILE_PX, FrozenSplats, Splatted
 from rfgs_core.render.tiles import TiledSplats, tile_splats
 
-#: A pixel is finished when less light than this passes; bounds the error of stopping early.
+#: A tile is finished when less light than this passes anywhere; bounds the error of stopping early.
 LIGHT_MIN = 1e-5
+#: Splats after which a tile is looked at again.
+_LOOK_EVERY = 16
 
 #: Pictures with fewer tile entries are drawn by one thread: waking others takes longer.
 SMALL_ENTRIES = 4096
+
+_OPTIONS: Any = {"fastmath": FAST_REDUCTION, "cache": True, "error_model": "numpy"}
 
 
 @dataclass(frozen=True)
@@ -45,8 +50,7 @@ class SplatPlan:
 
     def draw(self, rgb: Float[Tensor, "M 3"]) -> Splatted:
         """The picture with these colours; gradients flow into `rgb`, never into the Gaussians."""
-        picture: Tensor = _Blend.apply(rgb, self.tiles)  # type: ignore[assignment]
-        return Splatted(rgb=picture, alpha=self.alpha, depth=self.depth)
+        return Splatted(rgb=_blended(rgb, self.tiles)[0], alpha=self.alpha, depth=self.depth)
 
 
 def plan_splats(gaussians: Gaussians, camera: Camera) -> FrozenSplats:
@@ -58,17 +62,15 @@ def plan_splats(gaussians: Gaussians, camera: Camera) -> FrozenSplats:
     if gaussians.means.is_cuda:
         return GpuSplats.of(gaussians, camera)
     tiles = tile_splats(gaussians, camera)
-    ones_and_depths = np.stack([np.ones_like(tiles.depths), tiles.depths], axis=1)
-    blended = _blend(ones_and_depths, tiles)
-    alpha = blended[..., 0]
-    covered = alpha > 0.0
-    depth = np.full(alpha.shape, np.inf)
-    depth[covered] = blended[covered, 1] / alpha[covered]
-    return SplatPlan(
-        tiles=tiles,
-        alpha=torch.from_numpy(alpha.astype(np.float32)),
-        depth=torch.from_numpy(depth.astype(np.float32)),
-    )
+    depths, alpha = _blend(tiles.depths[:, None].astype(np.float32), tiles)
+    return SplatPlan(tiles, *_coverage(torch.from_numpy(alpha), torch.from_numpy(depths)))
+
+
+def _coverage(
+    alpha: Float[Tensor, "H W"], depths: Float[Tensor, "H W 1"]
+) -> tuple[Float[Tensor, "H W"], Float[Tensor, "H W"]]:
+    """Share covered, and the expected depth of blended depths."""
+    return alpha, torch.where(alpha > 0.0, depths[..., 0] / alpha, torch.inf)
 
 
 def splat(gaussians: Gaussians, rgb: Float[Tensor, "M 3"], camera: Camera) -> Splatted:
@@ -76,7 +78,8 @@ def splat(gaussians: Gaussians, rgb: Float[Tensor, "M 3"], camera: Camera) -> Sp
 
     Args:
         gaussians: M Gaussians; taken as constants.
-        rgb: Colours in [0, 1], shape [M, 3], on the same device; gradients flow into them.
+        rgb: Colours in [0, 1], shape [M, 3], on the same device, or any number of values each;
+            gradients flow into them.
         camera: Where to look from.
 
     Returns:
@@ -87,14 +90,32 @@ def splat(gaussians: Gaussians, rgb: Float[Tensor, "M 3"], camera: Camera) -> Sp
         >>> splat(Gaussians.none(), torch.zeros(0, 3), camera).alpha.sum().item()
         0.0
     """
-    return plan_splats(gaussians, camera).draw(rgb)
+    if gaussians.means.is_cuda:
+        return GpuSplats.of(gaussians, camera).draw(rgb)
+    tiles = tile_splats(gaussians, camera)
+    depths = np.zeros((len(rgb), 1))
+    depths[tiles.rows, 0] = tiles.depths
+    # Colours and depths in one walk through the tiles.
+    values = torch.cat([rgb, torch.from_numpy(depths).to(rgb)], dim=1)
+    blended, cover = _blended(values, tiles)
+    alpha, depth = _coverage(cover, blended.detach()[..., -1:].float())
+    return Splatted(rgb=blended[..., :-1], alpha=alpha, depth=depth)
 
 
-def _blend(values: np.ndarray, tiles: TiledSplats) -> np.ndarray:
-    picture = np.zeros((tiles.height, tiles.width, values.shape[1]))
+def _blended(
+    values: Float[Tensor, "M C"], tiles: TiledSplats
+) -> tuple[Float[Tensor, "H W C"], Float[Tensor, "H W"]]:
+    """Blended values, and the share of each pixel that is covered, without gradient."""
+    return _Blend.apply(values, tiles)  # type: ignore[return-value]
+
+
+def _blend(values: np.ndarray, tiles: TiledSplats) -> tuple[np.ndarray, np.ndarray]:
+    """Blended values [H, W, C], and the share that is covered [H, W]."""
+    channels = values.shape[1]
+    picture = np.zeros((tiles.height, tiles.width, channels + 1), values.dtype)
     with _threads_for(tiles):
         _blend_tiles(picture, values, tiles.splats, tiles.starts, tiles.entries)
-    return picture
+    return np.ascontiguousarray(picture[..., :channels]), picture[..., channels].astype(np.float32)
 
 
 @contextmanager
@@ -111,17 +132,18 @@ class _Blend(torch.autograd.Function):
     """Colours to picture, and back through the transposed weights."""
 
     @staticmethod
-    def forward(ctx: Any, rgb: Tensor, tiles: TiledSplats) -> Tensor:
-        ctx.tiles, ctx.shape = tiles, rgb.shape
-        values = rgb.detach().cpu().numpy().astype(np.float64)[tiles.rows]
-        return torch.from_numpy(_blend(np.ascontiguousarray(values), tiles)).to(rgb)
+    def forward(ctx: Any, values: Tensor, tiles: TiledSplats) -> tuple[Tensor, Tensor]:
+        ctx.tiles, ctx.shape = tiles, values.shape
+        picture, cover = map(torch.from_numpy, _blend(values.detach().numpy()[tiles.rows], tiles))
+        ctx.mark_non_differentiable(cover)
+        return picture, cover
 
     @staticmethod
     def backward(ctx: Any, *grad_outputs: Tensor) -> tuple[Tensor, None]:
-        (grad,) = grad_outputs
+        grad, _ = grad_outputs
         tiles: TiledSplats = ctx.tiles
-        towards = np.ascontiguousarray(grad.detach().cpu().numpy().astype(np.float64))
-        shares = np.zeros((len(tiles.entries), towards.shape[2]))
+        towards = np.ascontiguousarray(grad.detach().numpy())
+        shares = np.zeros((len(tiles.entries), towards.shape[2]), towards.dtype)
         with _threads_for(tiles):
             _blend_backward_tiles(shares, towards, tiles.splats, tiles.starts, tiles.entries)
         total = np.zeros(ctx.shape)
@@ -129,49 +151,7 @@ class _Blend(torch.autograd.Function):
         return torch.from_numpy(total).to(grad), None
 
 
-@numba.njit(inline="always")
-def _span(splat: np.ndarray, row: int, left: int, right: int) -> tuple[int, int]:
-    """Columns in [left, right) of one row where a splat may reach `ALPHA_MIN`.
-
-    Solves a dx² + 2 b dx dy + c dy² ≤ 2 · reach for dx, a pixel of margin on both sides.
-    """
-    a, b, c, reach = splat[2], splat[3], splat[4], splat[6]
-    dy = row + 0.5 - splat[1]
-    middle = splat[0] - b / a * dy
-    room = (2.0 * reach - (c - b * b / a) * dy * dy) / a
-    if room < 0.0:
-        room = 0.0
-    half = np.sqrt(room) + 1.0
-    first = max(left, min(right, int(np.floor(middle - half - 0.5))))
-    last = max(left, min(right, int(np.ceil(middle + half + 0.5))))
-    return first, last
-
-
-@numba.njit(inline="always")
-def _alpha(splat: np.ndarray, row: int, column: int) -> float:
-    """What one splat covers of a pixel, zero below `ALPHA_MIN`."""
-    dx, dy = column + 0.5 - splat[0], row + 0.5 - splat[1]
-    power = 0.5 * (splat[2] * dx * dx + splat[4] * dy * dy) + splat[3] * dx * dy
-    if power > splat[6] + 1e-6:
-        return 0.0
-    alpha = min(ALPHA_MAX, splat[5] * np.exp(-power))
-    return alpha if alpha >= ALPHA_MIN else 0.0
-
-
-@numba.njit(inline="always")
-def _take_light(
-    light: np.ndarray, splat: np.ndarray, row: int, column: int, top: int, left: int
-) -> float:
-    """Share of a pixel that one splat gives, taken from the light that still passes there."""
-    passing = light[row - top, column - left]
-    if passing < LIGHT_MIN:
-        return 0.0
-    alpha = _alpha(splat, row, column)
-    light[row - top, column - left] = passing * (1.0 - alpha)
-    return passing * alpha
-
-
-@numba.njit(inline="always")
+@numba.njit(inline="always", **_OPTIONS)
 def _tile_corner(tile: int, width: int, height: int) -> tuple[int, int, int, int]:
     """First and one-past-last column and row of a tile."""
     columns = (width + TILE_PX - 1) // TILE_PX
@@ -179,9 +159,70 @@ def _tile_corner(tile: int, width: int, height: int) -> tuple[int, int, int, int
     return left, min(width, left + TILE_PX), top, min(height, top + TILE_PX)
 
 
-@numba.njit(parallel=True, cache=True)
+@numba.njit(inline="always", **_OPTIONS)
+def _rows_reached(splat: np.ndarray, top: int) -> tuple[int, int]:
+    """Rows of a tile where a splat may reach `ALPHA_MIN`, a pixel of margin on both sides."""
+    a, b, c = splat[2], splat[3], splat[4]
+    half = np.sqrt(2.0 * splat[6] * a / (a * c - b * b)) + 1.0
+    middle = splat[1] - top - 0.5
+    first = max(0, min(TILE_PX, int(np.floor(middle - half))))
+    return first, max(first, min(TILE_PX, int(np.ceil(middle + half)) + 1))
+
+
+@numba.njit(inline="always", **_OPTIONS)
+def _take_light(
+    light: np.ndarray,  # [TILE_PX * TILE_PX], row after row
+    share: np.ndarray,  # [TILE_PX * TILE_PX]
+    splat: np.ndarray,
+    rows: tuple[int, int],
+    left: int,
+    top: int,
+) -> None:
+    """Writes the share that a splat gives to the pixels of these rows, and takes it from the light.
+
+    No branch, so that a row of a tile is a few vectors. The exponent is in double whatever the
+    precision of the light: whether it is within reach is what the plain twin finds too.
+    """
+    real = light.dtype.type
+    x, half_a, b, reach = splat[0] - left - 0.5, 0.5 * splat[2], splat[3], splat[6]
+    opacity, most = real(splat[5]), real(ALPHA_MAX)
+    for row in range(rows[0], rows[1]):
+        dy = row + top + 0.5 - splat[1]
+        by_row, along = 0.5 * splat[4] * dy * dy, b * dy
+        pixels = slice(row * TILE_PX, (row + 1) * TILE_PX)
+        lit, given = light[pixels], share[pixels]
+        for column in range(TILE_PX):
+            dx = column - x
+            power = (half_a * dx + along) * dx + by_row
+            alpha = opacity * exponential(real(-power))
+            alpha = min(alpha, most) * real(power <= reach)
+            given[column] = lit[column] * alpha
+            lit[column] -= given[column]
+
+
+@numba.njit(inline="always", **_OPTIONS)
+def _is_dark(light: np.ndarray) -> bool:
+    """Whether no pixel of a tile passes `LIGHT_MIN` any more."""
+    most = light[0]
+    for pixel in range(TILE_PX * TILE_PX):
+        most = max(most, light[pixel])
+    return most < LIGHT_MIN
+
+
+@numba.njit(inline="always", **_OPTIONS)
+def _add(sums: np.ndarray, share: np.ndarray, values: np.ndarray, rows: tuple[int, int]) -> None:
+    """Adds what a splat gives to rows of a tile: its values, then its share itself."""
+    channels = len(values)
+    for channel in range(channels + 1):
+        total = sums[channel]
+        value = values[channel] if channel < channels else sums.dtype.type(1.0)
+        for pixel in range(rows[0] * TILE_PX, rows[1] * TILE_PX):
+            total[pixel] += share[pixel] * value
+
+
+@numba.njit(parallel=True, **_OPTIONS)
 def _blend_tiles(
-    picture: np.ndarray,  # [H, W, C], zero on entry
+    picture: np.ndarray,  # [H, W, C + 1]: values, then the share that is covered
     values: np.ndarray,  # [S, C]
     splats: np.ndarray,  # [S, 7]
     starts: np.ndarray,  # [T + 1]
@@ -190,25 +231,22 @@ def _blend_tiles(
     height, width, channels = picture.shape
     for tile in numba.prange(len(starts) - 1):
         left, right, top, bottom = _tile_corner(tile, width, height)
-        light = np.ones((TILE_PX, TILE_PX))
-        open_pixels = (right - left) * (bottom - top)
+        light = np.ones(TILE_PX * TILE_PX, values.dtype)
+        share = np.zeros(TILE_PX * TILE_PX, values.dtype)
+        sums = np.zeros((channels, TILE_PX * TILE_PX), values.dtype)
         for entry in range(starts[tile], starts[tile + 1]):
-            if open_pixels == 0:
+            if (entry - starts[tile]) % _LOOK_EVERY == _LOOK_EVERY - 1 and _is_dark(light):
                 break
             splat = splats[entries[entry]]
-            value = values[entries[entry]]
-            for row in range(top, bottom):
-                first, last = _span(splat, row, left, right)
-                for column in range(first, last):
-                    share = _take_light(light, splat, row, column, top, left)
-                    if share == 0.0:
-                        continue
-                    for channel in range(channels):
-                        picture[row, column, channel] += share * value[channel]
-                    open_pixels -= light[row - top, column - left] < LIGHT_MIN
+            rows = _rows_reached(splat, top)
+            _take_light(light, share, splat, rows, left, top)
+            _add(sums, share, values[entries[entry]], rows)
+        for row in range(top, bottom):
+            for column in range(left, right):
+                picture[row, column] = sums[:, (row - top) * TILE_PX + column - left]
 
 
-@numba.njit(parallel=True, cache=True)
+@numba.njit(parallel=True, **_OPTIONS)
 def _blend_backward_tiles(
     shares: np.ndarray,  # [E, C], zero on entry
     towards: np.ndarray,  # [H, W, C], gradient with respect to the picture
@@ -219,21 +257,25 @@ def _blend_backward_tiles(
     height, width, channels = towards.shape
     for tile in numba.prange(len(starts) - 1):
         left, right, top, bottom = _tile_corner(tile, width, height)
-        light = np.ones((TILE_PX, TILE_PX))
-        open_pixels = (right - left) * (bottom - top)
+        light = np.ones(TILE_PX * TILE_PX, towards.dtype)
+        share = np.zeros(TILE_PX * TILE_PX, towards.dtype)
+        slopes = np.zeros((channels, TILE_PX * TILE_PX), towards.dtype)
+        for channel in range(channels):
+            for row in range(top, bottom):
+                for column in range(left, right):
+                    pixel = (row - top) * TILE_PX + column - left
+                    slopes[channel, pixel] = towards[row, column, channel]
         for entry in range(starts[tile], starts[tile + 1]):
-            if open_pixels == 0:
+            if (entry - starts[tile]) % _LOOK_EVERY == _LOOK_EVERY - 1 and _is_dark(light):
                 break
             splat = splats[entries[entry]]
-            for row in range(top, bottom):
-                first, last = _span(splat, row, left, right)
-                for column in range(first, last):
-                    share = _take_light(light, splat, row, column, top, left)
-                    if share == 0.0:
-                        continue
-                    for channel in range(channels):
-                        shares[entry, channel] += share * towards[row, column, channel]
-                    open_pixels -= light[row - top, column - left] < LIGHT_MIN
+            rows = _rows_reached(splat, top)
+            _take_light(light, share, splat, rows, left, top)
+            for channel in range(channels):
+                total, slope = towards.dtype.type(0.0), slopes[channel]
+                for pixel in range(rows[0] * TILE_PX, rows[1] * TILE_PX):
+                    total += share[pixel] * slope[pixel]
+                shares[entry, channel] = total
 
 
 @numba.njit(cache=True)

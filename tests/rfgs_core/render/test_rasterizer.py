@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numba
 import numpy as np
 import pytest
@@ -105,6 +107,34 @@ def test_tiled_agrees_with_the_plain_twin(size_px: int) -> None:
     covered = plain.alpha > 0.01
     np.testing.assert_allclose(tiled.depth[covered], plain.depth[covered], rtol=1e-4)
     assert (torch.isinf(tiled.depth) == torch.isinf(plain.depth)).all()
+
+
+def test_32_features_are_drawn_as_the_plain_twin_draws_them() -> None:
+    cloud, _, camera = random_cloud(200, 40, seed=3)
+    values = torch.randn(200, 32, generator=torch.Generator().manual_seed(4))
+    leaves = [values.clone().requires_grad_(True) for _ in range(2)]
+    tiled, plain = splat(cloud, leaves[0], camera), splat_plain(cloud, leaves[1], camera)
+    torch.testing.assert_close(tiled.rgb.double(), plain.rgb, rtol=0.0, atol=2e-5)
+    ramp = torch.linspace(-1.0, 2.0, plain.rgb.numel()).reshape(plain.rgb.shape)
+    for drawn in (tiled, plain):
+        (drawn.rgb * ramp).sum().backward()
+    assert leaves[1].grad is not None and float(leaves[1].grad.abs().max()) > 1.0
+    torch.testing.assert_close(leaves[0].grad, leaves[1].grad, rtol=1e-4, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("quats", 0.0), ("quats", torch.nan), ("log_scales", 800.0), ("means", torch.nan),
+     ("means", torch.inf), ("logit_opacities", torch.nan)],
+)  # fmt: skip
+def test_what_has_no_shape_or_place_is_not_drawn(name: str, value: float) -> None:
+    cloud, rgb, camera = random_cloud(50, 33, seed=3)
+    damaged = getattr(cloud, name).clone()
+    damaged[7] = value
+    rest = torch.arange(50) != 7
+    found = splat(replace(cloud, **{name: damaged}), rgb, camera)
+    expected = splat(cloud.select(rest), rgb[rest], camera)
+    assert torch.equal(found.rgb, expected.rgb) and torch.equal(found.depth, expected.depth)
 
 
 def test_stopping_early_behind_opaque_layers_stays_within_tolerance(camera, gaussians) -> None:

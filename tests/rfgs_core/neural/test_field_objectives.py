@@ -108,13 +108,8 @@ def test_fields_of_a_sequence_are_evaluated_as_runs_are(tiny_dataset: Path, tmp_
     config = TrainConfig(grid_side=8, solver_steps=2, posture="standing")
     settings = replace(SMALL, steps=5, prior=True)
 
-    known: dict[int, Given] = {}
-
     def given_of(frame: int, observations: Observations) -> Given:
-        # Fields share it, as those of a table do.
-        if frame not in known:
-            known[frame] = Given.of(observations, config, frame)
-        return known[frame]
+        return Given.of(observations, config, frame)
 
     runs = [
         fit_fields(dataset, "wifi", [1, 2], settings, config, given_of, tmp_path) for _ in range(2)

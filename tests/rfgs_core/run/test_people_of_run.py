@@ -52,7 +52,7 @@ def test_counting_says_its_price_first_and_only_where_people_are_sensed(
     tiny_dataset: Path, tmp_path: Path, capsys, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # What is said does not depend on who is found.
-    monkeypatch.setattr(run_people, "count_bodies", lambda *_: [])
+    monkeypatch.setattr(run_people, "count_bodies", lambda *_: [None])
     sequence, config = open_dataset(tiny_dataset).sequence(), TrainConfig()
     for asked, lines in (("told", 0), (2, 0), ("sensed", 1)):
         counted(tmp_path / "run", sequence, "wifi", sequence.frames, config, asked)

@@ -11,6 +11,9 @@ PYTHON_FOUND := $(shell command -v $(PYTHON) || command -v python3)
 # As `rfgs_core` sets it for programs; pytest's plugins load numpy before that.
 export OPENBLAS_NUM_THREADS ?= 1
 
+# Hundreds of processes and both workers of pytest load the same modules: they are compiled once.
+unexport PYTHONDONTWRITEBYTECODE
+
 # Commands take pip's Blender: one of the reader's own may lack the add-on. Only test-blender asks for it.
 unexport BLENDER
 

@@ -193,9 +193,14 @@ def _lies(
     """Where one body lies, tried where it lay before as well; None if it does not."""
     bounds_m, ground = observations.bounds_m, _ground(observations.bounds_m, axes_xy, body)
     evidence = PostureEvidence.of(observations, seed)
+    # Turned end for end, by a little, or with knees to any side, a body fills the same cells.
+    cells: dict[tuple[float, float, bool], StartCells] = {}
 
     def likely(bodies: Bodies) -> Float64[np.ndarray, "pair"]:
-        return evidence.of_density(StartCells.of(maps, bodies, bounds_m).density(bodies), bodies)
+        where = (*bodies.axes_xy[0].tolist(), bool(bodies.lies[0]))
+        if where not in cells:
+            cells[where] = StartCells.of(maps, bodies, bounds_m)
+        return evidence.of_density(cells[where].density(bodies), bodies)
 
     def climbed(
         start: tuple[Bodies, np.ndarray], tries: list[Bodies]

@@ -26,7 +26,6 @@ class BenchArgs:
     aside changes by under 1 % over 50 steps; or --gaussians and --steps of your own.
     readers: captures of Intel 5300 beside csiread, and of FeitCSI. real: not speed but how well
     measured data are explained, each part beside a baseline; docs/captures.md names the files.
-    tracers: the fast tracer beside Sionna RT on our scenes, as `rfgs-factory tracers`.
     limbs: joints and surface of a dataset's one person beside what knows less.
     people: how often a dataset's people are counted right, beside channels without any; or with
     --data, joints of real people in a public set (MM-Fi, mmBody, HuPR, RT-Pose, M4Human) by our
@@ -48,7 +47,6 @@ class BenchArgs:
             "training",
             "readers",
             "real",
-            "tracers",
             "limbs",
             "people",
             "live",
@@ -307,11 +305,6 @@ def run(args: BenchArgs) -> int:
     for name, value in asked.items():
         if value is not None and value < 1:
             raise RfgsError(f"--{name} {value}: expected at least 1")
-    if args.part == "tracers":
-        from rfgs_core.cli.calls import call
-
-        call("dataset_factory", "tracers", *(["--json", args.json] if args.json else []))
-        return 0
     if args.part in ("table1", "table2", "table3"):
         from rfgs_core.cli.tables import make_table
 

@@ -49,8 +49,6 @@ def test_the_link_of_the_panel_becomes_an_image(said: Any) -> None:
 
 def test_mistakes_are_told_in_one_line(said: Any, tmp_path: Path) -> None:
     refused("no run is chosen")
-    said.run_folder = str(tmp_path)
-    refused("is not a run")
     said.run_folder, said.tx_device, said.rx_device = RUN, 7, 8
     refused("wifi measures no link 7→8; it has 0→0, ")
     stored = bpy.context.preferences.addons[ADDON].preferences

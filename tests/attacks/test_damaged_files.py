@@ -45,7 +45,7 @@ def check(result: dict[str, Any], count: int) -> None:
 
 
 def test_some_damage_to_every_format(tmp_path: Path) -> None:
-    check(attacked(tmp_path, 8, 1, 300.0), 8)
+    check(attacked(tmp_path, 6, 1, 300.0), 6)
 
 
 @pytest.mark.parametrize("count", [20, pytest.param(300, marks=pytest.mark.slow)])

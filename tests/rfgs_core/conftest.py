@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import torch
 
+from rfgs_core.bodies import posture
 from rfgs_core.bodies.tracks import Tracks
 from rfgs_core.dataset import open_dataset
 from rfgs_core.fit.frame import FrameState
@@ -37,6 +38,14 @@ def hears_ctrl_c() -> Iterator[None]:
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
+
+
+@pytest.fixture
+def coarse_postures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Who sits is told of little, in a tenth of the time: for tests that ask for something else."""
+    monkeypatch.setattr(posture, "ENTRIES", 512)
+    monkeypatch.setattr(posture, "LINKS", 8)
+    monkeypatch.setattr(posture, "GAUSSIANS", 200)
 
 
 Train = Callable[..., Run]

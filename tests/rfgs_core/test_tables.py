@@ -98,6 +98,7 @@ def test_every_radio_is_traced_as_deep_as_it_can_be() -> None:
     assert sar[sar.index("--depth") + 1] == "1" and sar[sar.index("--tracer") + 1] == "sionna"
 
 
+@pytest.mark.usefixtures("coarse_postures")
 @pytest.mark.parametrize(
     "method", ["paper", "paper_fixed", "nerf_features", "ngp_propagation_prior"]
 )

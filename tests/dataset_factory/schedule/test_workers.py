@@ -67,6 +67,13 @@ def starting(marks: Path, count: int = 2, memory_gb: float = 1.0) -> Iterator[Wo
         yield workers
 
 
+@pytest.fixture(scope="module")
+def two(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workers]:
+    """Two workers for every test that leaves workers behind, the same or new ones."""
+    with starting(tmp_path_factory.mktemp("two") / "marks") as workers:
+        yield workers
+
+
 def run(workers: Workers, marks: Path, frames: list[int]) -> dict[int, Answer]:
     def submit(task: Task) -> Any:
         return workers.client.submit(misbehave, task.frame, str(marks), pure=False)
@@ -79,18 +86,14 @@ def asked(marks: Path) -> list[int]:
     return sorted(int(frame) for frame in marks.read_text().split())
 
 
-def test_a_worker_that_dies_costs_its_frame_one_try(marks: Path) -> None:
-    with starting(marks) as workers:
-        assert sorted(run(workers, marks, [3, 4, 5, 6])) == [3, 4, 5, 6]
+def test_a_worker_that_dies_costs_its_frame_one_try(two: Workers, marks: Path) -> None:
+    assert sorted(run(two, marks, [3, 4, 5, 6])) == [3, 4, 5, 6]
     assert asked(marks) == [3, 4, 5, 5, 6]
 
 
-def test_a_frame_that_kills_twice_is_named(marks: Path) -> None:
-    with (
-        starting(marks) as workers,
-        pytest.raises(RfgsError, match=r"wifi, frame 13: its worker died \(tried twice\)"),
-    ):
-        run(workers, marks, [13])
+def test_a_frame_that_kills_twice_is_named(two: Workers, marks: Path) -> None:
+    with pytest.raises(RfgsError, match=r"wifi, frame 13: its worker died \(tried twice\)"):
+        run(two, marks, [13])
     assert asked(marks) == [13, 13]
 
 
@@ -101,12 +104,11 @@ def test_a_worker_that_grows_is_killed_and_named(marks: Path) -> None:
     assert asked(marks) == [99, 99]
 
 
-def test_a_frame_that_cannot_be_traced_is_named_once(marks: Path) -> None:
-    with starting(marks) as workers:
-        with pytest.raises(RfgsError, match=r"wifi, frame 17: ValueError: no such triangle; the"):
-            run(workers, marks, [17])
-        with pytest.raises(RfgsError, match=r"^the wall is open$"):
-            run(workers, marks, [18])
+def test_a_frame_that_cannot_be_traced_is_named_once(two: Workers, marks: Path) -> None:
+    with pytest.raises(RfgsError, match=r"wifi, frame 17: ValueError: no such triangle; the"):
+        run(two, marks, [17])
+    with pytest.raises(RfgsError, match=r"^the wall is open$"):
+        run(two, marks, [18])
     assert asked(marks) == [17, 18]
 
 
@@ -137,33 +139,33 @@ def test_a_worker_is_replaced_after_so_many_frames() -> None:
 
 
 def test_a_worker_killed_while_it_starts_is_replaced(marks: Path) -> None:
+    me = psutil.Process()
+    before = set(me.children(recursive=True))
     with starting(marks, count=1) as workers:
-        me = psutil.Process()
         for _ in range(3):
-            killed = [p for p in me.children(recursive=True) if "spawn_main" in p.cmdline()[-2]]
-            for process in killed:
+            started = set(me.children(recursive=True)) - before
+            for process in [p for p in started if "spawn_main" in p.cmdline()[-2]]:
                 process.kill()
             time.sleep(0.3)
         assert sorted(run(workers, marks, [1, 2])) == [1, 2]
 
 
-def test_workers_listen_to_this_machine_alone_and_serve_no_page(marks: Path) -> None:
-    with starting(marks) as workers:
-        run(workers, marks, [1])
-        me = psutil.Process()
-        listening = [
-            socket.laddr
-            for process in [me, *me.children(recursive=True)]
-            for socket in process.net_connections("inet")
-            if socket.status == psutil.CONN_LISTEN
-        ]
-        assert listening and {address.ip for address in listening} == {"127.0.0.1"}
-        served: Any = workers.client.scheduler_info()
-        pages = [row["services"].get("dashboard") for row in [served, *served["workers"].values()]]
-        for port in filter(None, pages):
-            for page in ("status", "info/main/workers.html", "metrics", "health"):
-                with pytest.raises(HTTPError, match="404"):
-                    urlopen(f"http://127.0.0.1:{port}/{page}", timeout=5)
+def test_workers_listen_to_this_machine_alone_and_serve_no_page(two: Workers, marks: Path) -> None:
+    run(two, marks, [1])
+    me = psutil.Process()
+    listening = [
+        socket.laddr
+        for process in [me, *me.children(recursive=True)]
+        for socket in process.net_connections("inet")
+        if socket.status == psutil.CONN_LISTEN
+    ]
+    assert listening and {address.ip for address in listening} == {"127.0.0.1"}
+    served: Any = two.client.scheduler_info()
+    pages = [row["services"].get("dashboard") for row in [served, *served["workers"].values()]]
+    for port in filter(None, pages):
+        for page in ("status", "info/main/workers.html", "metrics", "health"):
+            with pytest.raises(HTTPError, match="404"):
+                urlopen(f"http://127.0.0.1:{port}/{page}", timeout=5)
 
 
 PROGRAM = """

@@ -31,7 +31,7 @@ NOBODY = Bodies.together([])
 
 @pytest.fixture
 def empty(make_observations: Callable[..., Observations]) -> Observations:
-    radio = replace(preset("wifi"), rx_rows=4, rx_cols=4, num_subcarriers=32)
+    radio = replace(preset("wifi"), rx_rows=3, rx_cols=3, num_subcarriers=24)
     return make_observations(radio=radio, bounds_m=ROOM_M)
 
 

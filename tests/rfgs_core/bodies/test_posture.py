@@ -112,6 +112,7 @@ def test_pairs_that_hear_nothing_keep_their_place_and_say_nothing(
 ) -> None:
     """Of few pairs several rounds are averaged, pair by pair; few Gaussians tell that as well."""
     monkeypatch.setattr(posture, "GAUSSIANS", 40)
+    monkeypatch.setattr(posture, "MOST_ENTRIES", 64)
     empty = make_observations(own_device_links="only")
     seen = echoing(empty, Bodies(AXIS, np.array([0.0])), seed=3)
     pair, names = seen.pairs

@@ -28,7 +28,7 @@ from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.settings import TrainConfig
 
 PLACE_M = np.array([2.4, 1.4, 1.1])
-SMALL = FieldSettings(steps=100, rays=128, samples_per_ray=24, scatterers=1000)
+SMALL = FieldSettings(steps=60, rays=128, samples_per_ray=24, scatterers=1000)
 
 
 def sampled(observations: Observations) -> SamplePoints:

@@ -17,6 +17,7 @@ EXTRA_OF = {
     "distributed": "factory",
     "dask": "factory",
     "triton": "gpu",
+    "gsplat": "gpu",
     "playwright": "picture",
     "imageio_ffmpeg": "video",
 }

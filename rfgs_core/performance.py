@@ -12,13 +12,19 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from rfgs_core.bench import bench_propagation, hardware
+import torch
+
+from rfgs_core.bench import PropagationBench, bench_propagation, hardware
+from rfgs_core.device import Device
 from rfgs_core.render.bench import Picture, bench_raster, time_picture
 from rfgs_core.scaling import Growth, growths
-from rfgs_core.selftest import OPERATIONS, Throughput, throughput
+from rfgs_core.selftest import OPERATIONS, SPEED, Throughput, throughput
 
 #: Pictures that are timed: Gaussians, edge [px].
-PICTURES = ((100_000, 512), (1_000_000, 512))
+PICTURES: dict[Device, tuple[tuple[int, int], ...]] = {
+    "cpu": ((100_000, 512), (1_000_000, 512)),
+    "cuda": ((100_000, 512), (1_000_000, 512), (1_000_000, 1024), (5_000_000, 1024)),
+}
 #: What is as large as at most this grows linearly, up to the noise of timing.
 _LINEAR = 1.1
 
@@ -36,32 +42,45 @@ class Performance:
     pictures: tuple[Picture, ...]
     """Of `PICTURES`."""
     memory_gib: float
-    """The most memory that this process has held, before and with the pictures [GiB]."""
+    """The most memory that this process has held, before and with the pictures [GiB]; on a GPU the
+    most of it that was in use there."""
     growths: tuple[Growth, ...]
-    """Cost over two decades of size."""
+    """Cost over two decades of size; not measured on a GPU."""
+    device: Device
+    """Where everything ran."""
     machine: dict[str, str | int]
     """As of `hardware`."""
 
 
-def measure(note: Callable[[str], None] = lambda words: None) -> Performance:
-    """Measures everything; some five minutes on two cores.
+def measure(
+    device: Device = "cpu", note: Callable[[str], None] = lambda words: None
+) -> Performance:
+    """Measures everything; some five minutes on two cores, one on a GPU.
 
     Args:
+        device: Where kernels run.
         note: Told what is timed next.
     """
     note("propagation, beside its plain twin")
-    propagation = bench_propagation()
+    propagation = bench_propagation(PropagationBench(device=device))
     note("propagation, beside a product of matrices")
-    share = throughput("cpu")
+    share = throughput(device)
     note("pictures, beside their plain twin")
-    raster = bench_raster()
+    raster = bench_raster(device=device)
     pictures = []
-    for count, size_px in PICTURES:
+    for count, size_px in PICTURES[device]:
         note(f"a picture of {count} Gaussians")
-        pictures.append(time_picture(count, size_px))
-    memory_gib = _peak_gib()
+        pictures.append(time_picture(count, size_px, device=device))
+    memory_gib = _peak_gib(device)
     return Performance(
-        propagation, share, raster, tuple(pictures), memory_gib, growths(note), hardware()
+        propagation=propagation,
+        share=share,
+        raster=raster,
+        pictures=tuple(pictures),
+        memory_gib=memory_gib,
+        growths=growths(note) if device == "cpu" else (),
+        device=device,
+        machine=hardware(),
     )
 
 
@@ -72,19 +91,26 @@ def page(found: Performance, day: str) -> str:
         found: What was measured.
         day: When, as YYYY-MM-DD.
     """
-    machine = found.machine
-    gpu = "no GPU" if machine["gpu"] == "none" else f"{machine['gpu']} (not used here)"
-    made = f"{machine['cpu']}, {machine['cores']} cores, {gpu}, {day}"
-    parts = (
-        f"# Performance\n\nMade by `rfgs bench performance --out docs/performance.md` on {made}. "
+    parts = [_head(found, day), _propagation(found), _pictures(found)]
+    if found.growths:
+        parts.append(_growths(found.growths))
+    return "\n".join(parts)
+
+
+def _head(found: Performance, day: str) -> str:
+    machine, option, title = found.machine, "", "Performance"
+    if found.device == "cuda":
+        option, title = "--device cuda ", "Performance on a GPU"
+        made = f"{machine['gpu']}, torch {found.propagation['torch']}, {day}"
+    else:
+        gpu = "no GPU" if machine["gpu"] == "none" else f"{machine['gpu']} (not used here)"
+        made = f"{machine['cpu']}, {machine['cores']} cores, {gpu}, {day}"
+    return (
+        f"# {title}\n\nMade by `rfgs bench performance {option}--out FILE` on {made}. "
         "Run it on a machine without other work.\nTimes are wall-clock, the shortest of some runs; "
         "each ratio is of two times of the same run. `rfgs selftest` holds every\nkernel against "
-        "its plain twin in double precision; `rfgs selftest --device cuda` does so on a GPU.\n",
-        _propagation(found),
-        _pictures(found),
-        _growths(found.growths),
+        "its plain twin in double precision; `rfgs selftest --device cuda` does so on a GPU.\n"
     )
-    return "\n".join(parts)
 
 
 def _propagation(found: Performance) -> str:
@@ -104,14 +130,35 @@ def _propagation(found: Performance) -> str:
         f"## Propagation\n\n{size}, scattering and shadows, float32. The largest relative error of "
         f"channels and gradients beside\nthe twin is {told['max_relative_error']:.1e}.\n\n"
         + _table(("", "time", "plain torch twin", "twin with blocks as large as the cache"), rows)
-        + f"\nScattering alone takes {1e3 * share.forward_s:.1f} ms: "
-        f"{share.rate / 1e9:.0f} billion additions and multiplications per second of the\n"
-        f"recurrence over subcarriers, {share.rate / share.ceiling:.0%} of the "
+        + f"\n{_ceiling(share, found.device)}\n"
+    )
+
+
+#: What the count of operations leaves out, and why the ceiling is not reached.
+_NOT_COUNTED: dict[Device, str] = {
+    "cpu": (
+        "Not counted is what each Gaussian and link cost before\nthe recurrence over subcarriers "
+        "begins: distances and phases in double precision, sines, cosines and exponentials.\nThat, "
+        "and a recurrence whose steps wait for each other, is what a product of matrices does not "
+        "have."
+    ),
+    "cuda": (
+        "Sine, cosine and exponential\nof each are among them, distances and phases in double "
+        "precision are not. Few of these operations are a multiplication and an addition\nin one, "
+        "as all of a product of matrices are."
+    ),
+}
+
+
+def _ceiling(share: Throughput, device: Device) -> str:
+    gaussians, links, subcarriers = SPEED[device]
+    return (
+        f"Scattering alone of {gaussians:,} Gaussians × {links} links × {subcarriers} subcarriers "
+        f"takes {1e3 * share.forward_s:.1f} ms: {share.rate / 1e9:.0f} billion\nadditions and "
+        f"multiplications per second, {share.rate / share.ceiling:.0%} of the "
         f"{share.ceiling / 1e9:.0f} billion that a product of matrices reaches in the same run.\n"
-        f"{OPERATIONS} of them are counted for each Gaussian, link and subcarrier. Not counted is "
-        "what each Gaussian and link cost before\nthe recurrence begins: distances and phases in "
-        "double precision, sines, cosines and exponentials. That, and a recurrence whose\nsteps "
-        "wait for each other, is what a product of matrices does not have.\n"
+        f"{OPERATIONS[device]} are counted for each Gaussian, link and subcarrier. "
+        f"{_NOT_COUNTED[device]}"
     )
 
 
@@ -121,20 +168,41 @@ def _pictures(found: Performance) -> str:
         (
             f"{each.num_gaussians:,}",
             f"{each.size_px} × {each.size_px}",
-            f"{each.first_s:.2f} s",
-            f"{each.again_s:.3f} s",
+            *_times(each),
         )
         for each in found.pictures
     ]
+    columns = ["Gaussians", "pixels", "projected, sorted and drawn"]
+    if found.device == "cuda":
+        columns += ["frames per second", "with gradients of everything"]
+        said = (
+            f"gsplat draws, and projects anew every time. The GPU has held {found.memory_gib:.1f} "
+            "GiB at most.\n"
+        )
+    else:
+        columns.append("drawn again")
+        said = (
+            "*Drawn again* is another picture of Gaussians that stay where they are, as in the fit "
+            f"of colours.\nThe process has held {found.memory_gib:.1f} GiB at most after these "
+            "pictures and the propagation above.\n"
+        )
     return (
         "## Pictures\n\nOf 20,000 Gaussians at 256 × 256 pixels the tiled rasteriser takes "
         f"{1e3 * raster['raster_s']:.0f} ms, {raster['raster_ratio']:.0f} times quicker than the\n"
         f"twin that visits every Gaussian at every pixel; the largest difference is "
         f"{raster['max_abs_error']:.0e} of full brightness.\n\n"
-        + _table(("Gaussians", "pixels", "projected, sorted and drawn", "drawn again"), rows)
-        + "\n*Drawn again* is another picture of Gaussians that stay where they are, as in the fit "
-        "of colours.\nThe process has held "
-        f"{found.memory_gib:.1f} GiB at most after these pictures and the propagation above.\n"
+        + _table(columns, rows)
+        + f"\n{said}"
+    )
+
+
+def _times(picture: Picture) -> tuple[str, ...]:
+    if picture.gradients_s is None:
+        return f"{picture.first_s:.2f} s", f"{picture.again_s:.3f} s"
+    return (
+        f"{1e3 * picture.first_s:.2f} ms",
+        f"{1.0 / picture.first_s:.0f}",
+        f"{1e3 * picture.gradients_s:.2f} ms",
     )
 
 
@@ -163,7 +231,9 @@ def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "".join(f"| {' | '.join(row)} |\n" for row in lines)
 
 
-def _peak_gib() -> float:
-    """The most memory that this process has held [GiB]."""
+def _peak_gib(device: Device) -> float:
+    """The most memory that this process has held there [GiB]."""
+    if device == "cuda":
+        return torch.cuda.max_memory_allocated() / 2**30
     unit = 1 if sys.platform == "darwin" else 1024
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 2**30

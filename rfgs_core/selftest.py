@@ -13,8 +13,10 @@ from torch import Tensor
 
 from rfgs_core.bench import CloudAndLinks, PropagationBench, cloud_and_links, fastest
 from rfgs_core.device import Device, on_device
+from rfgs_core.gaussians.model import FEATURE_DIM, Gaussians
 from rfgs_core.propagation import Backend, Subcarriers, propagate
 from rfgs_core.render.bench import random_cloud
+from rfgs_core.render.gpu import splat_on_gpu
 from rfgs_core.render.rasterizer import splat
 from rfgs_core.render.reference import splat_plain
 
@@ -22,18 +24,27 @@ from rfgs_core.render.reference import splat_plain
 SIZES = ((1, 1, 1), (2, 3, 5), (129, 2, 33), (1000, 65, 61))
 #: Gaussians and edges of pictures [px].
 PICTURES = ((1, 17), (300, 33), (2000, 96))
-#: The size at which speed is measured.
-SPEED = (20_000, 64, 64)
+#: The sizes at which speed is measured: large enough that a GPU does not wait for the CPU.
+SPEED: dict[Device, tuple[int, int, int]] = {
+    "cpu": (20_000, 64, 64),
+    "cuda": (200_000, 256, 64),
+}
 #: Largest errors: of channels and gradients in float32 against double, relative; of pictures in
 #: shares of full brightness.
 CHANNEL, GRADIENT, PICTURE = 1e-4, 1e-4, 1e-4
+#: Relative error of pictures on a GPU, and of their gradients: drawn in float32, a contribution at
+#: the least that counts falls to either side of it, and gsplat stops earlier (`render.gpu`).
+PICTURE_ON_GPU = 1e-3
 #: Additions and multiplications of one Gaussian, link and subcarrier: one step of the recurrence
-#: (`rfgs_core.propagation.kernels_scatter`) and two sums.
-OPERATIONS = 12
+#: (`propagation.kernels_scatter`) and two sums; on a GPU, where neighbours do not wait for each
+#: other, sine, cosine and exponential of each (`propagation.kernels_triton`).
+OPERATIONS: dict[Device, int] = {"cpu": 12, "cuda": 44}
 #: Edge of the matrices whose product shows the chip's ceiling.
 _EDGE: dict[Device, int] = {"cpu": 1536, "cuda": 4096}
 #: Distance of the far cloud [m], and its carrier [Hz]: 10,000 wavelengths.
 _FAR_M, _FAR_HZ = 50.0, 60e9
+#: What a picture depends on, beside colours.
+_DRAWN = ("means", "quats", "log_scales", "logit_opacities")
 _GRADIENTS = ("means", "quats", "scales_rf", "gamma", "alpha")
 
 _Value = TypeVar("_Value")
@@ -77,8 +88,8 @@ def checks(device: Device) -> Iterator[Check]:
     for size in SIZES:
         yield from _propagation(f"{size[0]} x {size[1]} x {size[2]}", _scene(*size), device)
     yield from _propagation("60 GHz at 50 m", _far(), device)
-    if device == "cpu":
-        yield from (_picture(*size) for size in PICTURES)
+    for size in PICTURES:
+        yield from _pictures_on_gpu(*size) if device == "cuda" else [_picture(*size)]
 
 
 def _scene(gaussians: int, links: int, subcarriers: int) -> CloudAndLinks:
@@ -152,9 +163,39 @@ def _picture(gaussians: int, edge_px: int) -> Check:
     return Check(f"picture, {gaussians} at {edge_px} px", worst, PICTURE)
 
 
+def _pictures_on_gpu(gaussians: int, edge_px: int) -> Iterator[Check]:
+    """Colours, features and all gradients of gsplat, beside the plain twin in double."""
+    cloud, rgb, camera = random_cloud(gaussians, edge_px, seed=gaussians)
+    drawn = torch.randn(gaussians, FEATURE_DIM, generator=torch.Generator().manual_seed(1))
+    for what, values in (("3 colours", rgb), ("32 features", drawn)):
+        ends = []
+        for device in ("cuda", "cpu"):
+            leaves = {
+                name: value.detach().to(device).requires_grad_(True)
+                for name, value in {**dict(cloud.items()), "values": values}.items()
+            }
+            there = Gaussians(**{name: leaves[name] for name, _ in cloud.items()})
+            if device == "cuda":
+                picture, alpha, _ = splat_on_gpu(there, leaves["values"], camera)
+            else:
+                plain = splat_plain(there, leaves["values"], camera)
+                picture, alpha = plain.rgb, plain.alpha
+            # Some direction that no symmetry of a picture hides.
+            ramp = torch.linspace(0.5, 1.5, picture.numel(), device=device, dtype=picture.dtype)
+            (picture * ramp.reshape(picture.shape)).sum().backward()
+            slopes = [leaves[name].grad for name in (*_DRAWN, "values")]
+            ends.append(([picture.detach(), alpha.detach()], slopes))
+        (seen, slopes), (plain, true_slopes) = ends
+        name = f"{what}, {gaussians} at {edge_px} px"
+        worst = max(_relative(a, b) for a, b in zip(seen, plain, strict=True))
+        yield Check(f"picture of {name}", worst, PICTURE_ON_GPU)
+        worst = max(_relative(a, b) for a, b in zip(slopes, true_slopes, strict=True))
+        yield Check(f"gradients of {name}", worst, PICTURE_ON_GPU)
+
+
 def throughput(device: Device, repeats: int = 5) -> Throughput:
     """Measures the forward model, and the chip's ceiling in the same run."""
-    scene = on_device(_scene(*SPEED), device)
+    scene = on_device(_scene(*SPEED[device]), device)
 
     def forward() -> Tensor:
         with torch.no_grad():
@@ -162,7 +203,7 @@ def throughput(device: Device, repeats: int = 5) -> Throughput:
 
     forward()
     best_s, _ = fastest(forward, repeats)
-    rate = OPERATIONS * float(np.prod(SPEED)) / best_s
+    rate = OPERATIONS[device] * float(np.prod(SPEED[device])) / best_s
     return Throughput(best_s, rate, _ceiling(device, repeats))
 
 

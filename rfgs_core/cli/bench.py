@@ -26,6 +26,7 @@ class BenchArgs:
     aside changes by under 1 % over 50 steps; or --gaussians and --steps of your own.
     readers: captures of Intel 5300 beside csiread, and of FeitCSI. real: not speed but how well
     measured data are explained, each part beside a baseline; docs/captures.md names the files.
+    tracers: the fast tracer beside Sionna RT on our scenes, as `rfgs-factory tracers`.
     limbs: joints and surface of a dataset's one person beside what knows less.
     people: how often a dataset's people are counted right, beside channels without any; or with
     --data, joints of real people in a public set (MM-Fi, mmBody, HuPR, RT-Pose, M4Human) by our
@@ -47,6 +48,7 @@ class BenchArgs:
             "training",
             "readers",
             "real",
+            "tracers",
             "limbs",
             "people",
             "live",
@@ -83,7 +85,8 @@ class BenchArgs:
     steps: int | None = None
     """Adam steps for the parts `training` (left out: until the loss stands still) and `fields`."""
     device: Device = "cpu"
-    """Where the parts `propagation` and `training` run: cpu, or cuda, the current GPU."""
+    """Where the parts `propagation`, `training` and `performance` run: cpu, or cuda, the current
+    GPU."""
     size: Literal["smoke", "paper-cpu", "full"] = "smoke"
     """For the paper's tables: one scene; the study's four with the paper's steps (hours); or these
     with five seeds and larger neural fields (days)."""
@@ -274,13 +277,18 @@ def _scaling() -> dict[str, Any]:
 def _performance(args: BenchArgs) -> int:
     from dataclasses import asdict
 
+    from rfgs_core.device import need_device
     from rfgs_core.evaluate.provenance import now
+    from rfgs_core.extras import require
     from rfgs_core.files import refuse_place, write_json, write_text
     from rfgs_core.performance import measure, page
 
+    need_device(args.device)
+    if args.device == "cuda":
+        require("gsplat")
     for place in filter(None, (args.out, args.json)):
         refuse_place(place)
-    found = measure(lambda words: _note(f"timing {words}"))
+    found = measure(args.device, lambda words: _note(f"timing {words}"))
     text = page(found, now()[:10])
     if args.out is None:
         sys.stdout.write(text)
@@ -305,6 +313,11 @@ def run(args: BenchArgs) -> int:
     for name, value in asked.items():
         if value is not None and value < 1:
             raise RfgsError(f"--{name} {value}: expected at least 1")
+    if args.part == "tracers":
+        from rfgs_core.cli.calls import call
+
+        call("dataset_factory", "tracers", *(["--json", args.json] if args.json else []))
+        return 0
     if args.part in ("table1", "table2", "table3"):
         from rfgs_core.cli.tables import make_table
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Literal
 
 import tyro
 
+from rfgs_core.device import Device, need_device
 from rfgs_core.errors import RfgsError
 from rfgs_core.frames import chosen_frames
 from rfgs_core.video import check_video
@@ -42,6 +43,8 @@ class RenderArgs:
     time through one camera, rendered beside true."""
     camera: str | None = None
     """Camera of the video; left out: the first that the shader never saw, else the first."""
+    device: Device = "cpu"
+    """Where pictures are drawn: cpu, or cuda, the current GPU, by gsplat."""
 
 
 def run(args: RenderArgs) -> int:
@@ -54,6 +57,7 @@ def run(args: RenderArgs) -> int:
         raise RfgsError("--camera: chooses the camera of a --video; give that too")
     if args.video is not None:
         check_video(args.video)
+    need_device(args.device)
     trained = open_run(args.run)
     if args.out is not None:
         render_run(trained, args)
@@ -81,7 +85,7 @@ def render_video(trained: TrainedRun, args: RenderArgs, file: Path) -> None:
     draw = render_person if args.person_only else render_view
 
     def picture(frame: int) -> np.ndarray:
-        rendered = to_bytes(draw(trained, camera, frame).rgb)
+        rendered = to_bytes(draw(trained, camera, frame, args.device).rgb)
         true = _true_picture(trained, camera.name, frame, args.person_only)
         both = rendered if true is None else side_by_side(rendered, true)
         return enlarged(both, WIDTH_PX)
@@ -118,7 +122,7 @@ def render_run(trained: TrainedRun, args: RenderArgs) -> None:
     draw = render_person if args.person_only else render_view
     for name, frame in tqdm(_chosen(trained, args), desc="render", unit="picture"):
         camera = camera_of(trained.sequence, name)
-        rendered = to_bytes(draw(trained, camera, frame).rgb)
+        rendered = to_bytes(draw(trained, camera, frame, args.device).rgb)
         write_png(args.out / name / f"{frame:06d}.png", rendered)
         true = _true_picture(trained, name, frame, args.person_only)
         if true is not None:

@@ -100,7 +100,7 @@ def run(args: TrainArgs) -> int:
         sys.stdout.write(f"offsets: {calibration_text(args.out, frames)}\n")
     if shader and not (args.out / "shader.npz").exists():
         seed = sub_seed(config.seed, "shader")
-        fit_run_shader(trained, ShaderConfig.for_recipe(config.recipe, seed))
+        fit_run_shader(trained, ShaderConfig.for_recipe(config.recipe, seed), config.device)
     sys.stdout.write(
         f"{args.out}: {count_in_words(len(frames), 'frame')}, "
         f"{len(trained.moving(frames[0]))} Gaussians, {trained.config.train_s:.0f} s; "

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The propagation model on a GPU, differentiable in torch.
 
-Scattering goes through kernels of our own; shadows, of which there are far fewer, through the
-plain twin on the device, some paths at a time and in double precision. Results are single.
+Scattering and shadows go through kernels of our own. Results are single.
 """
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import Any
 
@@ -14,10 +14,10 @@ import torch
 from jaxtyping import Complex, Float
 from torch import Tensor
 from torch.autograd.function import once_differentiable
-from torch.utils.checkpoint import checkpoint
 
 from rfgs_core.propagation import reference
-from rfgs_core.propagation.covariance import packed_covariances
+from rfgs_core.propagation.covariance import covariances_by_products
+from rfgs_core.propagation.fresnel import leg_frames
 from rfgs_core.propagation.geometry import EnvironmentPaths, Links, Subcarriers
 from rfgs_core.propagation.kernels_triton import (
     BY_GAIN,
@@ -30,39 +30,73 @@ from rfgs_core.propagation.kernels_triton import (
     scatter_backward,
     scatter_forward,
 )
+from rfgs_core.propagation.kernels_triton import (
+    SLOPES as SCATTER_SLOPES,
+)
+from rfgs_core.propagation.kernels_triton_shadow import (
+    BY_ALPHA,
+    GRADIENTS,
+    LEGS,
+    SCREENS,
+    SLOPES,
+    shadow_backward,
+    shadow_forward,
+)
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
 #: Programs that keep a large GPU busy; fewer links or Gaussians are split further.
 PROGRAMS = 2048
 #: Splits never go below this many Gaussians or links.
 LEAST_GAUSSIANS, LEAST_LINKS = 8 * ROWS, 8
-#: Path–Gaussian pairs whose shadows are in memory at a time.
-MOST_SHADOWS = 1 << 21
+
+
+@functools.lru_cache(maxsize=32)
+def _knots(
+    subcarriers: Subcarriers, knots: int, device: torch.device
+) -> list[tuple[Tensor, _Chunks]]:
+    """Share of each knot in every subcarrier, and the subcarriers where it has one.
+
+    The same in every step of a fit, and copies to a device make it wait.
+    """
+    rows = []
+    for knot in range(knots):
+        one = torch.eye(knots, dtype=torch.float64)[[knot]]
+        share = reference.gamma_at_subcarriers(one, subcarriers)[0]
+        rows.append((share.to(device, torch.float32), _Chunks(subcarriers, share > 0, device)))
+    return rows
 
 
 class _Chunks:
-    """Runs of neighbouring subcarriers, at most `SUBCARRIERS` long, among those marked."""
+    """Runs of `SUBCARRIERS` neighbouring subcarriers that hold all those marked.
+
+    Subcarriers between them that nobody asked for are computed and dropped: where every seventh is
+    hidden, that is less work than a run of its own for each six.
+    """
 
     def __init__(self, subcarriers: Subcarriers, marked: Tensor, device: torch.device) -> None:
-        rows, frequencies, column = [], [], 0
-        for start, count in subcarriers.spans:
-            wanted = marked[column : column + count].tolist()
-            at = 0
-            while at < count:
-                end = at
-                while end < min(count, at + SUBCARRIERS) and wanted[end]:
-                    end += 1
-                if end > at:
-                    rows.append((column + at, end - at))
-                    frequencies.append(
-                        (subcarriers.f0 + subcarriers.df * (start + at), subcarriers.df)
-                    )
-                at = max(end, at + 1)
-            column += count
-        cycles = torch.tensor(frequencies, dtype=torch.float64) / SPEED_OF_LIGHT
-        self.columns = column
-        self.table = torch.tensor(rows, dtype=torch.int32).to(device)
+        columns = torch.nonzero(marked)[:, 0]
+        indices = subcarriers.indices[columns]
+        lowest = int(indices.min()) if len(indices) else 0
+        runs, run = torch.unique((indices - lowest) // SUBCARRIERS, return_inverse=True)
+        hz = subcarriers.f0 + subcarriers.df * (lowest + runs.double() * SUBCARRIERS)
+        cycles = torch.stack([hz, torch.full_like(hz, subcarriers.df)], dim=1) / SPEED_OF_LIGHT
+        slots = run * SUBCARRIERS + (indices - lowest) % SUBCARRIERS
+        self.count = len(runs)
         self.cycles_per_m = cycles.to(device)
+        self._columns, self._slots = columns.to(device), slots.to(device)
+        self._width = subcarriers.num_selected
+
+    def taken(self, sums: Float[Tensor, "... slot"]) -> Float[Tensor, "... column"]:
+        """What kernels have written, by column; zero where nothing is marked."""
+        out = sums.new_zeros(*sums.shape[:-1], self._width)
+        out[..., self._columns] = sums[..., self._slots]
+        return out
+
+    def laid(self, values: Float[Tensor, "... column"]) -> Float[Tensor, "... slot"]:
+        """What kernels read; zero in slots without a subcarrier."""
+        out = values.new_zeros(*values.shape[:-1], self.count * SUBCARRIERS)
+        out[..., self._slots] = values[..., self._columns]
+        return out
 
 
 class _Scatter(torch.autograd.Function):
@@ -85,21 +119,20 @@ class _Scatter(torch.autograd.Function):
             *(x.detach().float().contiguous() for x in (shape, gain, visibility, normals)),
         )
         flags = {"FACING": normals.shape[1] > 0, "WEIGHED": visibility.shape[1] > 0}
-        links, total, parts = len(ends), means.shape[1], len(chunks.table)
-        splits = _splits(links * parts, total, LEAST_GAUSSIANS)
+        links, total = len(ends), means.shape[1]
+        splits = _splits(links * chunks.count, total, LEAST_GAUSSIANS)
         per_split = -(-total // splits // ROWS) * ROWS
-        sums = means.new_zeros(splits, links, 2, chunks.columns, dtype=torch.float32)
-        if links and total and parts:
+        width = chunks.count * SUBCARRIERS
+        sums = means.new_zeros(splits, links, 2, width, dtype=torch.float32)
+        if links and total and width:
             _launch(
-                scatter_forward,
-                (links, parts, splits),
-                flags,
-                (*cloud, ends, group, chunks.table, chunks.cycles_per_m, sums),
-                (total, chunks.columns, per_split, sharpness),
-            )
+                scatter_forward, (links, chunks.count, splits),
+                *cloud, ends, group, chunks.cycles_per_m, sums, total, per_split, sharpness,
+                **flags, ROWS=ROWS, SUBCARRIERS=SUBCARRIERS,
+            )  # fmt: skip
         ctx.state = (cloud, setting, flags)
         ctx.dtypes = tuple(x.dtype for x in (means, shape, gain, visibility, normals))
-        real, imaginary = sums.sum(dim=0).unbind(1)
+        real, imaginary = chunks.taken(sums.sum(dim=0)).unbind(1)
         return torch.complex(real, imaginary)
 
     @staticmethod
@@ -109,20 +142,18 @@ class _Scatter(torch.autograd.Function):
         cloud, (sharpness, ends, group, chunks), flags = ctx.state
         means, _, _, visibility, normals = cloud
         seed = torch.view_as_real(grads[0].conj().resolve_conj())
-        seed = seed.permute(0, 2, 1).float().contiguous()
-        links, total, parts = len(ends), means.shape[1], len(chunks.table)
-        rows = BY_GROUP + len(visibility)
-        splits = _splits(-(-total // ROWS), links, LEAST_LINKS)
-        per_split = -(-links // splits)
+        seed = chunks.laid(seed.permute(0, 2, 1).float())
+        links, total = len(ends), means.shape[1]
+        rows, tiles = BY_GROUP + len(visibility), -(-total // SCATTER_SLOPES)
+        splits = _splits(tiles, links, LEAST_LINKS)
         out = means.new_zeros(splits, rows, total, dtype=torch.float32)
-        if links and total and parts:
+        if links and total and chunks.count:
             _launch(
-                scatter_backward,
-                (-(-total // ROWS), splits),
-                flags,
-                (*cloud, ends, group, chunks.table, chunks.cycles_per_m, seed, out),
-                (total, links, parts, chunks.columns, rows, per_split, sharpness),
-            )
+                scatter_backward, (tiles, splits),
+                *cloud, ends, group, chunks.cycles_per_m, seed, out, total, links, chunks.count,
+                rows, -(-links // splits), sharpness,
+                **flags, SLOPES=SCATTER_SLOPES, SUBCARRIERS=SUBCARRIERS,
+            )  # fmt: skip
         summed = out.sum(dim=0)
         result = (
             summed[BY_MEANS:BY_SHAPE],
@@ -134,15 +165,9 @@ class _Scatter(torch.autograd.Function):
         return (*(x.to(dtype) for x, dtype in zip(result, ctx.dtypes, strict=True)), None)
 
 
-def _launch(
-    kernel: Any,
-    grid: tuple[int, ...],
-    flags: dict[str, bool],
-    tensors: tuple[Tensor, ...],
-    numbers: tuple[float, ...],
-) -> None:
-    """Runs a kernel, which takes tensors first: one program per place of the grid."""
-    kernel[grid](*tensors, *numbers, **flags, ROWS=ROWS, SUBCARRIERS=SUBCARRIERS)
+def _launch(kernel: Any, grid: tuple[int, ...], *arguments: Any, **sizes: Any) -> None:
+    """Runs a kernel: one program per place of the grid."""
+    kernel[grid](*arguments, **sizes)
 
 
 def _splits(programs: int, count: int, least: int) -> int:
@@ -163,7 +188,7 @@ def scatter(
 ) -> Complex[Tensor, "link subcarrier"]:
     """Twin of `rfgs_core.propagation.scatter` on the device of `means`, in single precision."""
     device, knots = means.device, gamma.shape[1]
-    shape = packed_covariances(quats, scales_rf)
+    shape = covariances_by_products(quats, scales_rf)
     group = links.group
     if visibility is None:
         visibility, group = means.new_zeros(0, 1), None
@@ -174,16 +199,62 @@ def scatter(
         normals = means.new_zeros(0, 3)
     ends = torch.cat([links.tx_xyz, links.rx_xyz], dim=1).double().contiguous()
     total = means.new_zeros(len(links), subcarriers.num_selected, dtype=torch.complex64)
-    for knot in range(knots):
-        weight = reference.gamma_at_subcarriers(
-            torch.eye(knots, dtype=torch.float64)[[knot]], subcarriers
-        )[0]
-        setting = (sharpness, ends, group, _Chunks(subcarriers, weight > 0, device))
+    for knot, (share, chunks) in enumerate(_knots(subcarriers, knots, device)):
+        setting = (sharpness, ends, group, chunks)
         gain = torch.stack([gamma[:, knot].real, gamma[:, knot].imag])
         part = _Scatter.apply(means.T, shape, gain, visibility.T, normals.T, setting)
-        total = total + part * weight.to(device, torch.float32)
+        total = total + part * share
     wavelength_m = (SPEED_OF_LIGHT / subcarriers.freq_hz).to(device, torch.float32)
     return (total * (wavelength_m / (4 * math.pi) ** 1.5)).to(gamma.dtype)
+
+
+class _Shadow(torch.autograd.Function):
+    """T[path] of packed Gaussians; all tensors have the Gaussian axis last."""
+
+    @staticmethod
+    def forward(ctx: Any, means: Tensor, shape: Tensor, alpha: Tensor, legs: Tensor) -> Tensor:
+        """Args: as `kernels_shadow.Screens`; legs as `kernels_triton_shadow` reads them."""
+        screens = (
+            means.detach().double().contiguous(),
+            shape.detach().double().contiguous(),
+            alpha.detach().float().contiguous(),
+        )
+        count, total = len(legs), means.shape[1]
+        splits = _splits(-(-count // LEGS), total, LEAST_GAUSSIANS)
+        per_split = -(-total // splits // SCREENS) * SCREENS
+        factors = means.new_ones(splits, 2, count, SCREENS, dtype=torch.float32)
+        if count and total:
+            _launch(
+                shadow_forward, (-(-count // LEGS), splits),
+                *screens, legs, factors, total, count, per_split, LEGS=LEGS, SCREENS=SCREENS,
+            )  # fmt: skip
+        else:
+            factors[:, 1] = 0.0
+        real, imaginary = factors.double().unbind(1)
+        product = torch.complex(real, imaginary).prod(dim=2).prod(dim=0)
+        ctx.state = (screens, legs, product)
+        ctx.dtypes = (means.dtype, shape.dtype, alpha.dtype)
+        return product.to(alpha.dtype.to_complex())
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, *grads: Tensor) -> tuple[Tensor | None, ...]:
+        """Chains the gradient of T to means, shape and alpha."""
+        screens, legs, product = ctx.state
+        seed = torch.view_as_real((grads[0].conj() * product).resolve_conj()).float().contiguous()
+        count, total = len(legs), screens[0].shape[1]
+        tiles = -(-total // SLOPES)
+        splits = _splits(tiles, count, LEAST_LINKS)
+        out = seed.new_zeros(splits, GRADIENTS, total)
+        if count and total:
+            _launch(
+                shadow_backward, (tiles, splits),
+                *screens, legs, seed, out, total, count, -(-count // splits),
+                SLOPES=SLOPES, GRADIENTS=GRADIENTS,
+            )  # fmt: skip
+        summed = out.sum(dim=0)
+        result = summed[:BY_SHAPE], summed[BY_SHAPE:BY_ALPHA], summed[BY_ALPHA]
+        return (*(x.to(dtype) for x, dtype in zip(result, ctx.dtypes, strict=True)), None)
 
 
 def shadow(
@@ -193,26 +264,10 @@ def shadow(
     alpha: Float[Tensor, "gaussian"],
     paths: EnvironmentPaths,
 ) -> Complex[Tensor, "path"]:
-    """Twin of `rfgs_core.propagation.shadow`: the plain one, computed again for gradients.
-
-    In double: of a thin Gaussian seen edge-on, the determinant of the spread cancels in single.
-    """
-    result = scales.dtype.to_complex()
-    quats, scales, alpha = quats.double(), scales.double(), alpha.double()
-    rows = max(1, MOST_SHADOWS // max(1, len(means)))
-    parts = [
-        checkpoint(
-            reference.shadow,
-            means,
-            quats,
-            scales,
-            alpha,
-            paths.rows(slice(at, at + rows)),
-            use_reentrant=False,
-            preserve_rng_state=False,
-        )
-        for at in range(0, len(paths), rows)
-    ]
-    if not parts:
-        return torch.zeros(0, dtype=result, device=means.device)
-    return torch.cat(parts).to(result)
+    """Twin of `rfgs_core.propagation.shadow` on the device of `means`."""
+    shape = covariances_by_products(quats.double(), scales.double())
+    table = leg_frames(paths).table()
+    unfolded_m = table[:, 12:].sum(dim=1, keepdim=True).clamp(min=1e-300)
+    legs = torch.cat([table, paths.wavelength_m / (2 * math.pi * unfolded_m)], dim=1)
+    legs = legs.to(means.device).contiguous()
+    return _Shadow.apply(means.T, shape, alpha.to(scales.dtype), legs)

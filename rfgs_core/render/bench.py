@@ -3,22 +3,26 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import torch
 
+from rfgs_core.bench import fastest
+from rfgs_core.device import Device, on_device
 from rfgs_core.gaussians.model import FEATURE_DIM, Gaussians
 from rfgs_core.render.cameras import Camera
+from rfgs_core.render.gpu import splat_on_gpu
 from rfgs_core.render.rasterizer import plan_splats, splat
 from rfgs_core.render.reference import splat_plain
 
 
 def bench_raster(
-    num_gaussians: int = 20_000, size_px: int = 256, repeats: int = 5, seed: int = 0
+    num_gaussians: int = 20_000,
+    size_px: int = 256,
+    repeats: int = 5,
+    seed: int = 0,
+    device: Device = "cpu",
 ) -> dict[str, float]:
     """Renders a random cloud with both rasterisers.
 
@@ -30,18 +34,19 @@ def bench_raster(
         size_px: Edge of the picture [px].
         repeats: Runs of the tiled rasteriser; the fastest counts. The twin runs once.
         seed: Seed of the cloud.
+        device: Where both draw.
 
     Returns:
         `raster_s` and `twin_s` [s], `raster_ratio` = twin_s / raster_s, and `max_abs_error` over
         colours and alpha in the rows that both rendered.
     """
-    gaussians, rgb, camera = random_cloud(num_gaussians, size_px, seed)
-    tiled = splat(gaussians, rgb, camera)  # compiles
-    raster_s = min(_seconds(lambda: splat(gaussians, rgb, camera))[0] for _ in range(repeats))
+    gaussians, rgb, camera = random_cloud(num_gaussians, size_px, seed, device)
+    splat(gaussians, rgb, camera)  # compiles
+    raster_s, tiled = fastest(lambda: splat(gaussians, rgb, camera), repeats)
     band = max(1, size_px // 8)
     top = (size_px - band) // 2
     rows = (top, top + band)
-    band_s, twin = _seconds(lambda: splat_plain(gaussians, rgb, camera, rows))
+    band_s, twin = fastest(lambda: splat_plain(gaussians, rgb, camera, rows), 1)
     twin_s = band_s * size_px / band
     color_error = (tiled.rgb[top : top + band] - twin.rgb).abs().max()
     alpha_error = (tiled.alpha[top : top + band] - twin.alpha).abs().max()
@@ -64,16 +69,32 @@ class Picture:
     """Projected, sorted and drawn [s]."""
     again_s: float
     """Drawn again with other colours [s]."""
+    gradients_s: float | None
+    """Drawn, and gradients of Gaussians and colours [s]; None on the CPU, where Gaussians in a
+    picture are constants."""
 
 
-def time_picture(num_gaussians: int, size_px: int, repeats: int = 3, seed: int = 0) -> Picture:
+def time_picture(
+    num_gaussians: int, size_px: int, repeats: int = 3, seed: int = 0, device: Device = "cpu"
+) -> Picture:
     """Times the tiled rasteriser alone, for clouds that its twin would take minutes for."""
-    gaussians, rgb, camera = random_cloud(num_gaussians, size_px, seed)
+    gaussians, rgb, camera = random_cloud(num_gaussians, size_px, seed, device)
     plan = plan_splats(gaussians, camera)  # compiles
     plan.draw(rgb)
-    first_s = min(_seconds(lambda: splat(gaussians, rgb, camera))[0] for _ in range(repeats))
-    again_s = min(_seconds(lambda: plan.draw(rgb))[0] for _ in range(repeats))
-    return Picture(num_gaussians, size_px, first_s, again_s)
+    first_s, _ = fastest(lambda: splat(gaussians, rgb, camera), repeats)
+    again_s, _ = fastest(lambda: plan.draw(rgb), repeats)
+    gradients_s = None
+    if device == "cuda":
+        gradients_s, _ = fastest(lambda: _with_gradients(gaussians, rgb, camera), repeats + 1)
+    return Picture(num_gaussians, size_px, first_s, again_s, gradients_s)
+
+
+def _with_gradients(gaussians: Gaussians, rgb: torch.Tensor, camera: Camera) -> torch.Tensor:
+    """A picture on a GPU, its brightness sent back to everything."""
+    leaves = {name: value.detach().requires_grad_(True) for name, value in gaussians.items()}
+    picture, _, _ = splat_on_gpu(Gaussians(**leaves), rgb.detach().requires_grad_(True), camera)
+    picture.sum().backward()
+    return picture
 
 
 def frames_per_second(gaussians: Gaussians, size_px: int = 256, repeats: int = 3) -> float:
@@ -82,11 +103,11 @@ def frames_per_second(gaussians: Gaussians, size_px: int = 256, repeats: int = 3
     centred = replace(gaussians.detach(), means=gaussians.means - gaussians.means.mean(dim=0))
     eye = _eye(size_px)
     splat(centred, colours, eye)  # compiles
-    return 1.0 / min(_seconds(lambda: splat(centred, colours, eye))[0] for _ in range(repeats))
+    return 1.0 / fastest(lambda: splat(centred, colours, eye), repeats)[0]
 
 
 def random_cloud(
-    num_gaussians: int, size_px: int, seed: int
+    num_gaussians: int, size_px: int, seed: int, device: Device = "cpu"
 ) -> tuple[Gaussians, torch.Tensor, Camera]:
     """Gaussians in front of a camera that looks along +y, their colours and the camera."""
     generator = torch.Generator().manual_seed(seed)
@@ -98,7 +119,7 @@ def random_cloud(
         logit_opacities=torch.logit(0.05 + 0.9 * uniform[:, 10]),
         features=torch.zeros(num_gaussians, FEATURE_DIM),
     )
-    return gaussians, uniform[:, 11:14], _eye(size_px)
+    return on_device(gaussians, device), uniform[:, 11:14].to(device), _eye(size_px)
 
 
 def _eye(size_px: int) -> Camera:
@@ -110,9 +131,3 @@ def _eye(size_px: int) -> Camera:
     return Camera(
         "bench", size_px, size_px, float(size_px), float(size_px), half, half, world_from_camera
     )
-
-
-def _seconds(work: Callable[[], Any]) -> tuple[float, Any]:
-    start = time.perf_counter()
-    result = work()
-    return time.perf_counter() - start, result

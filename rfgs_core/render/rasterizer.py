@@ -21,8 +21,9 @@ from torch import Tensor
 
 from rfgs_core.gaussians.model import Gaussians
 from rfgs_core.render.cameras import Camera
-from rfgs_core.render.splat import ALPHA_MAX, ALPHA_MIN, Splatted
-from rfgs_core.render.tiles import TILE_PX, TiledSplats, tile_splats
+from rfgs_core.render.gpu import GpuSplats
+from rfgs_core.render.splat import ALPHA_MAX, ALPHA_MIN, TILE_PX, FrozenSplats, Splatted
+from rfgs_core.render.tiles import TiledSplats, tile_splats
 
 #: A pixel is finished when less light than this passes; bounds the error of stopping early.
 LIGHT_MIN = 1e-5
@@ -33,7 +34,7 @@ SMALL_ENTRIES = 4096
 
 @dataclass(frozen=True)
 class SplatPlan:
-    """Frozen Gaussians seen by one camera: draws any colours, as often as wanted."""
+    """Frozen Gaussians in front of a camera, on the CPU; see `FrozenSplats`."""
 
     tiles: TiledSplats
     """Splats by tile."""
@@ -48,8 +49,14 @@ class SplatPlan:
         return Splatted(rgb=picture, alpha=self.alpha, depth=self.depth)
 
 
-def plan_splats(gaussians: Gaussians, camera: Camera) -> SplatPlan:
-    """Projects and sorts M Gaussians for one camera; detached from autograd."""
+def plan_splats(gaussians: Gaussians, camera: Camera) -> FrozenSplats:
+    """Projects and sorts M Gaussians for one camera, on their device; detached from autograd.
+
+    Raises:
+        MissingToolError: They are on a GPU, and gsplat is not installed.
+    """
+    if gaussians.means.is_cuda:
+        return GpuSplats.of(gaussians, camera)
     tiles = tile_splats(gaussians, camera)
     ones_and_depths = np.stack([np.ones_like(tiles.depths), tiles.depths], axis=1)
     blended = _blend(ones_and_depths, tiles)
@@ -69,11 +76,11 @@ def splat(gaussians: Gaussians, rgb: Float[Tensor, "M 3"], camera: Camera) -> Sp
 
     Args:
         gaussians: M Gaussians; taken as constants.
-        rgb: Colours in [0, 1], shape [M, 3]; gradients flow into them.
+        rgb: Colours in [0, 1], shape [M, 3], on the same device; gradients flow into them.
         camera: Where to look from.
 
     Returns:
-        The picture, colours in the precision of `rgb`.
+        The picture, on that device, colours in the precision of `rgb`.
 
     Example:
         >>> camera = Camera("front", 4, 4, 4.0, 4.0, 2.0, 2.0, np.eye(4))

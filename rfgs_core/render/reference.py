@@ -35,7 +35,7 @@ def splat_plain(
 
     Args:
         gaussians: M Gaussians; gradients flow into them.
-        rgb: Colours in [0, 1], shape [M, 3].
+        rgb: Colours in [0, 1], shape [M, 3], or any number of values each.
         camera: Where to look from.
         rows: First and one-past-last row of the picture to render; all of them if not given.
 
@@ -50,7 +50,8 @@ def splat_plain(
     values = torch.cat([rgb.double()[order], depths[:, None]], dim=1)
     top, bottom = rows or (0, camera.height)
     blended, covers = [], []
-    for pixels in _pixel_centres(top, bottom, camera.width).split(_CHUNK_PX):
+    pixels_xy = _pixel_centres(top, bottom, camera.width).to(centres.device)
+    for pixels in pixels_xy.split(_CHUNK_PX):
         dx = pixels[:, :1] - centres[:, 0]
         dy = pixels[:, 1:] - centres[:, 1]
         power = (0.5 * inverses[:, 0, 0] * dx + inverses[:, 0, 1] * dy) * dx
@@ -63,11 +64,11 @@ def splat_plain(
         blended.append(weights @ values)
         covers.append(weights.sum(dim=1))
     shape = (bottom - top, camera.width)
-    total = torch.cat(blended).reshape(*shape, 4)
+    total = torch.cat(blended).reshape(*shape, values.shape[1])
     cover = torch.cat(covers).reshape(shape)
     infinite = torch.full_like(cover, torch.inf)
-    depth = torch.where(cover > 0.0, total[..., 3] / cover.clamp_min(1e-12), infinite)
-    return Splatted(rgb=total[..., :3], alpha=cover, depth=depth)
+    depth = torch.where(cover > 0.0, total[..., -1] / cover.clamp_min(1e-12), infinite)
+    return Splatted(rgb=total[..., :-1], alpha=cover, depth=depth)
 
 
 def project_plain(
@@ -77,7 +78,7 @@ def project_plain(
 
     Depths up to the near plane are returned as they are, their projections are meaningless.
     """
-    matrix = torch.from_numpy(camera.view_from_world)
+    matrix = torch.from_numpy(camera.view_from_world).to(gaussians.means.device)
     view = gaussians.means.double() @ matrix[:3, :3].T + matrix[:3, 3]
     depth = view[:, 2]
     safe = torch.where(depth > NEAR_M, depth, torch.ones_like(depth))
@@ -94,7 +95,7 @@ def project_plain(
     double = Gaussians(**{name: value.double() for name, value in gaussians.items()})
     mapped = jacobian @ matrix[:3, :3]
     covariances = mapped @ double.covariances @ mapped.transpose(1, 2)
-    dilation = DILATION_PX2 * torch.eye(2, dtype=torch.float64)
+    dilation = DILATION_PX2 * torch.eye(2, dtype=torch.float64, device=matrix.device)
     return centres, covariances + dilation, depth
 
 

@@ -3,7 +3,7 @@
 
 Colour cannot come from radio. The Gaussians are fitted to channels alone; only then are the
 shader's three matrices fitted to training pictures, for display. This module takes geometry as a
-finished `SplatPlan` and features without gradient, so pictures cannot reach the Gaussians.
+finished `FrozenSplats` and features without gradient, so pictures cannot reach the Gaussians.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from torch import Tensor
 from rfgs_core.arrays import load_arrays, save_arrays
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.gaussians.model import FEATURE_DIM
-from rfgs_core.render.rasterizer import SplatPlan
+from rfgs_core.render.splat import FrozenSplats
 from rfgs_core.seeds import sub_seed
 from rfgs_core.threads import one_torch_thread
 
@@ -54,7 +54,7 @@ class Shader:
 
     def save(self, path: Path) -> None:
         """Writes `shader.npz` in one step."""
-        save_arrays(path, {name: getattr(self, name).detach().numpy() for name in _SHAPES})
+        save_arrays(path, {name: getattr(self, name).detach().cpu().numpy() for name in _SHAPES})
 
     @staticmethod
     def load(path: Path) -> Shader:
@@ -105,7 +105,7 @@ class ShaderConfig:
 class TrainingView:
     """One training picture and the frozen Gaussians as its camera sees them."""
 
-    plan: SplatPlan
+    plan: FrozenSplats
     """Frozen geometry."""
     features: Float32[Tensor, "M 32"]
     """Radio features, without gradient."""
@@ -132,7 +132,7 @@ def fit_shader(
     its RMS over all views; the division ends up inside W1.
 
     Args:
-        views: Training pictures; at least one.
+        views: Training pictures, all on one device; at least one.
         config: Rate, steps and seed. Same seed, same shader.
         on_step: Called with the loss of every step.
 
@@ -153,10 +153,11 @@ def _fit(
 ) -> Shader:
     rms = _feature_rms([view.features for view in views])
     generator = torch.Generator().manual_seed(sub_seed(config.seed, "shader"))
-    weights = {
-        name: (torch.randn(shape, generator=generator) * (2.0 / shape[1]) ** 0.5).requires_grad_()
+    drawn = {
+        name: torch.randn(shape, generator=generator) * (2.0 / shape[1]) ** 0.5
         for name, shape in _SHAPES.items()
     }
+    weights = {name: value.to(rms.device).requires_grad_() for name, value in drawn.items()}
     optimizer = torch.optim.Adam(list(weights.values()), lr=config.learning_rate)
     for _ in range(config.steps):
         chosen = torch.randint(len(views), (config.pictures_per_step,), generator=generator)
@@ -180,7 +181,7 @@ def _feature_rms(features: Sequence[Tensor]) -> Float[Tensor, "32"]:
     stacked = torch.cat(list(features)).double()
     if not torch.isfinite(stacked).all():
         raise RfgsFormatError("radio features hold values that are not finite")
-    rms = stacked.square().mean(dim=0).sqrt() if len(stacked) else torch.zeros(FEATURE_DIM)
+    rms = stacked.square().mean(dim=0).sqrt() if len(stacked) else stacked.new_zeros(FEATURE_DIM)
     # A feature that hardly ever differs from zero must not be blown up to count like the others.
     floor = 1e-3 * rms.max()
     rms = torch.where(rms > floor, rms, floor)

@@ -14,6 +14,7 @@ below 1/255 are not drawn at all.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 from jaxtyping import Float
 from torch import Tensor
@@ -29,6 +30,9 @@ ALPHA_MIN = 1.0 / 255.0
 
 #: Largest contribution of one Gaussian, which keeps the light behind it visible.
 ALPHA_MAX = 0.99
+
+#: Edge of a tile of a picture [px] (paper section 3.7).
+TILE_PX = 16
 
 #: Slopes beyond this multiple of the picture's half angle are clamped in the Jacobian.
 SLOPE_MARGIN = 1.3
@@ -48,3 +52,21 @@ class Splatted:
     def over(self, background: Float[Tensor, "H W 3"] | float) -> Float[Tensor, "H W 3"]:
         """The picture on top of a background."""
         return self.rgb + (1.0 - self.alpha)[..., None] * background
+
+
+class FrozenSplats(Protocol):
+    """Frozen Gaussians seen by one camera: draws any colours, as often as wanted."""
+
+    @property
+    def alpha(self) -> Float[Tensor, "H W"]:
+        """Share of each pixel that is covered."""
+        ...
+
+    @property
+    def depth(self) -> Float[Tensor, "H W"]:
+        """Expected planar depth [m], +inf where nothing covers the pixel."""
+        ...
+
+    def draw(self, rgb: Float[Tensor, "M 3"]) -> Splatted:
+        """The picture with these colours; gradients flow into `rgb`, never into the Gaussians."""
+        ...

@@ -12,10 +12,7 @@ from jaxtyping import Float64, Int32, Int64
 
 from rfgs_core.gaussians.model import Gaussians
 from rfgs_core.render.cameras import Camera
-from rfgs_core.render.splat import ALPHA_MIN, DILATION_PX2, NEAR_M, SLOPE_MARGIN
-
-#: Edge of a tile [px] (paper section 3.7).
-TILE_PX = 16
+from rfgs_core.render.splat import ALPHA_MIN, DILATION_PX2, NEAR_M, SLOPE_MARGIN, TILE_PX
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ import torch
 from jaxtyping import Bool, Float32, UInt8
 
 from rfgs_core.dataset.sequence import Sequence
+from rfgs_core.device import Device, on_device
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.gaussians.model import Gaussians
 from rfgs_core.gaussians.ply import GaussianCloud, cloud_of, read_ply, write_ply
@@ -121,7 +122,7 @@ def static_rows(
     return torch.arange(count) < count - len(attributes["features"])
 
 
-def render_view(run: TrainedRun, camera: str | Camera, frame: int) -> View:
+def render_view(run: TrainedRun, camera: str | Camera, frame: int, device: Device = "cpu") -> View:
     """The run's Gaussians in the room.
 
     Where the dataset has a picture of the empty room, the moving Gaussians are drawn over it (the
@@ -131,6 +132,7 @@ def render_view(run: TrainedRun, camera: str | Camera, frame: int) -> View:
         run: A trained run; colours are grey until its shader is fitted.
         camera: A camera or the name of one of the dataset's.
         frame: Blender frame number.
+        device: Where it is drawn.
 
     Returns:
         Picture, coverage and depth.
@@ -140,15 +142,17 @@ def render_view(run: TrainedRun, camera: str | Camera, frame: int) -> View:
     if not file.is_file():
         everything = run.gaussians(frame).detach()
         still = static_rows(everything, run.attributes(frame))
-        return _render(run, everything, eye, MID_GREY, still)
+        return _render(run, everything, eye, MID_GREY, device, still)
     empty = _colors(run.sequence.image_empty(eye.name), eye, file)
-    return _render(run, moving_gaussians(run, frame), eye, torch.from_numpy(empty))
+    return _render(run, moving_gaussians(run, frame), eye, torch.from_numpy(empty), device)
 
 
-def render_person(run: TrainedRun, camera: str | Camera, frame: int) -> View:
+def render_person(
+    run: TrainedRun, camera: str | Camera, frame: int, device: Device = "cpu"
+) -> View:
     """The moving Gaussians alone on mid-grey; arguments and result as in `render_view`."""
     eye = camera if isinstance(camera, Camera) else camera_of(run.sequence, camera)
-    return _render(run, moving_gaussians(run, frame), eye, MID_GREY)
+    return _render(run, moving_gaussians(run, frame), eye, MID_GREY, device)
 
 
 def true_person(sequence: Sequence, camera: Camera, frame: int) -> Float32[np.ndarray, "H W 3"]:
@@ -158,32 +162,32 @@ def true_person(sequence: Sequence, camera: Camera, frame: int) -> Float32[np.nd
     return np.where(mask[..., None] > 0, rgb, np.float32(MID_GREY)).astype(np.float32)
 
 
-def training_views(run: TrainedRun) -> list[TrainingView]:
+def training_views(run: TrainedRun, device: Device = "cpu") -> list[TrainingView]:
     """The pictures the shader may see, with the frozen Gaussians in front of each camera."""
-    moving = {frame: moving_gaussians(run, frame) for frame in run.frames}
+    moving = {frame: on_device(moving_gaussians(run, frame), device) for frame in run.frames}
     views = []
     for name, frame in pictures_of(run, "train"):
         camera = camera_of(run.sequence, name)
         plan = plan_splats(moving[frame], camera)
-        mask = torch.from_numpy(run.sequence.mask(name, frame) > 0)
+        mask = torch.from_numpy(run.sequence.mask(name, frame) > 0).to(device)
         views.append(
             TrainingView(
                 plan=plan,
                 features=moving[frame].features,
-                target=torch.from_numpy(true_person(run.sequence, camera, frame)),
+                target=torch.from_numpy(true_person(run.sequence, camera, frame)).to(device),
                 region=mask | (plan.alpha >= ALPHA_MIN),
             )
         )
     return views
 
 
-def fit_run_shader(run: TrainedRun, config: ShaderConfig) -> Shader:
+def fit_run_shader(run: TrainedRun, config: ShaderConfig, device: Device = "cpu") -> Shader:
     """Fits the shader to the run's training pictures and stores it in the run.
 
     Writes `shader.npz` and the colours in the run's PLY files; everything else in them keeps its
     bytes.
     """
-    shader = fit_shader(training_views(run), config)
+    shader = on_device(fit_shader(training_views(run, device), config), "cpu")
     shader.save(run.path / SHADER_FILE)
     color_run_files(run, shader)
     return shader
@@ -234,9 +238,11 @@ def _render(
     gaussians: Gaussians,
     camera: Camera,
     background: torch.Tensor | float,
+    device: Device,
     still: Bool[torch.Tensor, "M"] | None = None,
 ) -> View:
-    drawn = splat(gaussians, _shade(fitted_shader(run), gaussians, still), camera)
+    colours = _shade(fitted_shader(run), gaussians, still).to(device)
+    drawn = on_device(splat(on_device(gaussians, device), colours, camera), "cpu")
     picture = drawn.over(background).clamp(0.0, 1.0)
     return View(picture.numpy(), drawn.alpha.numpy(), drawn.depth.numpy())
 

@@ -25,9 +25,10 @@ def measured() -> Performance:
         propagation={**ratios, **tuned, **times, **sizes},
         share=Throughput(0.02, 5e10, 2e11),
         raster={"raster_s": 0.03, "twin_s": 6.0, "raster_ratio": 200.0, "max_abs_error": 1e-5},
-        pictures=(Picture(100_000, 512, 0.41, 0.052),),
+        pictures=(Picture(100_000, 512, 0.41, 0.052, None),),
         memory_gib=1.25,
         growths=(Growth("law", SIZES, (0.1, 0.9, 8.1)), Growth("flat", SIZES, (0.1, 0.1, 0.1))),
+        device="cpu",
         machine={"cpu": "a chip", "cores": 2, "gpu": "none"},
     )
 
@@ -42,6 +43,17 @@ def test_every_number_stands_on_the_page() -> None:
     assert "| 100,000 | 512 × 512 | 0.41 s | 0.052 s |" in text
     assert re.search(r"\| law \| 100 to 10,000 \| 0.1 s to 8.1 s \| 0.95 \|", text)
     assert "1.2 GiB" in text and "Nothing grows more than linearly" in text
+
+
+def test_the_page_of_a_gpu_has_frames_per_second_and_gradients() -> None:
+    found = measured()
+    drawn = (Picture(1_000_000, 512, 0.004, 0.004, 0.0125),)
+    told = replace(found, device="cuda", pictures=drawn, growths=())
+    told.machine["gpu"], told.propagation["torch"] = "a card", "2.13.0"
+    text = page(told, "2026-11-26")
+    assert "bench performance --device cuda --out FILE` on a card, torch 2.13.0, 2026-11-26" in text
+    assert "| 1,000,000 | 512 × 512 | 4.00 ms | 250 | 12.50 ms |" in text
+    assert "GPU has held 1.2 GiB" in text and "How cost grows" not in text
 
 
 def test_what_grows_faster_than_its_size_is_named() -> None:

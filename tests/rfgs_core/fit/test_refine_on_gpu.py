@@ -54,8 +54,8 @@ def test_kernels_of_the_gpu_descend_as_those_of_the_cpu(
     pytest.importorskip("triton", reason="kernels for a GPU need triton: pip install triton")
     from rfgs_core.propagation import gpu
 
-    config = replace(quick_config, batch_entries=64)
-    links = observations.links & (np.arange(observations.links.shape[1]) % 8 == 0)
+    config = replace(quick_config, batch_entries=32)
+    links = observations.links & (np.arange(observations.links.shape[1]) % 16 == 0)
     seen = replace(observations, links=links).with_delta(
         np.where(links[..., None], observations.delta, 0)
     )

@@ -10,6 +10,7 @@ import torch
 
 from rfgs_core.bench import PropagationBench, bench_propagation
 from rfgs_core.propagation import Links, Subcarriers, scatter, shadow
+from rfgs_core.propagation.covariance import covariances_by_products, packed_covariances
 
 SCATTER = ("means", "quats", "scales_rf", "gamma", "normals", "visibility")
 SHADOW = ("means", "quats", "scales", "alpha")
@@ -28,6 +29,21 @@ def test_scatter_twins_agree(make_cloud, make_links, f0, df, knots, assert_twins
         )
 
     assert_twins_agree(run, cloud)
+
+
+def test_covariances_of_a_gpu_are_those_of_the_cpu(make_cloud) -> None:
+    """Quaternions of any length, and thin Gaussians."""
+    cloud = make_cloud(57, dtype=torch.float64)
+    quats, scales = 3.0 * cloud["quats"], cloud["scales"] * torch.tensor([1.0, 1e-3, 1.0])
+    plain, found = packed_covariances(quats, scales), covariances_by_products(quats, scales)
+    torch.testing.assert_close(found, plain, rtol=1e-12, atol=1e-18)
+    weights = torch.linspace(-1.0, 2.0, plain.numel(), dtype=torch.float64).reshape(plain.shape)
+    leaves = (cloud["quats"], cloud["scales"])
+    ends = [
+        torch.autograd.grad((x * weights).sum(), leaves, retain_graph=True) for x in (plain, found)
+    ]
+    for slope, expected in zip(ends[1], ends[0], strict=True):
+        torch.testing.assert_close(slope, expected, rtol=1e-9, atol=1e-15)
 
 
 @pytest.mark.parametrize("wavelength_m", [0.052, 0.0048])

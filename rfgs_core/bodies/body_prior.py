@@ -47,6 +47,17 @@ class Bodies:
         """Bodies that all stand."""
         return Bodies(np.asarray(axes_xy, dtype=np.float64), np.full(len(axes_xy), np.nan))
 
+    @staticmethod
+    def together(parts: list[Bodies]) -> Bodies:
+        """All of some, in their order; nobody of none."""
+        if not parts:
+            return Bodies.standing(np.zeros((0, 2)))
+        return Bodies(
+            np.concatenate([part.axes_xy for part in parts]),
+            np.concatenate([part.knees_rad for part in parts]),
+            np.concatenate([part.ways for part in parts]),
+        )
+
     def __len__(self) -> int:
         return len(self.axes_xy)
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """How many people change the channel: one more is counted as long as the evidence asks for one.
 
-The facets of a standing body, of random phases, make what a device pair hears a normal vector (see
+The facets of a body that stands or lies, of random phases, make what a device pair hears a normal
+vector (see
 `limbs.evidence.kernel`); so do its echoes by way of walls, and noise. Their levels are fitted
 together. One more body counts if that raises the log-likelihood by enough, and with most of the
 device pairs that would hear it: what bounces off walls, or is left of a body that is modelled
@@ -10,24 +11,23 @@ badly, looks like a body at another place to every pair.
 
 from __future__ import annotations
 
-import functools
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Complex64, Float, Float64
+from jaxtyping import Float64
 
-from rfgs_core.articulated import people
+from rfgs_core.bodies.body_prior import Bodies
+from rfgs_core.bodies.held import Held, middle_of
 from rfgs_core.bodies.localise import SEPARATION_M, PairMaps, locate_bodies, pair_maps
+from rfgs_core.bodies.lying import bars_around, may_lie
 from rfgs_core.bodies.separation import residual_of_bodies
-from rfgs_core.encode.body_maps import CENTRE_HEIGHT_M
-from rfgs_core.limbs.evidence.body import Posed, by_bounces, direct, figure_of, posed
+from rfgs_core.bodies.start import LYING_REACH_M
 from rfgs_core.limbs.evidence.entries import Pair, pairs_of
 from rfgs_core.limbs.evidence.levels import Levels, mean_power
-from rfgs_core.limbs.evidence.library import about_z, upright
 from rfgs_core.measure.observations import Observations
 from rfgs_core.settings import TrainConfig
-from rfgs_core.worlds.figure import Figure
 
 #: Evidence that it takes to count one more [nat], and beside others a share of their median.
 TO_COUNT, OF_OTHERS = 20.0, 0.3
@@ -45,24 +45,30 @@ MOST = 8
 _CANDIDATES = 3
 #: … and around each of them [m].
 _STEPS_M = 0.08 * np.arange(-2, 3)
+_HERE_M = np.zeros((1, 3))
 _SHIFTS_M = np.array([[x, y, 0.0] for x in _STEPS_M for y in _STEPS_M])
+#: Turns by which who lies is made likelier, one after the other [rad].
+_TURNS_RAD = (0.0, 0.3, -0.3, 0.15, -0.15)
 #: Times that every body is moved to where it is likeliest beside all others, at most.
 _ROUNDS = 3
-#: Which way a body faces is not known: it is taken to face both ways [rad].
-_HEADINGS_RAD = (0.0, 0.5 * math.pi)
 
 
 class Gain(NamedTuple):
     """What a body at a place explains beside others."""
 
-    place_xy: Float64[np.ndarray, "2"]
-    """Where [m]."""
+    body: Bodies
+    """The one body, where and how it is likeliest."""
     by_pair: Float64[np.ndarray, "pair"]
     """Rise of the log-likelihood of each device pair, less ½ ln of its entries for the level that
     the body adds (Schwarz, Ann. Stat. 6(2), 1978) [nat]."""
     expected: Float64[np.ndarray, "pair"]
     """Rise that a body would cause on average, were it as bright as the others [nat]; zero where
     one of them hides it, infinite beside nobody."""
+
+    @property
+    def place_xy(self) -> Float64[np.ndarray, "2"]:
+        """Where it is [m]."""
+        return self.body.axes_xy[0]
 
     @property
     def nat(self) -> float:
@@ -114,67 +120,91 @@ def _one_more(
     seed: int,
 ) -> list[Gain] | None:
     """All bodies and the likeliest of those that may be missing; None where there is none."""
-    places = _places(found)
+    known = _bodies(found)
     if found:
-        maps = pair_maps(residual_of_bodies(observations, maps, places, config, seed))
+        maps = pair_maps(residual_of_bodies(observations, maps, known, config, seed))
     gains = [
-        gain_near(observations, places, place)
+        gain_near(observations, known, Bodies.standing(place[None]))
         for place in locate_bodies(maps, observations.bounds_m, _CANDIDATES)
-        if _separate(places, place)
+        if _separate(known, place)
     ]
     best = max(gains, key=lambda gain: gain.nat, default=None)
-    if best is None or best.nat < TO_COUNT or not _separate(places, best.place_xy):
+    if best is None or best.nat < TO_COUNT or not _separate(known, best.place_xy):
         return None
+    # Beside others who is heard well enough upright needs no second look.
+    if not found or not one_more_counts([*found, best]):
+        best = _lain(observations, maps, known, best)
     return _settled(observations, [*found, best])
+
+
+def _lain(observations: Observations, maps: PairMaps, known: Bodies, upright: Gain) -> Gain:
+    """Somebody as found, or lying near there if that is likelier."""
+    axes_xy = np.vstack([known.axes_xy, upright.place_xy])
+    if not may_lie(maps, observations.bounds_m, axes_xy, len(known)):
+        return upright
+    # At which end the head is makes no difference here.
+    bars = bars_around(maps, observations.bounds_m, axes_xy, len(known))[::2]
+    tries = [gain_near(observations, known, bar, _HERE_M) for bar in bars]
+    best = max(tries, key=lambda gain: gain.nat)
+    for turn_rad in _TURNS_RAD:
+        turned = replace(best.body, lying=best.body.ways + np.array([turn_rad, 0.0]))
+        best = max(best, gain_near(observations, known, turned), key=lambda gain: gain.nat)
+    return best if best.nat > upright.nat and _separate(known, best.place_xy) else upright
 
 
 def _settled(observations: Observations, found: list[Gain]) -> list[Gain]:
     """Each body where it is likeliest beside all others."""
     found = list(found)
     for _ in range(_ROUNDS if len(found) > 1 else 0):
-        before = _places(found)
-        for body in range(len(found)):
-            others = np.delete(_places(found), body, axis=0)
-            again = gain_near(observations, others, found[body].place_xy)
-            if not _separate(others, again.place_xy):
-                again = again._replace(place_xy=found[body].place_xy)
-            found[body] = again
-        if (_places(found) == before).all():
+        before = _bodies(found).axes_xy
+        for body, one in enumerate(found):
+            others = _bodies([other for other in found if other is not one])
+            again = gain_near(observations, others, one.body)
+            found[body] = (
+                again if _separate(others, again.place_xy) else again._replace(body=one.body)
+            )
+        if (_bodies(found).axes_xy == before).all():
             break
     return found
 
 
-def _places(found: list[Gain]) -> Float64[np.ndarray, "body 2"]:
-    return np.array([one.place_xy for one in found]).reshape(-1, 2)
+def _bodies(found: list[Gain]) -> Bodies:
+    return Bodies.together([one.body for one in found])
 
 
-def _separate(places: Float64[np.ndarray, "body 2"], place: Float64[np.ndarray, "2"]) -> bool:
-    """Whether nobody stands within `SEPARATION_M` of a place."""
-    return bool((np.linalg.norm(places - place, axis=1) >= SEPARATION_M).all())
+def _separate(known: Bodies, place: Float64[np.ndarray, "2"]) -> bool:
+    """Whether a place is `SEPARATION_M` from everybody, and out of reach of who lies.
+
+    What is left of arms and legs that lie otherwise than modelled is heard by most pairs.
+    """
+    apart_m = np.where(known.lies, LYING_REACH_M, SEPARATION_M)
+    return bool((np.linalg.norm(known.axes_xy - place, axis=1) >= apart_m).all())
 
 
 def gain_near(
     observations: Observations,
-    known_xy: Float[np.ndarray, "body 2"],
-    place_xy: Float[np.ndarray, "2"],
+    known: Bodies,
+    near: Bodies,
+    shifts_m: Float64[np.ndarray, "shift 3"] = _SHIFTS_M,
 ) -> Gain:
     """What a body explains beside others, at the best of some places around one.
 
     Args:
         observations: The frame.
-        known_xy: Where the others stand [m].
-        place_xy: About where it stands [m].
+        known: The others.
+        near: The one body, about where it is; who lies keeps height and way.
+        shifts_m: Places that are tried around there [m].
     """
     floor_m = float(observations.bounds_m[0, 2])
-    pairs = pairs_of(observations, _middle(place_xy, floor_m))
-    known = [_Standing.at(xy, floor_m, pairs) for xy in known_xy]
-    new = _Standing.at(place_xy, floor_m, pairs)
+    pairs = pairs_of(observations, middle_of(near, floor_m))
+    others = [Held.at(known.only(body), floor_m, pairs) for body in range(len(known))]
+    new = Held.at(near, floor_m, pairs)
     fits, tried, brightness = [], [], []
     for pair in pairs:
-        straight = [body.echoes(pair) for body in known]
-        bounces = [body.by_bounces(pair, observations.bounds_m) for body in known]
+        straight = [body.echoes(pair) for body in others]
+        bounces = [body.by_bounces(pair, observations.bounds_m) for body in others]
         fits.append(Levels.fitted(pair.change, [*straight, *bounces]))
-        tried.append([new.echoes(pair, shift) for shift in _SHIFTS_M])
+        tried.append([new.echoes(pair, shift) for shift in shifts_m])
         brightness += [
             level * pair.scale**2 / mean_power(part)
             for level, part in zip(fits[-1].level[1:], straight, strict=False)
@@ -182,8 +212,8 @@ def gain_near(
         ]
     rises = [fit.rises(parts) for fit, parts in zip(fits, tried, strict=True)]
     best = int(np.sum(rises, axis=0).argmax())
-    by_pair, expected = np.zeros(len(pairs)), np.full(len(pairs), 0.0 if known else np.inf)
-    seen = [not _hidden(pair, known_xy, np.asarray(place_xy)) for pair in pairs]
+    by_pair, expected = np.zeros(len(pairs)), np.full(len(pairs), 0.0 if others else np.inf)
+    seen = [not _hidden(pair, known, near.axes_xy[0]) for pair in pairs]
     if sum(seen) < FEWEST_PAIRS:
         # Two pairs agree by chance on an echo off a wall: then all have a say.
         seen = [True] * len(pairs)
@@ -192,16 +222,16 @@ def gain_near(
         if pair.change.any():
             by_pair[row] = fit.with_part(part).log_likelihood - fit.log_likelihood
         by_pair[row] -= 0.5 * math.log(len(pair.change))
-        if known and seen[row]:
+        if others and seen[row]:
             level = float(np.median(brightness or [0.0])) * mean_power(part) / pair.scale**2
             expected[row] = fit.expected_rise(part, level)
-    return Gain(np.asarray(place_xy) + _SHIFTS_M[best, :2], by_pair, expected)
+    there = replace(near, axes_xy=near.axes_xy + shifts_m[best, :2])
+    return Gain(there, by_pair, expected)
 
 
-def _hidden(
-    pair: Pair, known_xy: Float[np.ndarray, "body 2"], place_xy: Float64[np.ndarray, "2"]
-) -> bool:
+def _hidden(pair: Pair, known: Bodies, place_xy: Float64[np.ndarray, "2"]) -> bool:
     """Whether a body stands between a place and an end of a pair, seen from above."""
+    known_xy = known.axes_xy[~known.lies]
     behind_m = np.linalg.norm(known_xy - place_xy, axis=1)
     for end in (pair.tx, pair.rx):
         way = end.centre[:2] - place_xy
@@ -210,42 +240,3 @@ def _hidden(
         if ((off_m < _HIDES_M) & (behind_m > _BEHIND_M)).any():
             return True
     return False
-
-
-class _Standing(NamedTuple):
-    """A body that stands at a place, facing both ways at once."""
-
-    middle: Float64[np.ndarray, "3"]
-    """Middle of the body [m]."""
-    ways: list[Posed]
-
-    @staticmethod
-    def at(xy: Float[np.ndarray, "2"], floor_m: float, pairs: list[Pair]) -> _Standing:
-        figure = _figure()
-        pose, spot = upright(figure.body), np.array([*xy, floor_m])
-        turned = (pose.turned(about_z(heading)).moved(spot) for heading in _HEADINGS_RAD)
-        return _Standing(_middle(xy, floor_m), [posed(figure, one, pairs) for one in turned])
-
-    def echoes(
-        self, pair: Pair, shift: Float64[np.ndarray, "3"] | None = None
-    ) -> Complex64[np.ndarray, "entry entry"]:
-        """Covariance of the straight echoes, moved by `shift` [m]."""
-        moved = np.zeros(3) if shift is None else shift
-        return np.sum([direct(one, pair, moved) for one in self.ways], axis=0)
-
-    def by_bounces(
-        self, pair: Pair, bounds_m: Float64[np.ndarray, "2 3"]
-    ) -> Complex64[np.ndarray, "entry entry"]:
-        """Covariance of the echoes by way of one wall."""
-        parts = [by_bounces(one.facets, pair, bounds_m, self.middle) for one in self.ways]
-        return np.sum(parts, axis=0)
-
-
-def _middle(xy: Float[np.ndarray, "2"], floor_m: float) -> Float64[np.ndarray, "3"]:
-    return np.array([*xy, floor_m + CENTRE_HEIGHT_M])
-
-
-@functools.cache
-def _figure() -> Figure:
-    """The mean body."""
-    return figure_of(people().body(np.zeros(0)))

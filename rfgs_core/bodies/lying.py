@@ -63,7 +63,7 @@ def with_lying(
     standing = Bodies.standing(axes_xy)
     if config.posture == "standing" or observations.kind != "complex":
         return standing
-    low = [_may_lie(maps, observations.bounds_m, axes_xy, body) for body in range(len(axes_xy))]
+    low = [may_lie(maps, observations.bounds_m, axes_xy, body) for body in range(len(axes_xy))]
     if not any(low):
         return standing
     found = standing
@@ -84,7 +84,7 @@ def _put(bodies: Bodies, body: int, here: Bodies) -> Bodies:
     return Bodies(axes_xy, bodies.knees_rad, lying)
 
 
-def _may_lie(
+def may_lie(
     maps: PairMaps,
     bounds_m: Float64[np.ndarray, "2 3"],
     axes_xy: Float64[np.ndarray, "body 2"],
@@ -95,6 +95,21 @@ def _may_lie(
     chest = np.log(maps.upright(ground, bounds_m[0, 2] + _CHEST_M) + 0.05).mean(axis=0).max()
     loudest = max(_loudness(maps, bounds_m, ground, height).max() for height in HEIGHTS_M)
     return bool(loudest > chest - CHEST_LOG)
+
+
+def bars_around(
+    maps: PairMaps,
+    bounds_m: Float64[np.ndarray, "2 3"],
+    axes_xy: Float64[np.ndarray, "body 2"],
+    body: int,
+) -> list[Bodies]:
+    """The loudest level bars around one of some bodies, of every height, as bodies that lie."""
+    ground = _ground(bounds_m, axes_xy, body)
+    found = []
+    for height_m in HEIGHTS_M:
+        loud = _loudness(maps, bounds_m, ground, height_m)
+        found += _loudest(loud, ground, height_m)
+    return found
 
 
 def _ground(

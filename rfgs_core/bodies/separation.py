@@ -62,11 +62,11 @@ def separated(
     found, reach_m = axes_xy.copy(), np.broadcast_to(reach_m, count)
     if near is None:
         for body in range(1, count):
-            echoes = _echoes(observations, maps, found[:body], config, seed)
+            echoes = _echoes(observations, maps, Bodies.standing(found[:body]), config, seed)
             _move(found, body, _sought(observations, echoes.sum(axis=0)))
     for _ in range(ROUNDS):
         for body in range(count):
-            echoes = _echoes(observations, maps, found, config, seed)
+            echoes = _echoes(observations, maps, Bodies.standing(found), config, seed)
             others = echoes.sum(axis=0) - echoes[body]
             where = None if near is None else near[[body]]
             place = _sought(observations, others, where, reach_m[body])
@@ -84,7 +84,7 @@ def each_alone(
     """The frame once for each body, without the echoes of all others."""
     if len(axes_xy) == 1:
         return [observations]
-    echoes = _echoes(observations, maps, axes_xy, config, seed)
+    echoes = _echoes(observations, maps, Bodies.standing(axes_xy), config, seed)
     others = echoes.sum(axis=0) - echoes
     return [_without(observations, part) for part in others]
 
@@ -92,12 +92,12 @@ def each_alone(
 def residual_of_bodies(
     observations: Observations,
     maps: PairMaps,
-    axes_xy: Float64[np.ndarray, "body 2"],
+    bodies: Bodies,
     config: TrainConfig,
     seed: int,
 ) -> Observations:
     """What remains of a frame without the echoes of all its bodies."""
-    echoes = _echoes(observations, maps, axes_xy, config, seed)
+    echoes = _echoes(observations, maps, bodies, config, seed)
     return _without(observations, echoes.sum(axis=0))
 
 
@@ -133,15 +133,14 @@ def _without(
 def _echoes(
     observations: Observations,
     maps: PairMaps,
-    axes_xy: Float64[np.ndarray, "body 2"],
+    bodies: Bodies,
     config: TrainConfig,
     seed: int,
 ) -> Complex64[np.ndarray, "body tx rx subcarrier"]:
     """What each body reflects at the visible entries, all fitted together, shadows left aside."""
     rng = np.random.default_rng(sub_seed(seed, "apart"))
-    bodies = Bodies.standing(axes_xy)
     density = StartDensity.of(maps, bodies, observations.bounds_m)
-    points = density.draw(GAUSSIANS_PER_BODY * len(axes_xy), rng)
+    points = density.draw(GAUSSIANS_PER_BODY * len(bodies), rng)
     gaussians = gaussians_at(points, outward_normals(points, bodies))
     power = fit_power(observations, gaussians)
     head = new_head(observations, config, power)
@@ -149,10 +148,10 @@ def _echoes(
     target = comparison_of(observations).measured()
     noise = noise_per_link(observations, target, config.unexplained)
     gamma = posterior_mean(channel, head, gaussians, target, noise, power, SOLVER_STEPS)
-    body = nearest_axis(points, axes_xy)
+    body = nearest_axis(points, bodies.axes_xy)
     echoes = []
     with torch.no_grad():
-        for index in range(len(axes_xy)):
+        for index in range(len(bodies)):
             own = torch.from_numpy(body == index)
             part = channel.scattered(head, gaussians.select(own), gamma[own])
             echoes.append(observations.with_entries(part.numpy()).delta)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from rfgs_core.bodies.body_prior import Bodies
 from rfgs_core.bodies.count import count_bodies, gain_near, one_more_counts
 from rfgs_core.dataset import Sequence
 from rfgs_core.measure.observations import Observations, observe
@@ -51,16 +52,16 @@ def head_count_table(
     nobody: dict[str, list[int]] = {"noise": [], "empty": []}
     confirmed = 0
     config = TrainConfig()
-    for index, (frame, one) in enumerate(zip(frames, seen, strict=True)):
+    for index, (frame, now) in enumerate(zip(frames, seen, strict=True)):
         seed = sub_seed(0, sequence.name, radio, frame, "people")
-        found = count_bodies(one, config, seed)
+        found = count_bodies(now, config, seed)
         other = seen[(index + len(seen) // 2) % len(seen)]
-        there = [one_more_counts([gain_near(other, _NOBODY, body.place_xy)]) for body in found]
+        there = [one_more_counts([gain_near(other, _NOBODY, one.body)]) for one in found]
         confirmed += sum(there)
         counts.append(len(found))
         if index < EMPTY_FRAMES:
             for name, nobody_there in (("noise", noise_alone), ("empty", empty_room_anew)):
-                nobody[name].append(len(count_bodies(nobody_there(one, seed), config, seed)))
+                nobody[name].append(len(count_bodies(nobody_there(now, seed), config, seed)))
         on_frame()
     return {
         "people": true,
@@ -75,7 +76,7 @@ def head_count_table(
     }
 
 
-_NOBODY = np.zeros((0, 2))
+_NOBODY = Bodies.together([])
 
 
 def noise_alone(observations: Observations, seed: int) -> Observations:

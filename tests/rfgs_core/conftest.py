@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import torch
 
+from rfgs_core import interrupts
 from rfgs_core.bodies import posture
 from rfgs_core.bodies.tracks import Tracks
 from rfgs_core.dataset import open_dataset
@@ -33,8 +34,10 @@ MakeObservations = Callable[..., Observations]
 
 
 @pytest.fixture
-def hears_ctrl_c() -> Iterator[None]:
+def hears_ctrl_c(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """As our programs do, and so what they start: a shell's background job ignores Ctrl-C."""
+    # A command that makes nothing may have run in this process.
+    monkeypatch.setattr(interrupts, "_message", interrupts.MESSAGE)
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)

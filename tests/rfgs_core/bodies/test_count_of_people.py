@@ -8,8 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lit_bodies import lit
+from lit_bodies import echoing, lit
 
+from rfgs_core.bodies.body_prior import Bodies
 from rfgs_core.bodies.count import (
     FEWEST_PAIRS,
     OF_OTHERS,
@@ -25,13 +26,17 @@ from rfgs_core.settings import TrainConfig
 
 ROOM_M = np.array([[0.0, 0.0, 0.0], [5.0, 4.6, 2.4]])
 BODIES = [(1.5, 2.9), (3.4, 1.6)]
-NOBODY = np.zeros((0, 2))
+NOBODY = Bodies.together([])
 
 
 @pytest.fixture
 def empty(make_observations: Callable[..., Observations]) -> Observations:
     radio = replace(preset("wifi"), rx_rows=3, rx_cols=3, num_subcarriers=24)
     return make_observations(radio=radio, bounds_m=ROOM_M)
+
+
+def upright(place: np.ndarray | tuple[float, float]) -> Bodies:
+    return Bodies.standing(np.array([place]))
 
 
 def noisy(observations: Observations, share: float) -> Observations:
@@ -52,6 +57,15 @@ def test_people_are_counted_where_they_stand(empty: Observations, count: int) ->
         assert min(np.linalg.norm(one.place_xy - place) for one in found) < 0.25
 
 
+def test_who_lies_is_counted_once_and_told_to_lie(empty: Observations) -> None:
+    way_rad = 0.25 * np.pi
+    body = Bodies(np.array([[2.6, 2.2]]), np.array([np.nan]), np.array([[way_rad, 0.13]]))
+    (found,) = count_bodies(noisy(echoing(empty, body, seed=2), 0.02), TrainConfig(), 0)
+    assert found.body.lies.all()
+    assert np.linalg.norm(found.place_xy - body.axes_xy[0]) < 0.4
+    assert abs(np.sin(found.body.ways[0, 0] - way_rad)) < 0.35
+
+
 def test_an_unchanged_channel_has_nobody(empty: Observations) -> None:
     assert count_bodies(empty, TrainConfig(), 0) == []
 
@@ -69,7 +83,7 @@ def test_what_one_pair_alone_hears_is_nobody(empty: Observations) -> None:
     quiet = noisy(empty.with_delta(np.zeros_like(body.delta)), 1.0).delta
     level = np.sqrt(np.mean(np.abs(body.delta[pair == 0]) ** 2))
     only = np.where((pair == 0)[..., None], body.delta, 0.1 * level * quiet)
-    gain = gain_near(body.with_delta(only), NOBODY, np.array(BODIES[0]))
+    gain = gain_near(body.with_delta(only), NOBODY, upright(BODIES[0]))
     assert gain.nat > TO_COUNT
     assert gain.heard < 0.5
     assert not one_more_counts([gain])
@@ -78,14 +92,14 @@ def test_what_one_pair_alone_hears_is_nobody(empty: Observations) -> None:
 
 def test_another_place_explains_less(empty: Observations) -> None:
     seen = lit(empty, BODIES[:1], seed=2)
-    here, there = (gain_near(seen, NOBODY, np.array(place)) for place in BODIES)
+    here, there = (gain_near(seen, NOBODY, upright(place)) for place in BODIES)
     assert here.nat > 2.0 * there.nat
 
 
 def test_who_is_known_is_not_counted_again(empty: Observations) -> None:
     seen = lit(empty, BODIES[:1], seed=2)
-    first = gain_near(seen, NOBODY, np.array(BODIES[0]))
-    beside = gain_near(seen, np.array(BODIES[:1]), np.add(BODIES[0], (0.45, 0.0)))
+    first = gain_near(seen, NOBODY, upright(BODIES[0]))
+    beside = gain_near(seen, upright(BODIES[0]), upright(np.add(BODIES[0], (0.45, 0.0))))
     assert not one_more_counts([first, beside])
 
 
@@ -103,13 +117,13 @@ def test_who_is_known_is_not_counted_again(empty: Observations) -> None:
 def test_evidence_and_agreement_are_both_needed(
     by_pair: list[float], expected: list[float], counts: bool
 ) -> None:
-    one = Gain(np.zeros(2), np.array(by_pair), np.array(expected))
+    one = Gain(upright(np.zeros(2)), np.array(by_pair), np.array(expected))
     assert one_more_counts([one]) is counts
 
 
 def test_next_to_strong_evidence_a_faint_one_is_nobody() -> None:
     def of(nat: float) -> Gain:
-        return Gain(np.zeros(2), np.full(4, nat / 4), np.full(4, 1e3))
+        return Gain(upright(np.zeros(2)), np.full(4, nat / 4), np.full(4, 1e3))
 
     strong = 4.0 * TO_COUNT / OF_OTHERS
     assert one_more_counts([of(2.0 * TO_COUNT)])

@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from rfgs_core.bodies.body_prior import Bodies
-from rfgs_core.bodies.held import Held, middle_of
+from rfgs_core.bodies.expected_echoes import ExpectedEchoes, middle_of
 from rfgs_core.bodies.localise import SEPARATION_M, PairMaps, locate_bodies, pair_maps
 from rfgs_core.bodies.lying import bars_around, may_lie
 from rfgs_core.bodies.separation import residual_of_bodies
@@ -197,8 +197,8 @@ def gain_near(
     """
     floor_m = float(observations.bounds_m[0, 2])
     pairs = pairs_of(observations, middle_of(near, floor_m))
-    others = [Held.at(known.only(body), floor_m, pairs) for body in range(len(known))]
-    new = Held.at(near, floor_m, pairs)
+    others = [ExpectedEchoes.at(known.only(body), floor_m, pairs) for body in range(len(known))]
+    new = ExpectedEchoes.at(near, floor_m, pairs)
     fits, tried, brightness = [], [], []
     for pair in pairs:
         straight = [body.echoes(pair) for body in others]

@@ -27,7 +27,7 @@ _ENDS_RAD = (0.0, math.pi)
 _ON_BACK = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 
 
-class Held(NamedTuple):
+class ExpectedEchoes(NamedTuple):
     """A body at a place, facing all ways at once."""
 
     middle: Float64[np.ndarray, "3"]
@@ -35,7 +35,7 @@ class Held(NamedTuple):
     ways: list[Posed]
 
     @staticmethod
-    def at(one: Bodies, floor_m: float, pairs: list[Pair]) -> Held:
+    def at(one: Bodies, floor_m: float, pairs: list[Pair]) -> ExpectedEchoes:
         """A single body as some pairs see it; who sits is taken to stand."""
         figure = _figure()
         pose = upright(figure.body)
@@ -48,7 +48,7 @@ class Held(NamedTuple):
             turned = [pose.turned(about_z(heading)) for heading in _HEADINGS_RAD]
             spot = np.array([*one.axes_xy[0], floor_m])
         ways = [posed(figure, way.moved(spot), pairs) for way in turned]
-        return Held(middle_of(one, floor_m), ways)
+        return ExpectedEchoes(middle_of(one, floor_m), ways)
 
     def echoes(
         self, pair: Pair, shift: Float64[np.ndarray, "3"] | None = None

@@ -16,6 +16,7 @@ from rfgs_core.device import Device, on_device
 from rfgs_core.gaussians.model import FEATURE_DIM, Gaussians
 from rfgs_core.propagation import Backend, Subcarriers, propagate
 from rfgs_core.render.bench import random_cloud
+from rfgs_core.render.cameras import Camera
 from rfgs_core.render.gpu import splat_on_gpu
 from rfgs_core.render.rasterizer import splat
 from rfgs_core.render.reference import splat_plain
@@ -166,31 +167,32 @@ def _picture(gaussians: int, edge_px: int) -> Check:
 def _pictures_on_gpu(gaussians: int, edge_px: int) -> Iterator[Check]:
     """Colours, features and all gradients of gsplat, beside the plain twin in double."""
     cloud, rgb, camera = random_cloud(gaussians, edge_px, seed=gaussians)
-    drawn = torch.randn(gaussians, FEATURE_DIM, generator=torch.Generator().manual_seed(1))
-    for what, values in (("3 colours", rgb), ("32 features", drawn)):
-        ends = []
-        for device in ("cuda", "cpu"):
-            leaves = {
-                name: value.detach().to(device).requires_grad_(True)
-                for name, value in {**dict(cloud.items()), "values": values}.items()
-            }
-            there = Gaussians(**{name: leaves[name] for name, _ in cloud.items()})
-            if device == "cuda":
-                picture, alpha, _ = splat_on_gpu(there, leaves["values"], camera)
-            else:
-                plain = splat_plain(there, leaves["values"], camera)
-                picture, alpha = plain.rgb, plain.alpha
-            # Some direction that no symmetry of a picture hides.
-            ramp = torch.linspace(0.5, 1.5, picture.numel(), device=device, dtype=picture.dtype)
-            (picture * ramp.reshape(picture.shape)).sum().backward()
-            slopes = [leaves[name].grad for name in (*_DRAWN, "values")]
-            ends.append(([picture.detach(), alpha.detach()], slopes))
-        (seen, slopes), (plain, true_slopes) = ends
-        name = f"{what}, {gaussians} at {edge_px} px"
-        worst = max(_relative(a, b) for a, b in zip(seen, plain, strict=True))
-        yield Check(f"picture of {name}", worst, PICTURE_ON_GPU)
-        worst = max(_relative(a, b) for a, b in zip(slopes, true_slopes, strict=True))
-        yield Check(f"gradients of {name}", worst, PICTURE_ON_GPU)
+    features = torch.randn(gaussians, FEATURE_DIM, generator=torch.Generator().manual_seed(1))
+    for what, values in (("3 colours", rgb), ("32 features", features)):
+        found, exact = (_drawn(cloud, values, camera, device) for device in ("cuda", "cpu"))
+        for part, kind in enumerate(("picture", "gradients")):
+            pairs = zip(found[part], exact[part], strict=True)
+            worst = max(_relative(one, other) for one, other in pairs)
+            yield Check(f"{kind} of {what}, {gaussians} at {edge_px} px", worst, PICTURE_ON_GPU)
+
+
+def _drawn(
+    cloud: Gaussians, values: Tensor, camera: Camera, device: Device
+) -> tuple[list[Tensor], list[Tensor]]:
+    """Picture and coverage, and the gradients of everything that they depend on."""
+    parts = {**dict(cloud.items()), "values": values}
+    leaves = {name: part.detach().to(device).requires_grad_(True) for name, part in parts.items()}
+    there = Gaussians(**{name: leaves[name] for name, _ in cloud.items()})
+    if device == "cuda":
+        picture, alpha, _ = splat_on_gpu(there, leaves["values"], camera)
+    else:
+        plain = splat_plain(there, leaves["values"], camera)
+        picture, alpha = plain.rgb, plain.alpha
+    # Some direction that no symmetry of a picture hides.
+    ramp = torch.linspace(0.5, 1.5, picture.numel(), device=device, dtype=picture.dtype)
+    (picture * ramp.reshape(picture.shape)).sum().backward()
+    slopes = [torch.as_tensor(leaves[name].grad) for name in (*_DRAWN, "values")]
+    return [picture.detach(), alpha.detach()], slopes
 
 
 def throughput(device: Device, repeats: int = 5) -> Throughput:

@@ -26,12 +26,10 @@ from rfgs_core.propagation.kernels_triton import (
     BY_NORMALS,
     BY_SHAPE,
     ROWS,
+    SCATTER_SLOPES,
     SUBCARRIERS,
     scatter_backward,
     scatter_forward,
-)
-from rfgs_core.propagation.kernels_triton import (
-    SLOPES as SCATTER_SLOPES,
 )
 from rfgs_core.propagation.kernels_triton_shadow import (
     BY_ALPHA,

@@ -19,7 +19,7 @@ from rfgs_core.propagation.triton_math import plus, sine_cosine_of_turns, store_
 #: computes its distances once. Half as many Gaussians take seven times as long on an H100.
 ROWS, SUBCARRIERS = 128, 32
 #: Gaussians of one tile of the gradient: one per thread.
-SLOPES = 128
+SCATTER_SLOPES = 128
 #: Rows of the gradient: positions, covariances, real and imaginary gain, normals; then groups.
 BY_MEANS, BY_SHAPE, BY_GAIN, BY_NORMALS, BY_GROUP = 0, 3, 9, 11, 14
 

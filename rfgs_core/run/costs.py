@@ -93,7 +93,7 @@ def count_price(stage: Stage) -> str:
     """One line before people are counted: in how many frames, how long, and what does without."""
     found = forecast([stage])
     return (
-        f"counting people in {stage.steps} frames first: about {in_words(found.total_s)}, "
+        f"counting people in up to {stage.steps} frames first: about {in_words(found.total_s)}, "
         f"{found.source}; --people told, or their number, does without"
     )
 

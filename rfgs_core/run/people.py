@@ -151,6 +151,7 @@ def counted(
                 bar.update()
 
         heads = head_count(sequence, radio, frames, config, people, step)
+        bar.total = bar.n
     if heads.source == "sensed" and heads.count == 0:
         if people == "auto":
             _LOG.warning("%s senses nobody; taken to be there: %d, told", radio, told(sequence))
@@ -171,6 +172,8 @@ def head_count(
     on_frame: Callable[[int], Any] = lambda _done: None,
 ) -> HeadCount:
     """How many people there are: what most of some frames say, spread over all.
+
+    Frames that can no longer change that are not asked.
 
     Args:
         sequence: The data.
@@ -199,19 +202,35 @@ def head_count(
         empty = learned_background(sequence, radio, config.channel, config.observe, config.packets)
     votes = {}
     on_frame(0)
-    for frame in spread_frames(frames, votes_of(frames)):
+    for frame in _middle_and_ends_first(spread_frames(frames, votes_of(frames))):
         seen = observe(
             sequence, radio, frame, config.channel, config.observe, empty, config.packets
         )
         seed = sub_seed(config.seed, sequence.name, radio, frame, "people")
         votes[str(frame)] = len(count_bodies(seen, config, seed))
         on_frame(len(votes))
+        if decided(list(votes.values()), votes_of(frames)):
+            break
     return HeadCount(voted(list(votes.values())), "sensed", votes)
 
 
 def votes_of(frames: list[int]) -> int:
     """How many of some frames have a vote."""
     return min(VOTES, len(frames))
+
+
+def _middle_and_ends_first(frames: list[int]) -> list[int]:
+    """Frames in an order of which the first few are spread over all."""
+    half = len(frames) // 2
+    first = [frames[half], frames[0], frames[-1]]
+    return list(dict.fromkeys([*first, *frames]))
+
+
+def decided(votes: list[int], everybody: int) -> bool:
+    """Whether the votes that are still to come, of so many, can change nothing."""
+    tally = Counter(votes)
+    most = tally.pop(voted(votes))
+    return most > max(tally.values(), default=0) + everybody - len(votes)
 
 
 def voted(votes: list[int]) -> int:

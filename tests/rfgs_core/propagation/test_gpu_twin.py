@@ -123,6 +123,7 @@ for room, kernel, own in (
 ):
     names = kernel.arg_names
     known = {"FACING": True, "WEIGHED": True, **{n: getattr(room, n, None) for n in sizes}}
+    known["SLOPES"] = known["SLOPES"] or scattering.SCATTER_SLOPES
     known["SUBCARRIERS"] = 8  # A loop over all 32 written out takes the compiler much longer.
     constants = {n: known[n] for n in names if n in known}
     kinds = {**types, **own}

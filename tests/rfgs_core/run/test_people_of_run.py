@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +14,16 @@ from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.evaluate.head_count import empty_room_anew, head_count_table, noise_alone
 from rfgs_core.measure.observations import observe
 from rfgs_core.run import people as run_people
-from rfgs_core.run.people import PEOPLE_FILE, HeadCount, People, counted, head_count, told, voted
+from rfgs_core.run.people import (
+    PEOPLE_FILE,
+    HeadCount,
+    People,
+    counted,
+    decided,
+    head_count,
+    told,
+    voted,
+)
 from rfgs_core.run.training import train_sequence
 from rfgs_core.settings import TrainConfig
 
@@ -24,6 +34,28 @@ from rfgs_core.settings import TrainConfig
 )
 def test_most_frames_decide_and_of_equals_the_larger(votes: list[int], count: int) -> None:
     assert voted(votes) == count
+
+
+def test_votes_that_are_not_asked_would_change_nothing() -> None:
+    """All ballots of five frames on nobody, one or two."""
+    early = 0
+    for ballot in itertools.product(range(3), repeat=5):
+        asked = next((n for n in range(1, 5) if decided(list(ballot[:n]), 5)), 5)
+        assert voted(list(ballot[:asked])) == voted(list(ballot))
+        early += asked == 3
+    assert early == 3 * 3**2
+    assert not decided([1, 1], 5) and decided([1, 1, 1], 5) and not decided([1, 1, 1, 2], 7)
+
+
+def test_frames_are_asked_until_most_agree(
+    tiny_dataset: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sequence, asked = open_dataset(tiny_dataset).sequence(), []
+    monkeypatch.setattr(run_people, "observe", lambda _sequence, _radio, frame, *_: frame)
+    monkeypatch.setattr(run_people, "count_bodies", lambda frame, *_: asked.append(frame) or [None])
+    monkeypatch.setattr(run_people, "why_not_sensed", lambda *_: None)
+    heads = head_count(sequence, "wifi", list(range(1, 10)), TrainConfig(), "sensed")
+    assert asked == [5, 1, 9] and heads == HeadCount(1, "sensed", {"5": 1, "1": 1, "9": 1})
 
 
 def test_what_is_kept_is_read(tmp_path: Path) -> None:
@@ -57,7 +89,7 @@ def test_counting_says_its_price_first_and_only_where_people_are_sensed(
     for asked, lines in (("told", 0), (2, 0), ("sensed", 1)):
         counted(tmp_path / "run", sequence, "wifi", sequence.frames, config, asked)
         said = capsys.readouterr().err
-        assert said.count("counting people in 2 frames first: about ") == lines
+        assert said.count("counting people in up to 2 frames first: about ") == lines
     assert "does without" in said
 
 

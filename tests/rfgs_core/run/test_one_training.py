@@ -20,7 +20,7 @@ QUICK = ("--people", "told", "--posture", "standing", "--limbs", "off")
 ROOT = Path(__file__).resolve().parents[3]
 #: Bars, what the radio can tell apart, and the price.
 TOLD = (
-    r"(train wifi|counting people): +\d+%|counting people in \d+ frames first: about |"
+    r"(train wifi|counting people): +\d+%|counting people in up to \d+ frames first: about |"
     r"\d+ frames? to fit, |wifi(_\d)?: (paths|across)|\d+ links x \d+ subcarriers"
 )
 

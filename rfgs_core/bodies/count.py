@@ -126,10 +126,10 @@ def _one_more(
     gains = [
         gain_near(observations, known, Bodies.standing(place[None]))
         for place in locate_bodies(maps, observations.bounds_m, _CANDIDATES)
-        if _separate(known, place)
+        if stands_clear(known, place)
     ]
     best = max(gains, key=lambda gain: gain.nat, default=None)
-    if best is None or best.nat < TO_COUNT or not _separate(known, best.place_xy):
+    if best is None or best.nat < TO_COUNT or not stands_clear(known, best.place_xy):
         return None
     # Beside others who is heard well enough upright needs no second look.
     if not found or not one_more_counts([*found, best]):
@@ -149,7 +149,7 @@ def _lain(observations: Observations, maps: PairMaps, known: Bodies, upright: Ga
     for turn_rad in _TURNS_RAD:
         turned = replace(best.body, lying=best.body.ways + np.array([turn_rad, 0.0]))
         best = max(best, gain_near(observations, known, turned), key=lambda gain: gain.nat)
-    return best if best.nat > upright.nat and _separate(known, best.place_xy) else upright
+    return best if best.nat > upright.nat and stands_clear(known, best.place_xy) else upright
 
 
 def _settled(observations: Observations, found: list[Gain]) -> list[Gain]:
@@ -161,7 +161,7 @@ def _settled(observations: Observations, found: list[Gain]) -> list[Gain]:
             others = _bodies([other for other in found if other is not one])
             again = gain_near(observations, others, one.body)
             found[body] = (
-                again if _separate(others, again.place_xy) else again._replace(body=one.body)
+                again if stands_clear(others, again.place_xy) else again._replace(body=one.body)
             )
         if (_bodies(found).axes_xy == before).all():
             break
@@ -172,7 +172,7 @@ def _bodies(found: list[Gain]) -> Bodies:
     return Bodies.together([one.body for one in found])
 
 
-def _separate(known: Bodies, place: Float64[np.ndarray, "2"]) -> bool:
+def stands_clear(known: Bodies, place: Float64[np.ndarray, "2"]) -> bool:
     """Whether a place is `SEPARATION_M` from everybody, and out of reach of who lies.
 
     What is left of arms and legs that lie otherwise than modelled is heard by most pairs.

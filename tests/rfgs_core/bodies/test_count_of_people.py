@@ -19,6 +19,7 @@ from rfgs_core.bodies.count import (
     count_bodies,
     gain_near,
     one_more_counts,
+    stands_clear,
 )
 from rfgs_core.measure.observations import Observations
 from rfgs_core.radio import preset
@@ -55,6 +56,23 @@ def test_people_are_counted_where_they_stand(empty: Observations, count: int) ->
     assert len(found) == count
     for place in BODIES[:count]:
         assert min(np.linalg.norm(one.place_xy - place) for one in found) < 0.25
+
+
+@pytest.mark.parametrize(("away_m", "beside_standing", "beside_lying"),
+                         [(0.3, False, False), (0.5, True, False), (1.0, True, False),
+                          (1.2, True, True)])  # fmt: skip
+def test_nobody_is_told_within_reach_of_who_lies(
+    away_m: float, beside_standing: bool, beside_lying: bool
+) -> None:
+    """Hands and feet of who lies are a metre from the hips; who stands takes less room."""
+    place = np.array([2.0 + away_m, 1.0])
+    stands = upright((2.0, 1.0))
+    lies = Bodies(stands.axes_xy, np.array([np.nan]), np.array([[0.3, 0.13]]))
+    far = upright((9.0, 9.0))
+    for known, clear in ((stands, beside_standing), (lies, beside_lying)):
+        assert stands_clear(known, place) == clear
+        assert stands_clear(Bodies.together([far, known]), place) == clear
+    assert stands_clear(NOBODY, place)
 
 
 def test_who_lies_is_counted_once_and_told_to_lie(empty: Observations) -> None:

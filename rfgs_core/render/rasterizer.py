@@ -165,8 +165,10 @@ def _rows_reached(splat: np.ndarray, top: int) -> tuple[int, int]:
     a, b, c = splat[2], splat[3], splat[4]
     half = np.sqrt(2.0 * splat[6] * a / (a * c - b * b)) + 1.0
     middle = splat[1] - top - 0.5
-    first = max(0, min(TILE_PX, int(np.floor(middle - half))))
-    return first, max(first, min(TILE_PX, int(np.ceil(middle + half)) + 1))
+    # Cut before they are whole numbers, which hold no splat of any size.
+    first = min(max(np.floor(middle - half), 0.0), float(TILE_PX))
+    last = min(max(np.ceil(middle + half) + 1.0, first), float(TILE_PX))
+    return int(first), int(last)
 
 
 @numba.njit(inline="always", **_OPTIONS)

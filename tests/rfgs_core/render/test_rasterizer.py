@@ -137,6 +137,16 @@ def test_what_has_no_shape_or_place_is_not_drawn(name: str, value: float) -> Non
     assert torch.equal(found.rgb, expected.rgb) and torch.equal(found.depth, expected.depth)
 
 
+def test_a_gaussian_larger_than_any_room_covers_everything() -> None:
+    cloud, rgb, camera = random_cloud(50, 33, seed=3)
+    sizes = cloud.log_scales.clone()
+    sizes[7] = 60.0
+    vast = replace(cloud, log_scales=sizes)
+    tiled, plain = splat(vast, rgb, camera), splat_plain(vast, rgb, camera)
+    assert float(plain.alpha.min()) > 0.05
+    torch.testing.assert_close(tiled.rgb.double(), plain.rgb, rtol=0.0, atol=2e-5)
+
+
 def test_stopping_early_behind_opaque_layers_stays_within_tolerance(camera, gaussians) -> None:
     layers = gaussians([[0.0, 0.0, -1.0 - 0.01 * i] for i in range(40)], 0.4, 0.7)
     rgb = torch.linspace(0, 1, 120).reshape(40, 3)

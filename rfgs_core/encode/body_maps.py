@@ -109,6 +109,11 @@ def views_of(layout: Layout, links: Bool[np.ndarray, "tx rx"]) -> list[View]:
     return views
 
 
+def distinct_places(places_m: Float64[np.ndarray, "element"]) -> int:
+    """How many places elements have along an axis of their array."""
+    return len(np.unique(np.round(places_m, 5)))
+
+
 def body_maps(
     change: Complex[np.ndarray, "tx rx subcarrier"],
     layout: Layout,

@@ -11,7 +11,7 @@ import torch
 from jaxtyping import Bool, Float, Float32, UInt8
 from torch import Tensor
 
-from rfgs_core.encode.body_maps import AZIMUTHS, ELEVATIONS, View
+from rfgs_core.encode.body_maps import AZIMUTHS, ELEVATIONS, View, distinct_places
 from rfgs_core.radio.levels import decibels
 from rfgs_core.skeleton import JOINTS
 
@@ -72,7 +72,7 @@ def _places(view: View) -> list[float]:
     """log2 of how many places the elements of either end have along y and z."""
     ends = (view.tx.offsets, view.rx.offsets)
     return [
-        float(np.log2(len(np.unique(np.round(offsets[:, axis], 5)))))
+        float(np.log2(distinct_places(offsets[:, axis])))
         for offsets in ends
         for axis in (0, 1)
     ]

@@ -26,17 +26,18 @@ from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.delay import delay_transform
 
 #: Direction cosines and resolution cells are tabulated in steps of one over this.
-_PER_COSINE, _PER_CELL = 128, 32
-#: Largest difference of direction cosines that a table holds.
-_WIDEST = 2.6
+PER_COSINE, PER_CELL = 128, 32
+#: Largest difference of direction cosines that a table holds, and its samples.
+WIDEST = 2.6
+TABLE = math.ceil(2 * WIDEST * PER_COSINE) + 1
 #: The side lobes of a whole band are read to this many cells [cell] ...
 _LOBES = 6
 #: ... and of one with a gap, whose lobes fall slowly, over a whole map of 4 GHz.
-_LOBES_OF_GAP = 48
+LOBES_OF_GAP = 48
 #: Facets damped by more than e^-6 are left out.
-_MOST_DAMPED = 6.0
+MOST_DAMPED = 6.0
 #: Cosine between the way in and the way out beyond which a body shadows, in full and at all.
-_FORWARD, _ASLANT = 0.75, 0.45
+FORWARD, ASLANT = 0.75, 0.45
 
 
 class Band(NamedTuple):
@@ -47,7 +48,7 @@ class Band(NamedTuple):
     cell_m: float
     """Resolution c/B [m]."""
     response: Complex128[np.ndarray, "sample"]
-    """Sum of the weights times e^{j(k − k_centre)x}, x in cells, `_PER_CELL` samples each."""
+    """Sum of the weights times e^{j(k − k_centre)x}, x in cells, `PER_CELL` samples each."""
     reach: int
     """Cells either side that the table holds."""
     skin: float
@@ -62,10 +63,10 @@ class Band(NamedTuple):
         """The band of weighted subcarriers; `skin` is the size of skin's reflection coefficient."""
         spacing_hz = float(freq_hz[1] - freq_hz[0])
         centre_hz = float(freq_hz.mean())
-        reach = _LOBES if (weights > 0).all() else _LOBES_OF_GAP
+        reach = _LOBES if (weights > 0).all() else LOBES_OF_GAP
         # Zeros beyond the band give the samples between whole cells.
-        size = len(freq_hz) * _PER_CELL
-        sample = np.arange(-reach * _PER_CELL, reach * _PER_CELL + 1)
+        size = len(freq_hz) * PER_CELL
+        sample = np.arange(-reach * PER_CELL, reach * PER_CELL + 1)
         to_centre = np.exp(-1j * np.pi * (len(freq_hz) - 1) / size * sample)
         response = delay_transform(weights, size)[sample % size] * size * to_centre
         cell_m = SPEED_OF_LIGHT / (spacing_hz * len(freq_hz))
@@ -82,7 +83,7 @@ def array_table(end: ArrayEnd, axis: int, wavenumber: float) -> Complex128[np.nd
 def _table(places_m: tuple[float, ...], wavenumber: float) -> np.ndarray:
     if max(places_m) - min(places_m) < 1e-5:
         return np.zeros(0, dtype=np.complex128)
-    off = np.arange(-_WIDEST * _PER_COSINE, _WIDEST * _PER_COSINE + 1) / _PER_COSINE
+    off = np.arange(TABLE) / PER_COSINE - WIDEST
     return np.exp(1j * wavenumber * np.outer(off, places_m)).mean(axis=1)
 
 
@@ -168,7 +169,7 @@ def _read(table: np.ndarray, off: float) -> complex:
     """A table of direction cosines at `off`; 1 of an array with a single place along the axis."""
     if len(table) == 0:
         return 1.0 + 0.0j
-    at = min(max((off + _WIDEST) * _PER_COSINE, 0.0), len(table) - 1.001)
+    at = min(max((off + WIDEST) * PER_COSINE, 0.0), len(table) - 1.001)
     low = int(at)
     return table[low] + (at - low) * (table[low + 1] - table[low])
 
@@ -189,7 +190,7 @@ def _amplitude(
     """
     q_n = c_i + c_s
     damped = k2_area * max(2.0 - 2.0 * forward - q_n * q_n, 0.0) / 24.0
-    if damped > _MOST_DAMPED:
+    if damped > MOST_DAMPED:
         return 0.0
     sent = 0.5 * q_n if heard and c_s > 0.0 else 0.0
     sent += shadowing(forward) * screen * c_i
@@ -203,7 +204,7 @@ def shadowing(forward: float) -> float:
     Args:
         forward: Cosine between the way in and the way out.
     """
-    return min(max((forward - _ASLANT) / (_FORWARD - _ASLANT), 0.0), 1.0)
+    return min(max((forward - ASLANT) / (FORWARD - ASLANT), 0.0), 1.0)
 
 
 @numba.njit(cache=True, nogil=True, inline="always")
@@ -220,7 +221,7 @@ def _spread(
     low = max(math.ceil(at - reach / cells), 0)
     high = min(math.floor(at + reach / cells), out.shape[2] - 1)
     for m in range(low, high + 1):
-        x = ((m - at) * cells + reach) * _PER_CELL
+        x = ((m - at) * cells + reach) * PER_CELL
         j = min(max(int(x), 0), len(response) - 2)
         window = response[j] + (x - j) * (response[j + 1] - response[j])
         for e in range(len(up)):

@@ -5,40 +5,27 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64
 
-from rfgs_core.articulated import Pose, people
-from rfgs_core.encode.body_maps import CENTRE_HEIGHT_M, ArrayEnd, View, views_of
+from rfgs_core.encode.body_maps import ArrayEnd, View
 from rfgs_core.radio import Radio
-from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.delay import band_window, hann
 from rfgs_core.radio.tissue import normal_reflection, skin_permittivity
-from rfgs_core.seeds import sub_seed
 from rfgs_core.worlds.echoes import Band, Listener, Seen, mirrored
-from rfgs_core.worlds.figure import Figure, Posed, seen_from, seen_roughly
-from rfgs_core.worlds.motion import FAMILIES, random_motion
-from rfgs_core.worlds.motion.curves import Z, about
+from rfgs_core.worlds.figure import Figure, Posed, look_cell, seen_from
+from rfgs_core.worlds.moments import acted
 from rfgs_core.worlds.room import Room, Sight
 
 #: Of a body in a wall's mirror every fourth facet is enough: its echo is speckle all the same.
-_EVERY = 4
+EVERY = 4
 #: Echoes by way of a wall that come later than this are beyond the map [m].
-_LATEST_M = 2.2
-#: Antennas nearer to each other than this see the same of a body: of a device, and its images [m].
-_SAME_PLACE_M, _SAME_IMAGE_M = 0.1, 0.4
-#: The centre of the maps is off the body's own by a deviation between these [m].
-_OFF_CENTRE_M = (0.01, 0.08)
+LATEST_M = 2.2
 #: Moments of one motion, so that drawing it pays.
 _MOMENTS = 12
-#: Bodies that are made ready at a time, and motions until others take their place.
-_CAST, _MOTIONS_PER_CAST = 24, 120
-#: How often each family of motions is drawn; others as often as `_OTHERWISE`.
-_SHARES = {"walk": 5.0, "gesture": 4.0, "random": 3.0, "walk_gesture": 2.0}
-_OTHERWISE = 1.0
 
 
 class Example(NamedTuple):
@@ -63,48 +50,18 @@ def examples(radio: Radio, seed: int) -> Iterator[Example]:
         radio: Radio of the devices.
         seed: Seed of everything.
     """
-    rng = np.random.default_rng(sub_seed(seed, radio.name, "worlds"))
-    shares = np.array([_SHARES.get(family, _OTHERWISE) for family in FAMILIES])
-    wavelength_m = SPEED_OF_LIGHT / float(radio.freq_hz.max())
-    motions = 0
-    cast: list[Figure] = []
-    while True:
-        if motions % _MOTIONS_PER_CAST == 0:
-            drawn = [people().random(rng, child=bool(rng.random() < 0.12)) for _ in range(_CAST)]
-            cast = [Figure.of(body, wavelength_m) for body in drawn]
-        motions += 1
-        figure = cast[int(rng.integers(len(cast)))]
-        family = str(rng.choice(FAMILIES, p=shares / shares.sum()))
-        yield from _moments(rng, radio, figure, family)
+    for figure, family, moments in acted(radio, seed, _MOMENTS):
+        for pose, room, sight, views, centre in moments:
+            weights = band_window(sight.subcarriers, hann)
+            band = Band.of(sight.freq_hz, weights, skin_reflection(radio.centre_hz))
+            maps = body_echoes(figure, figure.posed(pose), views, centre, band, room, sight)
+            yield Example(views, maps, centre, figure.body.joints17(pose), family)
 
 
 @functools.lru_cache(maxsize=4)
-def _skin(centre_hz: float) -> float:
-    """Size of the reflection coefficient of skin."""
+def skin_reflection(centre_hz: float) -> float:
+    """Size of the reflection coefficient of skin at a frequency [Hz]."""
     return float(abs(normal_reflection(skin_permittivity(np.array([centre_hz])))[0]))
-
-
-def _moments(
-    rng: np.random.Generator, radio: Radio, figure: Figure, family: str
-) -> Iterator[Example]:
-    """Moments of one motion, each in a room of its own."""
-    motion = random_motion(rng, figure.body, family)
-    for _ in range(_MOMENTS):
-        room = Room.random(rng)
-        spot = room.place(rng)
-        sight = Sight.random(rng, radio, room, spot)
-        if sight is None:
-            continue
-        band = Band.of(sight.freq_hz, band_window(sight.subcarriers, hann), _skin(radio.centre_hz))
-        pose = motion.at(float(rng.uniform(0.0, motion.duration_s)))
-        pose = pose.turned(about(Z, float(rng.uniform(-np.pi, np.pi))))
-        # Wherever the motion has led, somebody is at this spot now.
-        far = figure.posed(pose).centroid(figure.areas_m2)[:2]
-        pose = Pose(pose.root + np.append(spot - far, 0.0), pose.turns)
-        centre = np.append(spot + rng.normal(0.0, rng.uniform(*_OFF_CENTRE_M), 2), CENTRE_HEIGHT_M)
-        views = views_of(sight.layout, sight.links)
-        maps = body_echoes(figure, figure.posed(pose), views, centre, band, room, sight)
-        yield Example(views, maps, centre, figure.body.joints17(pose), family)
 
 
 def body_echoes(
@@ -118,58 +75,93 @@ def body_echoes(
 ) -> Float32[np.ndarray, "pair elevation azimuth range"]:
     """Maps of one body, direct and by way of one wall on either leg."""
     facets = posed.points, posed.normals, figure.areas_m2
-    points, normals, areas = (np.ascontiguousarray(values[::_EVERY]) for values in facets)
-    direct = _Sights(lambda place: seen_from(posed, figure.body.faces, place), _SAME_PLACE_M)
-    by_bounces = _Sights(lambda place: seen_roughly(points, normals, place, centre), _SAME_IMAGE_M)
-    above = [posed.points[:, 2] > height for height in sight.above_m.tolist()]
+    thin = tuple(np.ascontiguousarray(values[::EVERY]) for values in facets)
+    looks = _Looks(facets, thin, _middles(views), room, sight.above_m)
     maps = []
     for view in views:
         listener = Listener.at(centre, view, band)
         out = listener.empty_map()
-        by_tx = direct.of(view.tx.centre) & above[view.pair[0]]
-        by_rx = direct.of(view.rx.centre) & above[view.pair[1]]
-        listener.add(out, Seen(*facets, by_tx, by_rx), view.tx, view.rx)
-        thin_tx, thin_rx = by_tx[::_EVERY], by_rx[::_EVERY]
-        for tx, rx, gain in _by_bounces(view, room, centre):
-            sent = thin_tx if tx is view.tx else by_bounces.of(tx.centre)
-            heard = thin_rx if rx is view.rx else by_bounces.of(rx.centre)
-            listener.add(
-                out, Seen(points, normals, areas, sent, heard), tx, rx, gain * math.sqrt(_EVERY)
-            )
+        a, b = view.pair
+        listener.add(out, Seen(*facets, looks.straight(a), looks.straight(b)), view.tx, view.rx)
+        for bounce in _by_bounces(view, room, centre):
+            wall, lit = bounce.wall, [looks.straight(a)[::EVERY], looks.straight(b)[::EVERY]]
+            lit[bounce.side] = looks.by_wall(view.pair[bounce.side], wall)
+            gain = float(room.reflects[wall]) * math.sqrt(EVERY)
+            listener.add(out, Seen(*thin, *lit), bounce.tx, bounce.rx, gain)
         maps.append(np.abs(out * band.skin) ** 2)
     return np.array(maps, dtype=np.float32)
 
 
-class _Sights:
-    """What places see, asked once of places that are about the same."""
+def _middles(views: list[View]) -> dict[int, Float64[np.ndarray, "3"]]:
+    """The middle between each device's transmitter and receiver, from where it sees [m]."""
+    sends = {view.pair[0]: view.tx.centre for view in views}
+    hears = {view.pair[1]: view.rx.centre for view in views}
+    return {
+        device: 0.5 * (sends.get(device, hears.get(device)) + hears.get(device, sends.get(device)))
+        for device in {*sends, *hears}
+    }
 
-    def __init__(self, see: Callable[[np.ndarray], np.ndarray], same_m: float) -> None:
-        self._see, self._same_m = see, same_m
-        self._known: list[tuple[np.ndarray, np.ndarray]] = []
 
-    def of(self, place: Float64[np.ndarray, "3"]) -> Bool[np.ndarray, "facet"]:
-        """Facets that a place [m] sees."""
-        for other, seen in self._known:
-            if math.dist(other, place) < self._same_m:
-                return seen
-        self._known.append((place, self._see(place)))
-        return self._known[-1][1]
+class _Looks:
+    """What devices see of a body, straight and in the mirror of a wall, each asked once."""
+
+    def __init__(
+        self,
+        facets: tuple[np.ndarray, ...],
+        thin: tuple[np.ndarray, ...],
+        middles: dict[int, np.ndarray],
+        room: Room,
+        above_m: np.ndarray,
+    ) -> None:
+        self._facets, self._thin, self._middles = facets, thin, middles
+        self._room, self._above_m = room, above_m
+        area = float(facets[2].sum())
+        self._cell_m = look_cell(len(facets[0]), area)
+        self._thin_cell_m = look_cell(len(thin[0]), area)
+        self._known: dict[tuple[int, tuple[int, int] | None], np.ndarray] = {}
+
+    def straight(self, device: int) -> Bool[np.ndarray, "facet"]:
+        """Facets that a device sees over the furniture."""
+        if (device, None) not in self._known:
+            points, normals, _ = self._facets
+            seen = seen_from(points, normals, self._middles[device], self._cell_m)
+            self._known[device, None] = seen & (points[:, 2] > self._above_m[device])
+        return self._known[device, None]
+
+    def by_wall(self, device: int, wall: tuple[int, int]) -> Bool[np.ndarray, "thin"]:
+        """Facets of the thinned body that its image behind a wall sees."""
+        if (device, wall) not in self._known:
+            image = self._middles[device].copy()
+            image[wall[0]] = 2.0 * self._room.bounds_m[wall[1], wall[0]] - image[wall[0]]
+            points, normals, _ = self._thin
+            self._known[device, wall] = seen_from(points, normals, image, self._thin_cell_m)
+        return self._known[device, wall]
+
+
+class _Bounce(NamedTuple):
+    """A way by one wall."""
+
+    tx: ArrayEnd
+    rx: ArrayEnd
+    side: int
+    """Which of them is an image: 0 the transmitter, 1 the receiver."""
+    wall: tuple[int, int]
+    """Axis of the wall, and which of two sides."""
 
 
 def _by_bounces(
     view: View, room: Room, centre: Float64[np.ndarray, "3"]
-) -> Iterator[tuple[ArrayEnd, ArrayEnd, float]]:
-    """Ends of a view with one of them behind a wall, and the wall's amplitude."""
+) -> Iterator[_Bounce]:
+    """The ways of a view by one wall, on either leg."""
     direct_m = view.path_m(centre)
     for axis in range(3):
-        for side in range(2):
-            gain, at_m = float(room.reflects[axis, side]), float(room.bounds_m[side, axis])
-            if gain == 0.0:
+        for low_or_high in range(2):
+            at_m = float(room.bounds_m[low_or_high, axis])
+            if room.reflects[axis, low_or_high] == 0.0:
                 continue
-            for ends in (
-                (mirrored(view.tx, axis, at_m), view.rx),
-                (view.tx, mirrored(view.rx, axis, at_m)),
+            for side, (tx, rx) in enumerate(
+                ((mirrored(view.tx, axis, at_m), view.rx), (view.tx, mirrored(view.rx, axis, at_m)))
             ):
-                path_m = math.dist(ends[0].centre, centre) + math.dist(ends[1].centre, centre)
-                if path_m - direct_m <= _LATEST_M:
-                    yield *ends, gain
+                path_m = math.dist(tx.centre, centre) + math.dist(rx.centre, centre)
+                if path_m - direct_m <= LATEST_M:
+                    yield _Bounce(tx, rx, side, (axis, low_or_high))

@@ -6,6 +6,9 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
+
+from rfgs_core.device import Device
 
 
 @dataclass(frozen=True)
@@ -23,12 +26,21 @@ class LimbsArgs:
     """File to write, NAME.safetensors."""
     frames: int = 300_000
     """Frames of random worlds: 60 (mmwave) or 30 (wifi) take a second on one core."""
-    steps: float = 24.0
-    """Steps of 64 frames for every 64 new ones; frames are kept in memory and seen again."""
+    hours: float | None = None
+    """End after this long, however many frames there were."""
+    passes: float = 24.0
+    """How often each frame is seen on average; frames are kept in memory and seen again."""
     kept: int = 150_000
-    """Frames that are kept in memory, 9 kB each."""
+    """Frames that are kept in memory, 9 kB each (wifi: 7 kB)."""
     workers: int = 1
     """Processes that make worlds, beside the one that trains."""
+    batch: int = 64
+    """Frames of a step."""
+    size: Literal["small", "large"] = "small"
+    """Size of the network: small, or large (5 MB) for millions of frames."""
+    device: Device = "cpu"
+    """Where worlds are heard and the network is trained: cpu or cuda, which hears thousands a
+    second and takes workers, one per core, to draw them."""
     seed: int = 0
     """Seed of worlds and weights; 0 is a seed like any other."""
 
@@ -38,6 +50,7 @@ def run(args: LimbsArgs) -> int:
     import torch
     from tqdm import tqdm
 
+    from rfgs_core.device import need_device
     from rfgs_core.errors import RfgsError
     from rfgs_core.limbs.learn import LearnConfig, learn
     from rfgs_core.limbs.weights import save_network
@@ -51,18 +64,20 @@ def run(args: LimbsArgs) -> int:
         )
     if args.out.suffix != ".safetensors":
         raise RfgsError(f"--out {args.out}: expected a file name that ends in .safetensors")
-    for name in ("frames", "kept"):
+    for name in ("frames", "kept", "batch"):
         if getattr(args, name) < 1:
             raise RfgsError(f"--{name} {getattr(args, name)}: expected at least 1")
+    if not (args.hours is None or 0.0 < args.hours < 10_000.0):
+        raise RfgsError(f"--hours {args.hours}: expected more than 0")
+    if not 0.0 < args.passes <= 10_000.0:
+        raise RfgsError(f"--passes {args.passes}: expected more than 0")
+    need_device(args.device)
     if not 0 <= args.workers <= 256:
         raise RfgsError(f"--workers {args.workers}: expected 0 to 256")
     config = LearnConfig(
-        frames=args.frames,
-        steps_per_chunk=args.steps,
-        kept=args.kept,
-        workers=args.workers,
-        seed=args.seed,
-    )
+        frames=args.frames, hours=args.hours, passes=args.passes, kept=args.kept,
+        workers=args.workers, batch=args.batch, size=args.size, device=args.device, seed=args.seed,
+    )  # fmt: skip
     torch.set_num_threads(1)
     partial = args.out.with_suffix(".partial")
     with tqdm(total=args.frames, desc=f"limbs {args.radio}", unit="frame") as bar:
@@ -76,7 +91,9 @@ def run(args: LimbsArgs) -> int:
         "data": "random worlds, made as they were needed",
         "frames": learned.progress.frames,
         "seed": args.seed,
-        "steps_per_chunk": args.steps,
+        "passes": args.passes,
+        "batch": args.batch,
+        "device": args.device,
         "hours": round(learned.progress.spent_s / 3600.0, 2),
         "unseen_worlds_m": round(learned.unseen_m, 4),
     }

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import Literal, NamedTuple
+
 import torch
 from jaxtyping import Float
 from torch import Tensor, nn
@@ -11,9 +13,26 @@ from rfgs_core.encode.body_maps import AZIMUTHS, ELEVATIONS
 from rfgs_core.limbs.tokens import GEOMETRY, Tokens
 from rfgs_core.skeleton import JOINTS
 
-#: Width of a token, heads, layers and hidden width of the transformer, and hidden width of the
-#: last layers.
-WIDTH, HEADS, LAYERS, HIDDEN, LAST = 128, 4, 3, 256, 256
+#: small: what two cores train in hours; large: five times that, for millions of frames on a GPU.
+Size = Literal["small", "large"]
+
+
+class _Widths(NamedTuple):
+    token: int
+    heads: int
+    layers: int
+    hidden: int
+    """Hidden width of the transformer."""
+    last: int
+    """Hidden width of the last layers."""
+    channels: tuple[int, int]
+    """Channels of the first and last convolution, and of the middle one."""
+
+
+_SIZES: dict[Size, _Widths] = {
+    "small": _Widths(128, 4, 3, 256, 256, (64, 80)),
+    "large": _Widths(256, 8, 4, 512, 512, (96, 128)),
+}
 #: Maps of at least this many ranges are read by convolution along the range.
 _MANY_RANGES = 16
 #: Scale of what the network says [m].
@@ -28,19 +47,22 @@ class LimbNetwork(nn.Module):
     Pairs are a set: any number of them, in any order, from any place.
     """
 
-    def __init__(self, ranges: int) -> None:
+    def __init__(self, ranges: int, size: Size = "small") -> None:
         super().__init__()
-        self.ranges = ranges
-        beams = len(ELEVATIONS) * len(AZIMUTHS)
-        self.read = _convolution(beams, ranges) if ranges >= _MANY_RANGES else _dense(beams, ranges)
-        self.place = nn.Sequential(nn.Linear(GEOMETRY, 96), nn.GELU(), nn.Linear(96, WIDTH))
+        self.ranges, self.size = ranges, size
+        widths = _SIZES[size]
+        token, last = widths.token, widths.last
+        reader = _convolution if ranges >= _MANY_RANGES else _dense
+        self.read = reader(len(ELEVATIONS) * len(AZIMUTHS), ranges, widths)
+        self.place = nn.Sequential(nn.Linear(GEOMETRY, 96), nn.GELU(), nn.Linear(96, token))
         layer = nn.TransformerEncoderLayer(
-            WIDTH, HEADS, HIDDEN, dropout=0.0, activation="gelu", batch_first=True, norm_first=True
-        )
-        self.mix = nn.TransformerEncoder(layer, LAYERS, enable_nested_tensor=False)
-        self.query = nn.Parameter(torch.randn(1, 1, WIDTH) * 0.02)
+            token, widths.heads, widths.hidden,
+            dropout=0.0, activation="gelu", batch_first=True, norm_first=True,
+        )  # fmt: skip
+        self.mix = nn.TransformerEncoder(layer, widths.layers, enable_nested_tensor=False)
+        self.query = nn.Parameter(torch.randn(1, 1, token) * 0.02)
         self.say = nn.Sequential(
-            nn.LayerNorm(WIDTH), nn.Linear(WIDTH, LAST), nn.GELU(), nn.Linear(LAST, len(JOINTS) * 4)
+            nn.LayerNorm(token), nn.Linear(token, last), nn.GELU(), nn.Linear(last, len(JOINTS) * 4)
         )
 
     def forward(
@@ -48,29 +70,31 @@ class LimbNetwork(nn.Module):
     ) -> tuple[Float[Tensor, "frame 17 3"], Float[Tensor, "frame 17"]]:
         """Joints around the maps' centre, x towards the reference receiver [m], and log σ."""
         frames, pairs = seen.there.shape
-        heard = self.read(seen.maps.flatten(0, 1)).reshape(frames, pairs, WIDTH)
+        heard = self.read(seen.maps.flatten(0, 1)).unflatten(0, (frames, pairs))
         token = heard + self.place(seen.geometry)
         token = torch.cat([self.query.expand(frames, -1, -1), token], 1)
-        silent = torch.cat([torch.zeros(frames, 1, dtype=torch.bool), ~seen.there], 1)
+        silent = torch.cat([torch.zeros_like(seen.there[:, :1]), ~seen.there], 1)
         mixed = self.mix(token, src_key_padding_mask=silent)[:, 0]
         said = self.say(mixed).reshape(frames, len(JOINTS), 4)
         return said[..., :3] * _SCALE_M, said[..., 3].clamp(_SURE, _UNSURE)
 
 
-def _convolution(beams: int, ranges: int) -> nn.Sequential:
+def _convolution(beams: int, ranges: int, widths: _Widths) -> nn.Sequential:
     """Reader of maps with many ranges."""
     quarter = (ranges + 3) // 4
+    outer, inner = widths.channels
     return nn.Sequential(
-        nn.Conv1d(beams, 64, 5, stride=2, padding=2), nn.GELU(),
-        nn.Conv1d(64, 80, 3, stride=2, padding=1), nn.GELU(),
-        nn.Conv1d(80, 64, 3, padding=1), nn.GELU(),
-        nn.Flatten(), nn.Linear(64 * quarter, WIDTH),
+        nn.Conv1d(beams, outer, 5, stride=2, padding=2), nn.GELU(),
+        nn.Conv1d(outer, inner, 3, stride=2, padding=1), nn.GELU(),
+        nn.Conv1d(inner, outer, 3, padding=1), nn.GELU(),
+        nn.Flatten(), nn.Linear(outer * quarter, widths.token),
     )  # fmt: skip
 
 
-def _dense(beams: int, ranges: int) -> nn.Sequential:
+def _dense(beams: int, ranges: int, widths: _Widths) -> nn.Sequential:
     """Reader of maps with few ranges."""
+    hidden, token = 3 * widths.channels[0], widths.token
     return nn.Sequential(
-        nn.Flatten(), nn.Linear(beams * ranges, 192), nn.GELU(),
-        nn.Linear(192, WIDTH), nn.GELU(), nn.Linear(WIDTH, WIDTH),
+        nn.Flatten(), nn.Linear(beams * ranges, hidden), nn.GELU(),
+        nn.Linear(hidden, token), nn.GELU(), nn.Linear(token, token),
     )  # fmt: skip

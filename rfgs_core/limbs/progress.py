@@ -33,10 +33,10 @@ def keep(
     path: Path, network: LimbNetwork, optimiser: torch.optim.Optimizer, progress: Progress
 ) -> None:
     """Writes the state of a training in one step."""
-    state = {f"weight.{name}": value for name, value in network.state_dict().items()}
+    state = {f"weight.{name}": value.cpu() for name, value in network.state_dict().items()}
     for name, parameter in network.named_parameters():
         for moment in _MOMENTS:
-            state[f"{moment}.{name}"] = optimiser.state[parameter][moment]
+            state[f"{moment}.{name}"] = optimiser.state[parameter][moment].cpu()
     state["frames"] = torch.tensor(progress.frames)
     state["spent_s"] = torch.tensor(progress.spent_s, dtype=torch.float64)
     write_bytes(path, sealed(save(state, {"seal": BLANK})))
@@ -60,5 +60,10 @@ def resume(path: Path, network: LimbNetwork, optimiser: torch.optim.Optimizer) -
     refuse_misfit(path, state, wanted, _REMEDY)
     network.load_state_dict({name: state[f"weight.{name}"] for name in weights})
     for name, parameter in parameters.items():
-        optimiser.state[parameter] = {moment: state[f"{moment}.{name}"] for moment in _MOMENTS}
+        moments = {moment: state[f"{moment}.{name}"] for moment in _MOMENTS}
+        # The count of steps stays where the optimiser keeps it.
+        optimiser.state[parameter] = {
+            moment: value if moment == "step" else value.to(parameter.device)
+            for moment, value in moments.items()
+        }
     return Progress(int(told["frames"]), float(told["spent_s"]))

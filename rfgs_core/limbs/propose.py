@@ -69,17 +69,16 @@ def _asked(
     network: LimbNetwork, packed: Packed
 ) -> tuple[Float64[np.ndarray, "17 3"], Float64[np.ndarray, "17"]]:
     """Mean joints around the centre, and σ, of one packed frame."""
-    pairs = np.flatnonzero(packed.there[0])
-    receivers = packed.vectors[0, pairs, 1]
+    pairs = np.flatnonzero(packed.there[0].numpy())
+    receivers = packed.vectors[0, pairs, 1].numpy()
     # One reference per receiving device.
     _, first = np.unique(np.round(receivers, 3), axis=0, return_index=True)
     references = np.repeat(pairs[np.sort(first)], 2)
-    many = Packed(*(np.repeat(values, len(references), axis=0) for values in packed))
-    there = torch.from_numpy(many.there)
+    many = Packed(*(values.repeat_interleave(len(references), 0) for values in packed))
     mirror = torch.arange(len(references)) % 2 == 1
     network.eval()
     with torch.no_grad():
-        seen = tokens(many, relative_power(many), there, torch.from_numpy(references), mirror)
+        seen = tokens(many, relative_power(many), many.there, torch.from_numpy(references), mirror)
         joints, log_sigma = network(seen)
         straight = mirrored_joints(joints, mirror)
         sigma = torch.where(mirror[:, None], log_sigma[:, MIRRORED], log_sigma).exp()

@@ -12,11 +12,12 @@ from jaxtyping import Bool, Float, Float32, UInt8
 from torch import Tensor
 
 from rfgs_core.encode.body_maps import AZIMUTHS, ELEVATIONS, View, distinct_places
-from rfgs_core.radio.levels import decibels
 from rfgs_core.skeleton import JOINTS
 
 #: Step of a stored map [dB]: 255 is the peak of its pair.
 _STEP_DB = 0.2
+#: Power of a stored map that is told from nothing, over its pair's peak.
+_LEAST = 1e-9
 #: A map's values below its peak that are told from nothing, as log10 of power.
 _FLOOR = 3.0
 #: Numbers of a token beside its map: six vectors, four counts, cosine of the way on, level.
@@ -31,15 +32,15 @@ MIRRORED = [
 class Packed(NamedTuple):
     """Frames as arrays, padded to the same number of pairs."""
 
-    maps: UInt8[np.ndarray, "frame pair elevation azimuth range"]
+    maps: UInt8[Tensor, "frame pair elevation azimuth range"]
     """Power below each pair's peak, in steps of 0.2 dB from 255 down."""
-    level: Float32[np.ndarray, "frame pair"]
+    level: Float32[Tensor, "frame pair"]
     """log10 of that peak."""
-    vectors: Float32[np.ndarray, "frame pair 6 3"]
+    vectors: Float32[Tensor, "frame pair 6 3"]
     """Transmitter, receiver, and y and z axes of either, seen from the maps' centre [m]."""
-    counts: Float32[np.ndarray, "frame pair 4"]
+    counts: Float32[Tensor, "frame pair 4"]
     """log2 of the distinct places of elements along these axes."""
-    there: Bool[np.ndarray, "frame pair"]
+    there: Bool[Tensor, "frame pair"]
     """Which pairs are not padding."""
 
 
@@ -48,33 +49,44 @@ def pack(
 ) -> Packed:
     """Packs (views, maps, centre) of some frames; `pairs` or more of each frame are left out."""
     count, shape = len(frames), frames[0][1].shape[1:]
-    maps = np.zeros((count, pairs, *shape), dtype=np.uint8)
-    level = np.zeros((count, pairs), dtype=np.float32)
+    power = np.zeros((count, pairs, *shape), dtype=np.float32)
     vectors = np.zeros((count, pairs, 6, 3), dtype=np.float32)
     counts = np.zeros((count, pairs, 4), dtype=np.float32)
     there = np.zeros((count, pairs), dtype=bool)
-    for i, (views, power, centre) in enumerate(frames):
+    for i, (views, heard, centre) in enumerate(frames):
         for j, view in enumerate(views[:pairs]):
-            peak = float(power[j].max())
-            if not peak > 0.0:
-                continue
-            below_db = decibels(power[j] / peak, least=1e-9)
-            maps[i, j] = np.clip(255.5 + below_db / _STEP_DB, 0, 255)
-            level[i, j] = np.log10(peak)
+            power[i, j] = heard[j]
             vectors[i, j, :2] = view.tx.centre - centre, view.rx.centre - centre
             vectors[i, j, 2:4], vectors[i, j, 4:6] = view.tx.axes, view.rx.axes
             counts[i, j] = _places(view)
             there[i, j] = True
-    return Packed(maps, level, vectors, counts, there)
+    return packed_power(*(torch.from_numpy(value) for value in (power, vectors, counts, there)))
+
+
+def packed_power(
+    power: Float32[Tensor, "frame pair elevation azimuth range"],
+    vectors: Float32[Tensor, "frame pair 6 3"],
+    counts: Float32[Tensor, "frame pair 4"],
+    there: Bool[Tensor, "frame pair"],
+) -> Packed:
+    """Packs power [m⁴]; a pair that hears nothing is none. See `Packed`."""
+    peak = power.amax((2, 3, 4))
+    there = there & (peak > 0.0)
+    peak = torch.where(there, peak, 1.0)
+    below_db = 10.0 * torch.log10((power / peak[:, :, None, None, None]).clamp_min(_LEAST))
+    maps = (255.5 + below_db / _STEP_DB).clamp(0.0, 255.0).to(torch.uint8)
+    used = there[:, :, None]
+    return Packed(
+        maps * used[..., None, None], torch.log10(peak), vectors * used[..., None], counts * used,
+        there,
+    )  # fmt: skip
 
 
 def _places(view: View) -> list[float]:
     """log2 of how many places the elements of either end have along y and z."""
     ends = (view.tx.offsets, view.rx.offsets)
     return [
-        float(np.log2(distinct_places(offsets[:, axis])))
-        for offsets in ends
-        for axis in (0, 1)
+        float(np.log2(distinct_places(offsets[:, axis]))) for offsets in ends for axis in (0, 1)
     ]
 
 
@@ -90,7 +102,7 @@ class Tokens(NamedTuple):
 
 def relative_power(packed: Packed) -> Float[Tensor, "frame pair elevation azimuth range"]:
     """Power over each pair's peak."""
-    below = (torch.from_numpy(packed.maps).float() - 255.0) * (_STEP_DB / 10.0)
+    below = (packed.maps.float() - 255.0) * (_STEP_DB / 10.0)
     return torch.pow(10.0, below)
 
 
@@ -110,8 +122,8 @@ def tokens(
         reference: Pair whose receiver gives the x axis, of each frame.
         mirror: Frames to be seen in a mirror that swaps left and right.
     """
-    vectors = torch.from_numpy(packed.vectors)
-    rows = torch.arange(len(vectors))
+    vectors = packed.vectors
+    rows = torch.arange(len(vectors), device=vectors.device)
     towards = vectors[rows, reference, 1]
     yaw = torch.atan2(towards[:, 1], towards[:, 0])
     turned = rotate(vectors, -yaw)
@@ -126,15 +138,15 @@ def tokens(
     power = torch.where(mirror[:, None, None, None, None], power.flip(3), power)
     peak = power.amax((2, 3, 4), keepdim=True).clamp_min(1e-9)
     maps = torch.log10(power / peak + 10.0**-_FLOOR) + 2.0
-    level = torch.from_numpy(packed.level) + torch.log10(peak[..., 0, 0, 0])
+    level = packed.level + torch.log10(peak[..., 0, 0, 0])
     best = torch.where(there, level, torch.full_like(level, -torch.inf)).amax(1, keepdim=True)
     ends = torch.nn.functional.normalize(turned[:, :, :2], dim=-1)
     onward = -(ends[:, :, 0] * ends[:, :, 1]).sum(-1)
-    scale = torch.tensor([0.4, 0.4, 1.0, 1.0, 1.0, 1.0])[:, None]
+    scale = turned.new_tensor([0.4, 0.4, 1.0, 1.0, 1.0, 1.0])[:, None]
     geometry = torch.cat(
         [
             (turned * scale).flatten(2),
-            torch.from_numpy(packed.counts) / 3.0,
+            packed.counts / 3.0,
             onward[..., None],
             (level - best).clamp(-4.0, 0.0)[..., None],
         ],
@@ -156,5 +168,5 @@ def rotate(vectors: Float[Tensor, "frame *more 3"], angle: Float[Tensor, "frame"
 
 def mirrored_joints(joints: Float[Tensor, "frame 17 3"], mirror: Tensor) -> Tensor:
     """Joints of the mirrored frames: sides and the sign of y swapped."""
-    swapped = joints[:, MIRRORED] * torch.tensor([1.0, -1.0, 1.0])
+    swapped = joints[:, MIRRORED] * joints.new_tensor([1.0, -1.0, 1.0])
     return torch.where(mirror[:, None, None], swapped, joints)

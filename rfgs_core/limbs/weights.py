@@ -13,7 +13,7 @@ from safetensors.torch import save
 
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.files import write_bytes
-from rfgs_core.limbs.network import LimbNetwork
+from rfgs_core.limbs.network import LimbNetwork, Size
 from rfgs_core.limbs.tensor_file import read_tensors, refuse_misfit
 from rfgs_core.radio import Radio
 from rfgs_core.records import record
@@ -36,6 +36,7 @@ class _Card(msgspec.Struct):
     centre_hz: _Hertz
     bandwidth_hz: _Hertz
     ranges: Annotated[int, msgspec.Meta(ge=1, le=4096)]
+    size: Size = "small"
 
 
 class Trained(NamedTuple):
@@ -54,6 +55,7 @@ def save_network(path: Path, network: LimbNetwork, radio: Radio, card: dict[str,
         "centre_hz": radio.centre_hz,
         "bandwidth_hz": radio.bandwidth_hz,
         "ranges": network.ranges,
+        "size": network.size,
         **card,
     }
     # One entry: the library writes several in an order of its own.
@@ -81,7 +83,7 @@ def load_network(path: Path) -> Trained:
         found = str(card.get("schema"))[:60]
         raise RfgsFormatError(f"{path}: expected schema {SCHEMA}, found {found}; {_REMEDY}")
     known: _Card = record(f"{path}: card", card, _Card, _REMEDY)
-    network = LimbNetwork(known.ranges)
+    network = LimbNetwork(known.ranges, known.size)
     refuse_misfit(path, weights, network.state_dict(), _REMEDY)
     network.load_state_dict({name: value.float() for name, value in weights.items()})
     network.eval()

@@ -47,7 +47,7 @@ class _Facets(NamedTuple):
     normals: Float[Tensor, "moment facet 3"]
     areas: Float[Tensor, "facet"]
     cell_m: float
-    """Width of a cell of `figure.seen_from` [m]."""
+    """Width of a cell of `figure.seen_among` [m]."""
 
     def thinned(self) -> _Facets:
         """Every few of them."""
@@ -262,14 +262,15 @@ def _mirrored(
 def _see(
     facets: _Facets, places: Float[Tensor, "moment place 3"]
 ) -> Bool[Tensor, "moment place facet"]:
-    """Facets that each place [m] sees, as `figure.seen_from`."""
+    """Facets that each place [m] sees, as `figure.seen_among`."""
     way = facets.points[:, None] - places[:, :, None]
     middle = facets.points.mean(1, keepdim=True) - places
     away = way.norm(dim=-1)
     cell = facets.cell_m / middle.norm(dim=-1, keepdim=True)
-    turn = torch.atan2(way[..., 1], way[..., 0]) - torch.atan2(middle[..., 1], middle[..., 0])[
-        ..., None
-    ]
+    turn = (
+        torch.atan2(way[..., 1], way[..., 0])
+        - torch.atan2(middle[..., 1], middle[..., 0])[..., None]
+    )
     turn = turn - 2.0 * math.pi * torch.round(turn / (2.0 * math.pi))
     rise = torch.atan2(way[..., 2], way[..., :2].norm(dim=-1))
     level = torch.atan2(middle[..., 2], middle[..., :2].norm(dim=-1))[..., None]

@@ -16,7 +16,7 @@ from rfgs_core.radio import Radio
 from rfgs_core.radio.delay import band_window, hann
 from rfgs_core.radio.tissue import normal_reflection, skin_permittivity
 from rfgs_core.worlds.echoes import Band, Listener, Seen, mirrored
-from rfgs_core.worlds.figure import Figure, Posed, look_cell, seen_from
+from rfgs_core.worlds.figure import Figure, Posed, look_cell, seen_among
 from rfgs_core.worlds.moments import acted
 from rfgs_core.worlds.room import Room, Sight
 
@@ -124,7 +124,7 @@ class _Looks:
         """Facets that a device sees over the furniture."""
         if (device, None) not in self._known:
             points, normals, _ = self._facets
-            seen = seen_from(points, normals, self._middles[device], self._cell_m)
+            seen = seen_among(points, normals, self._middles[device], self._cell_m)
             self._known[device, None] = seen & (points[:, 2] > self._above_m[device])
         return self._known[device, None]
 
@@ -134,7 +134,7 @@ class _Looks:
             image = self._middles[device].copy()
             image[wall[0]] = 2.0 * self._room.bounds_m[wall[1], wall[0]] - image[wall[0]]
             points, normals, _ = self._thin
-            self._known[device, wall] = seen_from(points, normals, image, self._thin_cell_m)
+            self._known[device, wall] = seen_among(points, normals, image, self._thin_cell_m)
         return self._known[device, wall]
 
 
@@ -149,9 +149,7 @@ class _Bounce(NamedTuple):
     """Axis of the wall, and which of two sides."""
 
 
-def _by_bounces(
-    view: View, room: Room, centre: Float64[np.ndarray, "3"]
-) -> Iterator[_Bounce]:
+def _by_bounces(view: View, room: Room, centre: Float64[np.ndarray, "3"]) -> Iterator[_Bounce]:
     """The ways of a view by one wall, on either leg."""
     direct_m = view.path_m(centre)
     for axis in range(3):

@@ -61,9 +61,12 @@ def mirrored(world: tuple) -> tuple:
 
 
 def seen(packed: Packed, reference: int = 0, mirror: bool = False) -> Tokens:
-    there = torch.from_numpy(packed.there)
     return tokens(
-        packed, relative_power(packed), there, torch.tensor([reference]), torch.tensor([mirror])
+        packed,
+        relative_power(packed),
+        packed.there,
+        torch.tensor([reference]),
+        torch.tensor([mirror]),
     )
 
 
@@ -115,5 +118,5 @@ def test_a_silent_pair_is_no_pair() -> None:
 def test_maps_keep_their_power_to_a_tenth_of_a_decibel() -> None:
     _, maps, _ = world()
     packed = pack([world()], 3)
-    power = relative_power(packed).numpy()[0] * 10.0 ** packed.level[0][:, None, None, None]
+    power = (relative_power(packed)[0] * 10.0 ** packed.level[0][:, None, None, None]).numpy()
     np.testing.assert_allclose(10 * np.log10(power / maps), 0.0, atol=0.101)

@@ -7,12 +7,14 @@ from itertools import islice
 
 import numpy as np
 import pytest
+import torch
 from scipy.spatial import KDTree
 
 from rfgs_core.articulated import Body, Pose, facets_of, people
-from rfgs_core.limbs.learn import LearnConfig, Worlds, learn, next_chunk, pairs_of
+from rfgs_core.limbs.learn import LearnConfig, learn
+from rfgs_core.limbs.stream import chunks, next_chunk, pairs_of
 from rfgs_core.radio.presets import preset
-from rfgs_core.worlds.figure import Figure, seen_from, seen_roughly
+from rfgs_core.worlds.figure import Figure, look_cell, seen_among
 from rfgs_core.worlds.heard import Example, examples
 from rfgs_core.worlds.motion import random_motion
 from rfgs_core.worlds.room import Room, Sight
@@ -62,18 +64,47 @@ def test_facets_cover_the_skin(walker: tuple[Body, Pose]) -> None:
     np.testing.assert_allclose(posed.vertices, skin, atol=1e-6)
 
 
-def test_a_rough_sight_is_nearly_the_sight_of_a_picture(walker: tuple[Body, Pose]) -> None:
+def through_skin(points: np.ndarray, place: np.ndarray, skin: np.ndarray) -> np.ndarray:
+    """Whether the way from each point to a place meets a triangle [T, 3, 3] of the skin."""
+    a, u, v = skin[:, 0], skin[:, 1] - skin[:, 0], skin[:, 2] - skin[:, 0]
+    out = []
+    for point in points:
+        way = place - point
+        side = np.cross(way, v)
+        det = np.einsum("ti,ti->t", u, side)
+        inverse = 1.0 / np.where(det == 0.0, np.inf, det)
+        back = np.cross(point - a, u)
+        x = np.einsum("ti,ti->t", point - a, side) * inverse
+        y, at = back @ way * inverse, np.einsum("ti,ti->t", v, back) * inverse
+        away = at * np.linalg.norm(way) > 4e-3
+        out.append(((x > 0.0) & (y > 0.0) & (x + y < 1.0) & away & (at < 1.0)).any())
+    return np.array(out)
+
+
+def test_a_sight_is_nearly_that_of_rays(walker: tuple[Body, Pose]) -> None:
+    """Facets hide each other as the skin does, from near and from far."""
     body, pose = walker
     figure = Figure.of(body, WAVELENGTH_M)
     posed = figure.posed(pose)
-    centre = posed.centroid(figure.areas_m2)
-    for angle in np.linspace(0.0, 2 * np.pi, 7)[:-1]:
-        place = centre + np.array([3.0 * np.cos(angle), 3.0 * np.sin(angle), 0.6])
-        drawn = seen_from(posed, body.faces, place)
-        rough = seen_roughly(posed.points, posed.normals, place, centre)
+    some = slice(None, None, 6)
+    skin = posed.vertices[body.faces].astype(np.float64)
+    cell_m = look_cell(len(posed.points), float(figure.areas_m2.sum()))
+    for angle, away_m in zip(np.linspace(0.0, 2 * np.pi, 7)[:-1], (1.0, 3.0) * 3, strict=True):
+        across = away_m * np.array([np.cos(angle), np.sin(angle)])
+        place = figure.middle(pose) + np.array([*across, 0.6])
+        own = seen_among(posed.points, posed.normals, place, cell_m)[some]
+        faces = np.einsum("fi,fi->f", place - posed.points, posed.normals)[some] > 0.0
+        rays = faces & ~through_skin(posed.points[some], place, skin)
         # Both see most of the half that faces them, and hide an arm behind the trunk.
-        assert 0.2 < drawn.mean() < 0.5
-        assert (drawn == rough).mean() > 0.93
+        assert 0.2 < rays.mean() < 0.5
+        assert (own == rays).mean() > 0.93 and (own & ~rays).mean() < 0.03
+
+
+def test_the_middle_is_the_centroid_of_all_facets(walker: tuple[Body, Pose]) -> None:
+    figure = Figure.of(walker[0], WAVELENGTH_M)
+    weight = figure.areas_m2 / figure.areas_m2.sum()
+    expected = weight @ figure.posed(walker[1]).points
+    np.testing.assert_allclose(figure.middle(walker[1]), expected, atol=1e-4)
 
 
 def test_devices_that_find_no_place_are_no_world() -> None:
@@ -89,7 +120,7 @@ def test_devices_that_find_no_place_are_no_world() -> None:
 def test_a_network_learns_from_worlds(tmp_path) -> None:
     """Joint errors in worlds it has not seen fall well below those of an untrained network."""
     radio = preset("mmwave")
-    config = LearnConfig(frames=4096, steps_per_chunk=6.0, kept=4096, workers=0)
+    config = LearnConfig(frames=4096, passes=6.0, kept=4096, workers=0)
     learned = learn(radio, config, checkpoint=tmp_path / "state")
     assert learned.progress.frames == 4096 and learned.unseen_m < 0.3
     # The state that was kept goes on without another step being due.
@@ -100,6 +131,6 @@ def test_a_network_learns_from_worlds(tmp_path) -> None:
 def test_chunks_hold_what_a_step_needs() -> None:
     radio = preset("mmwave")
     chunk = next_chunk(examples(radio, 2), 8, pairs_of(radio))
-    assert chunk.packed.there.any(axis=1).all() and np.isfinite(chunk.joints).all()
-    streamed = next(iter(Worlds(radio, 2)))
+    assert bool(chunk.packed.there.any(1).all()) and bool(torch.isfinite(chunk.joints).all())
+    streamed = next(chunks(radio, 2, "cpu", workers=0))
     assert streamed.joints.shape == (64, 17, 3)

@@ -139,28 +139,24 @@ class BatchedEchoes:
     def _by_bounces(
         self, batch: Batch, facets: _Facets, sees: Bool[Tensor, "moment device facet"]
     ) -> list[_Ways]:
-        """The ways of all pairs with one end behind one wall, wall by wall."""
-        out = []
+        """The ways of all pairs with their transmitter, or receiver, behind one wall."""
         straight = self._straight(batch, sees)
-        for axis in range(3):
-            for side in range(2):
-                at_m, reflects = batch.walls_m[:, axis, side], batch.reflects[:, axis, side]
-                image = _mirrored(batch.ends, axis, at_m)
-                seen = _see(facets, image[:, :, :, 0].mean(2))
-                for end in (0, 1):
-                    ends = straight.ends.clone()
-                    device = batch.pairs[straight.moment, straight.pair, end]
-                    ends[:, end] = image[straight.moment, device, end]
-                    later_m = ends[:, :, 0].norm(dim=-1).sum(1) - (
-                        straight.ends[:, :, 0].norm(dim=-1).sum(1)
-                    )
-                    gain = reflects[straight.moment]
-                    used = ((gain > 0.0) & (later_m <= LATEST_M)).nonzero()[:, 0]
-                    lit = [straight.sees[0][used], straight.sees[1][used]]
-                    lit[end] = seen[straight.moment[used], device[used]]
-                    ways = _Ways(*(values[used] for values in straight[:-1]), (lit[0], lit[1]))
-                    gain = ways.gain * gain[used] * math.sqrt(EVERY)
-                    out.append(ways._replace(ends=ends[used], gain=gain))
+        images = _images(batch)
+        seen = _see(facets, images[..., 0, :].mean(3).flatten(1, 2)).unflatten(1, (6, -1))
+        straight_m = straight.ends[:, :, 0].norm(dim=-1).sum(1)
+        gains = batch.reflects.flatten(1)[straight.moment]
+        out = []
+        for end in (0, 1):
+            device = batch.pairs[straight.moment, straight.pair, end]
+            ends = straight.ends[:, None].repeat(1, 6, 1, 1, 1)
+            ends[:, :, end] = images[straight.moment, :, device, end]
+            later_m = ends[..., 0, :].norm(dim=-1).sum(2) - straight_m[:, None]
+            way, wall = ((gains > 0.0) & (later_m <= LATEST_M)).nonzero(as_tuple=True)
+            lit = [straight.sees[0][way], straight.sees[1][way]]
+            lit[end] = seen[straight.moment[way], wall, device[way]]
+            ways = _Ways(*(values[way] for values in straight[:-1]), (lit[0], lit[1]))
+            gain = ways.gain * gains[way, wall] * math.sqrt(EVERY)
+            out.append(ways._replace(ends=ends[way, wall], gain=gain))
         return out
 
     def _add(
@@ -249,13 +245,12 @@ class BatchedEchoes:
         return torch.view_as_complex(value * near[..., None])
 
 
-def _mirrored(
-    ends: Float[Tensor, "moment device 2 3 3"], axis: int, at_m: Float[Tensor, "moment"]
-) -> Float[Tensor, "moment device 2 3 3"]:
-    """Images of all ends in a wall across one of the world's axes, as `echoes.mirrored`."""
-    out = ends.clone()
-    out[..., axis] = -out[..., axis]
-    out[:, :, :, 0, axis] += 2.0 * at_m[:, None, None]
+def _images(batch: Batch) -> Float[Tensor, "moment 6 device 2 3 3"]:
+    """Images of all ends in the six sides of the room, as `echoes.mirrored`."""
+    across = torch.eye(3, device=batch.ends.device).repeat_interleave(2, 0)
+    out = batch.ends[:, None] * (1.0 - 2.0 * across)[:, None, None, None]
+    shift = 2.0 * batch.walls_m.flatten(1)[..., None] * across
+    out[..., 0, :] += shift[:, :, None, None]
     return out
 
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
+import numba
 import numpy as np
 import psutil
 
@@ -28,7 +29,7 @@ from rfgs_core.errors import RfgsError
 from rfgs_core.radio.path_table import PathTable
 
 if TYPE_CHECKING:
-    from dataset_factory.trace import AnyTracer
+    from dataset_factory.trace import AnyTracer, Tracer
 
 V = TypeVar("V")
 
@@ -102,9 +103,12 @@ class SceneTracer:
 
     def __init__(self, request: Request, bundle: Path) -> None:
         """Opens the scene."""
-        from dataset_factory.trace.setup import prepare
+        if request.tracer == "fast":
+            numba.set_num_threads(1)
+        else:
+            from dataset_factory.trace.setup import prepare
 
-        prepare(threads=1, device=request.device)
+            prepare(threads=1, device=request.device)
         self._request = request
         self._bundle = read_bundle(bundle)
         self._radio = ""
@@ -123,14 +127,13 @@ class SceneTracer:
     def _traced(
         self, tracer: AnyTracer, frame: BundleFrame | None
     ) -> tuple[np.ndarray, PathTable | None]:
-        from dataset_factory.trace import Tracer
+        if self._request.paths:
+            # Not sooner: importing it takes seconds, and the fast tracer does without Sionna RT.
+            from dataset_factory.trace import Tracer
 
-        if not (self._request.paths and isinstance(tracer, Tracer)):
-            return tracer.static() if frame is None else tracer.samples(frame), None
-        if frame is None:
-            return tracer.static(), tracer.static_paths()
-        trace = tracer.trace(frame)
-        return tracer.samples(frame, trace), tracer.paths(frame, trace)
+            if isinstance(tracer, Tracer):
+                return _with_paths(tracer, frame)
+        return tracer.static() if frame is None else tracer.samples(frame), None
 
     def _load(self, radio: str) -> AnyTracer:
         from dataset_factory.trace import tracer_class
@@ -150,6 +153,14 @@ class SceneTracer:
         )
         self._tracer = tracer
         return tracer
+
+
+def _with_paths(tracer: Tracer, frame: BundleFrame | None) -> tuple[np.ndarray, PathTable | None]:
+    """Channel of a frame and the paths behind it."""
+    if frame is None:
+        return tracer.static(), tracer.static_paths()
+    trace = tracer.trace(frame)
+    return tracer.samples(frame, trace), tracer.paths(frame, trace)
 
 
 class _Place:

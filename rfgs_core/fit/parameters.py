@@ -11,6 +11,7 @@ import torch
 from jaxtyping import Bool, Int64
 from torch import Tensor
 
+from rfgs_core.adam import Adam
 from rfgs_core.arrays import Shape
 from rfgs_core.device import on_device
 from rfgs_core.errors import RfgsFormatError
@@ -59,11 +60,8 @@ class TrainableGaussians:
 
     def _adopt(self, values: dict[str, Tensor]) -> None:
         self.leaves = {name: value.requires_grad_(True) for name, value in values.items()}
-        self.optimiser = torch.optim.Adam(
-            [
-                {"params": [leaf], "lr": getattr(self.rates, name)}
-                for name, leaf in self.leaves.items()
-            ]
+        self.optimiser = Adam(
+            {leaf: getattr(self.rates, name) for name, leaf in self.leaves.items()}
         )
 
     @property

@@ -17,6 +17,7 @@ import torch
 from jaxtyping import Bool, Float, Float32
 from torch import Tensor
 
+from rfgs_core.adam import Adam
 from rfgs_core.arrays import load_arrays, save_arrays
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.gaussians.model import FEATURE_DIM
@@ -158,7 +159,7 @@ def _fit(
         for name, shape in _SHAPES.items()
     }
     weights = {name: value.to(rms.device).requires_grad_() for name, value in drawn.items()}
-    optimizer = torch.optim.Adam(list(weights.values()), lr=config.learning_rate)
+    optimizer = Adam(dict.fromkeys(weights.values(), config.learning_rate))
     for _ in range(config.steps):
         chosen = torch.randint(len(views), (config.pictures_per_step,), generator=generator)
         optimizer.zero_grad()

@@ -29,7 +29,10 @@ LIMIT_S = 60.0
 #: Arguments that say where to write.
 OUTPUTS = ("out", "json", "video", "picture", "record", "markdown")
 
-_TRAIN = "train DATA --radio wifi --gaussians 40 --iterations 1 --people 1 --limbs off --no-shader"
+_TRAIN = (
+    "train DATA --radio wifi --gaussians 40 --iterations 1 --people 1 --posture standing "
+    "--limbs off --no-shader"
+)
 _GENERATE = "rfgs-factory generate living_room_walk --radio wifi"
 #: What a command fills, and a link in it where the command would read or write.
 FOLDERS = {

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import numpy as np
 import sionna.rt as rt
-import trimesh
 
 from dataset_factory.scene.bundle import Bundle
 from dataset_factory.trace.rays.scene import static_name, vehicle_meshes
@@ -60,12 +59,14 @@ class CornerObjects:
             places: Where the vehicles' vertices are [m], shape (V, 3).
             velocity: How fast they move [m/s], shape (V, 3).
         """
+        from trimesh.triangles import points_to_barycentric
+
         out = np.zeros((*paths.kinds.shape, 3))
         hit = (paths.kinds != 0) & (paths.kinds != SCATTERING)
         for number, faces, _ in self._vehicles:
             here = hit & (paths.objects == number)
             corners = faces[paths.primitives[here]]
-            share = trimesh.triangles.points_to_barycentric(
+            share = points_to_barycentric(
                 places[corners].astype(np.float64), paths.vertices[:, 1:-1][here]
             )
             out[here] = np.einsum("pc,pcx->px", share, velocity[corners])

@@ -38,7 +38,7 @@ def test_dataset_shows_one_scene_to_radio_and_cameras(box_dataset: Path) -> None
     ratio = np.linalg.norm(change) / np.linalg.norm(sequence.csi_static("wifi"))
     assert 0.01 < ratio < 1.0
     vertices, faces, instance = sequence.moving_mesh(2)
-    assert np.allclose(np.ptp(vertices, axis=0), [0.4, 0.3, 1.7], atol=1e-4)
+    assert np.allclose(np.ptp(vertices, axis=0), [0.2, 0.15, 0.85], atol=1e-4)
     assert len(faces) == len(instance) == 12
     camera = sequence.cameras[0]
     mask, depth = sequence.mask("cam00", 2), sequence.depth("cam00", 2)
@@ -46,7 +46,7 @@ def test_dataset_shows_one_scene_to_radio_and_cameras(box_dataset: Path) -> None
     u = camera["cx"] - camera["fl_x"] * local[0] / local[2]
     v = camera["cy"] + camera["fl_y"] * local[1] / local[2]
     assert mask[int(v), int(u)] == 1
-    assert abs(-local[2] - 0.15 - depth[int(v), int(u)]) < 0.05
+    assert abs(-local[2] - 0.075 - depth[int(v), int(u)]) < 0.05
     assert np.isinf(depth).any() and (sequence.image("cam00", 2)[np.isinf(depth)][:, 3] < 255).all()
     empty = sequence.image_empty("cam00").astype(float)
     assert np.abs(empty - sequence.image("cam00", 2))[mask == 1].mean() > 10

@@ -34,8 +34,7 @@ def copied(trained: TrainableGaussians) -> dict[str, np.ndarray]:
 
 def test_default_rates_are_the_papers(make_gaussians) -> None:
     trained = TrainableGaussians(make_gaussians(2), LearningRates())
-    groups = trained.optimiser.param_groups
-    rates = {name: group["lr"] for name, group in zip(trained.leaves, groups, strict=True)}
+    rates = {name: trained.optimiser.rates[leaf] for name, leaf in trained.leaves.items()}
     assert rates == {
         "means": 0.005,
         "quats": 0.0005,

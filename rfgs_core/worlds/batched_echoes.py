@@ -78,12 +78,22 @@ class _Ways(NamedTuple):
 class BatchedEchoes:
     """Hears batches of moments of one radio on one device."""
 
-    def __init__(self, radio: Radio, device: str | torch.device) -> None:
+    def __init__(
+        self, radio: Radio, device: str | torch.device, kernels: bool | None = None
+    ) -> None:
+        """Prepares what does not depend on the moment.
+
+        Args:
+            radio: The radio.
+            device: Where batches are.
+            kernels: Whether facets go through `kernels_triton`; None: on a GPU.
+        """
         wavelength_m = SPEED_OF_LIGHT / float(radio.freq_hz.max())
         figure = Figure.of(people().body(np.zeros(0)), wavelength_m)
         shares = np.zeros((len(figure.points), len(BONES)), "f4")
         np.put_along_axis(shares, figure.bone, figure.weight, axis=1)
         self.device = torch.device(device)
+        self._kernels = self.device.type == "cuda" if kernels is None else kernels
         self._shares = torch.from_numpy(shares).to(self.device)
         self._wavenumber = 2.0 * np.pi * float(radio.freq_hz.mean()) / SPEED_OF_LIGHT
         self._ranges = Ranges.of_band(radio.freq_hz)
@@ -178,6 +188,8 @@ class BatchedEchoes:
         self, batch: Batch, facets: _Facets, ways: _Ways
     ) -> Complex64[Tensor, "way beam range"]:
         """What each of some ways hears; see `echoes._add_echo`."""
+        if self._kernels:
+            return self._sum_by_kernel(batch, facets, ways)
         points, normals = facets.points[ways.moment], facets.normals[ways.moment]
         legs = points[:, None] - ways.ends[:, :, None, 0]
         length = legs.norm(dim=-1)
@@ -194,6 +206,33 @@ class BatchedEchoes:
         beams = (up[..., :, None] * across[..., None, :]).flatten(2)
         flat = torch.view_as_real(window).flatten(2)
         return torch.view_as_complex((beams.mT @ flat).unflatten(-1, (-1, 2)))
+
+    def _sum_by_kernel(
+        self, batch: Batch, facets: _Facets, ways: _Ways
+    ) -> Complex64[Tensor, "way beam range"]:
+        """The same, its factors written by one kernel."""
+        from rfgs_core.worlds.kernels_triton import ACROSS, BLOCK, UP, facet_waves
+
+        count, total, ranges = len(ways.moment), len(facets.areas), self._ranges.count
+        flat = [ways.ends.flatten(1), ways.cosines.flatten(1), ways.first_m[:, None]]
+        numbers = torch.cat([*flat, ways.gain[:, None]], 1).contiguous()
+        response = batch.band[ways.moment] * batch.responses.shape[1]
+        rows = [ways.moment[:, None], ways.table.flatten(1) * TABLE, response[:, None]]
+        lit = ways.sees[0].to(torch.uint8) + 2 * ways.sees[1].to(torch.uint8)
+        beams = numbers.new_empty(count, UP * ACROSS, total)
+        waves = numbers.new_empty(count, 2 * ranges, total)
+        if count == 0:
+            return torch.zeros(0, UP * ACROSS, ranges, dtype=torch.complex64, device=self.device)
+        facet_waves[(-(-total // BLOCK), count)](
+            facets.points.contiguous(), facets.normals.contiguous(), facets.areas.contiguous(),
+            lit, numbers, torch.cat(rows, 1).contiguous(), batch.tables.contiguous(),
+            torch.view_as_real(batch.responses).contiguous(), beams, waves,
+            total, ranges, batch.responses.shape[1] - 1, self._wavenumber / (2.0 * math.pi),
+            self._wavenumber**2 / 24.0, 1.0 / self._skin, 1.0 / self._ranges.step_m,
+            self._ranges.step_m / self._cell_m * PER_CELL, BLOCK=BLOCK,
+        )  # fmt: skip
+        heard = beams @ waves.mT
+        return torch.complex(heard[..., :ranges], heard[..., ranges:])
 
     def _amplitude(
         self,

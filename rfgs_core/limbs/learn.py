@@ -121,7 +121,7 @@ def learn(
             unseen = judge(network, judged)
             told = float(torch.stack(errors).mean()) if errors else math.nan
             words = f"off by {told:.3f} m, in unseen worlds {unseen:.4f} m"
-            if checkpoint is not None:
+            if checkpoint is not None and errors:
                 keep(checkpoint, network, optimiser, progress)
         on_chunk(progress.frames, words)
         if share >= 1.0:

@@ -45,10 +45,15 @@ def pytest_configure(config: pytest.Config) -> None:
         numba.set_num_threads(1)
 
 
+def pytest_collection() -> None:
+    """Collecting loads what is kept: there is no garbage to search for."""
+    gc.disable()
+
+
 def pytest_collection_finish() -> None:
-    """Spares what collecting has loaded, and keeps, from every later search for garbage."""
-    gc.collect()
+    """Spares what was loaded from every later search for garbage."""
     gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(scope="session")

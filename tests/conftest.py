@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import gc
 import os
 import subprocess
 import sys
@@ -43,17 +42,6 @@ def pytest_configure(config: pytest.Config) -> None:
 
         torch.set_num_threads(1)
         numba.set_num_threads(1)
-
-
-def pytest_collection() -> None:
-    """Collecting loads what is kept: there is no garbage to search for."""
-    gc.disable()
-
-
-def pytest_collection_finish() -> None:
-    """Spares what was loaded from every later search for garbage."""
-    gc.freeze()
-    gc.enable()
 
 
 @pytest.fixture(scope="session")

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import gc
 import os
 import subprocess
 import sys
@@ -43,12 +42,6 @@ def pytest_configure(config: pytest.Config) -> None:
 
         torch.set_num_threads(1)
         numba.set_num_threads(1)
-
-
-def pytest_collection_finish() -> None:
-    """Spares what collecting has loaded, and keeps, from every later search for garbage."""
-    gc.collect()
-    gc.freeze()
 
 
 @pytest.fixture(scope="session")

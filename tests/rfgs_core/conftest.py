@@ -70,7 +70,7 @@ def small_radio(**changes: Any) -> Radio:
     return Radio(**(values | changes))
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def make_observations() -> MakeObservations:
     """Observations of a room without a body; nothing is held out unless masks say so.
 

@@ -13,6 +13,8 @@ from lit_bodies import lit
 from rfgs_core.bodies.localise import (
     BODY_RADIUS_M,
     GROUND_STEP_M,
+    PEAK_RADIUS_M,
+    SEPARATION_M,
     PairMaps,
     _separate_peaks,
     locate_bodies,
@@ -140,3 +142,23 @@ def test_a_weak_body_is_not_lost_to_the_slope_of_a_strong_one() -> None:
     found = ground[_separate_peaks(ground, score, 2)]
     assert np.linalg.norm(found - [strong, weak], axis=1).max() < 0.05
     assert len(np.unique(_separate_peaks(ground, score, 4))) == 4
+
+
+def test_peaks_are_those_of_asking_every_place() -> None:
+    rng = np.random.default_rng(3)
+    axes = [np.arange(0.0, side, GROUND_STEP_M) for side in (2.0, 1.2)]
+    ground = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    distance_m = np.linalg.norm(ground[:, None] - ground, axis=2)
+    for digits in (9, 1):
+        waves = np.sin(3.0 * ground @ rng.standard_normal((2, 5))).sum(axis=1)
+        # Rounded scores are equal in many places: the first of them is taken.
+        score = np.round(waves + 0.1 * rng.standard_normal(len(ground)), digits)
+        peak = score >= np.where(distance_m <= PEAK_RADIUS_M, score, -np.inf).max(axis=1)
+        free, expected = np.ones(len(ground), dtype=bool), []
+        # More than there are peaks, so that slopes are taken too.
+        for _ in range(9):
+            among = free & peak if (free & peak).any() else free
+            expected.append(int(np.where(among, score, -np.inf).argmax()))
+            free &= distance_m[expected[-1]] >= SEPARATION_M
+        assert not (free & peak).any() and not peak[expected].all()
+        assert _separate_peaks(ground, score, 9).tolist() == expected

@@ -8,7 +8,9 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+import torch
 from jaxtyping import Bool, Complex64, Float32, Int64
+from torch import Tensor
 
 from rfgs_core.articulated.bones import BONES
 from rfgs_core.encode.body_maps import ArrayEnd, distinct_places
@@ -28,42 +30,42 @@ _REAL = 1e-6
 class Batch(NamedTuple):
     """Moments of one body. Padded devices and pairs are zeros that nobody asks."""
 
-    points: Float32[np.ndarray, "facet 3"]
+    points: Float32[Tensor, "facet 3"]
     """Facets at rest [m]."""
-    normals: Float32[np.ndarray, "facet 3"]
-    areas_m2: Float32[np.ndarray, "facet"]
-    turns: Float32[np.ndarray, "moment bone 3 3"]
+    normals: Float32[Tensor, "facet 3"]
+    areas_m2: Float32[Tensor, "facet"]
+    turns: Float32[Tensor, "moment bone 3 3"]
     """Rotation of each bone from rest, around the centre of the maps."""
-    moves: Float32[np.ndarray, "moment bone 3"]
+    moves: Float32[Tensor, "moment bone 3"]
     """Its translation, likewise [m]."""
-    joints: Float32[np.ndarray, "moment 17 3"]
+    joints: Float32[Tensor, "moment 17 3"]
     """Joints around the centre of the maps [m]."""
-    ends: Float32[np.ndarray, "moment device 2 3 3"]
+    ends: Float32[Tensor, "moment device 2 3 3"]
     """Transmitter and receiver: centre around that of the maps [m], y axis, z axis."""
-    table: Int64[np.ndarray, "moment device 2 2"]
+    table: Int64[Tensor, "moment device 2 2"]
     """Row of `tables` for either end along either axis."""
-    tables: Float32[np.ndarray, "row sample"]
+    tables: Float32[Tensor, "row sample"]
     """Responses of arrays, as `echoes.array_table`."""
-    counts: Float32[np.ndarray, "moment device 2 2"]
+    counts: Float32[Tensor, "moment device 2 2"]
     """log2 of the distinct places of elements along either axis."""
-    above_m: Float32[np.ndarray, "moment device"]
+    above_m: Float32[Tensor, "moment device"]
     """Furniture hides what is lower from each device [m]."""
-    walls_m: Float32[np.ndarray, "moment 3 2"]
+    walls_m: Float32[Tensor, "moment 3 2"]
     """Where the sides of the room are along each axis, around the centre [m]."""
-    reflects: Float32[np.ndarray, "moment 3 2"]
+    reflects: Float32[Tensor, "moment 3 2"]
     """Amplitude of a wave after each; 0 for no wall."""
-    pairs: Int64[np.ndarray, "moment pair 2"]
+    pairs: Int64[Tensor, "moment pair 2"]
     """Transmitting and receiving device."""
-    there: Bool[np.ndarray, "moment pair"]
+    there: Bool[Tensor, "moment pair"]
     """Which pairs are not padding."""
-    band: Int64[np.ndarray, "moment"]
+    band: Int64[Tensor, "moment"]
     """Row of `responses`."""
-    responses: Complex64[np.ndarray, "row sample"]
+    responses: Complex64[Tensor, "row sample"]
     """Responses of bands, as `echoes.Band`, to `LOBES_OF_GAP` cells either side."""
 
 
 def batch_of(radio: Radio, done: Acted, pairs: int) -> Batch:
-    """Arrays of the moments of a motion.
+    """The moments of a motion, on the CPU.
 
     Args:
         radio: The radio.
@@ -74,30 +76,38 @@ def batch_of(radio: Radio, done: Acted, pairs: int) -> Batch:
     count = len(moments)
     tables = _Rows()
     responses = _Rows()
-    out = Batch(
-        figure.points.astype("f4"), figure.normals.astype("f4"), figure.areas_m2.astype("f4"),
-        np.zeros((count, len(BONES), 3, 3), "f4"), np.zeros((count, len(BONES), 3), "f4"),
-        np.zeros((count, 17, 3), "f4"), np.zeros((count, DEVICES, 2, 3, 3), "f4"),
-        np.zeros((count, DEVICES, 2, 2), np.int64), np.zeros((0, 0), "f4"),
-        np.zeros((count, DEVICES, 2, 2), "f4"), np.zeros((count, DEVICES), "f4"),
-        np.zeros((count, 3, 2), "f4"), np.zeros((count, 3, 2), "f4"),
-        np.zeros((count, pairs, 2), np.int64), np.zeros((count, pairs), bool),
-        np.zeros(count, np.int64), np.zeros((0, 0), "c8"),
-    )  # fmt: skip
+    out = {
+        "points": figure.points.astype("f4"),
+        "normals": figure.normals.astype("f4"),
+        "areas_m2": figure.areas_m2.astype("f4"),
+        "turns": np.zeros((count, len(BONES), 3, 3), "f4"),
+        "moves": np.zeros((count, len(BONES), 3), "f4"),
+        "joints": np.zeros((count, 17, 3), "f4"),
+        "ends": np.zeros((count, DEVICES, 2, 3, 3), "f4"),
+        "table": np.zeros((count, DEVICES, 2, 2), np.int64),
+        "counts": np.zeros((count, DEVICES, 2, 2), "f4"),
+        "above_m": np.zeros((count, DEVICES), "f4"),
+        "walls_m": np.zeros((count, 3, 2), "f4"),
+        "reflects": np.zeros((count, 3, 2), "f4"),
+        "pairs": np.zeros((count, pairs, 2), np.int64),
+        "there": np.zeros((count, pairs), bool),
+        "band": np.zeros(count, np.int64),
+    }
     for row, moment in enumerate(moments):
         turns, moves = figure.body.from_rest(moment.pose)
-        out.turns[row], out.moves[row] = turns, moves - moment.centre
-        out.joints[row] = figure.body.joints17(moment.pose) - moment.centre
-        out.walls_m[row] = moment.room.bounds_m.T - moment.centre[:, None]
-        out.reflects[row] = moment.room.reflects
-        out.above_m[row, : len(moment.sight.above_m)] = moment.sight.above_m - moment.centre[2]
+        out["turns"][row], out["moves"][row] = turns, moves - moment.centre
+        out["joints"][row] = figure.body.joints17(moment.pose) - moment.centre
+        out["walls_m"][row] = moment.room.bounds_m.T - moment.centre[:, None]
+        out["reflects"][row] = moment.room.reflects
+        out["above_m"][row, : len(moment.sight.above_m)] = moment.sight.above_m - moment.centre[2]
         _place_devices(out, row, moment, tables)
         mask = moment.sight.subcarriers.tobytes()
-        out.band[row] = responses.row(mask, lambda mask=mask: _response(radio, mask))
+        out["band"][row] = responses.row(mask, lambda mask=mask: _response(radio, mask))
         views = moment.views[:pairs]
-        out.pairs[row, : len(views)] = [view.pair for view in views]
-        out.there[row, : len(views)] = True
-    return out._replace(tables=np.stack(tables.values), responses=np.stack(responses.values))
+        out["pairs"][row, : len(views)] = [view.pair for view in views]
+        out["there"][row, : len(views)] = True
+    out |= {"tables": np.stack(tables.values), "responses": np.stack(responses.values)}
+    return Batch(**{name: torch.from_numpy(values) for name, values in out.items()})
 
 
 class _Rows:
@@ -115,7 +125,7 @@ class _Rows:
         return self._row[key]
 
 
-def _place_devices(out: Batch, row: int, moment: Moment, tables: _Rows) -> None:
+def _place_devices(out: dict[str, np.ndarray], row: int, moment: Moment, tables: _Rows) -> None:
     """Fills in what a moment's devices send and hear with."""
     wavenumber = 2.0 * np.pi * float(moment.sight.freq_hz.mean()) / SPEED_OF_LIGHT
     done: set[tuple[int, int]] = set()
@@ -124,12 +134,12 @@ def _place_devices(out: Batch, row: int, moment: Moment, tables: _Rows) -> None:
             if (device, side) in done:
                 continue
             done.add((device, side))
-            out.ends[row, device, side, 0] = end.centre - moment.centre
-            out.ends[row, device, side, 1:] = end.axes
+            out["ends"][row, device, side, 0] = end.centre - moment.centre
+            out["ends"][row, device, side, 1:] = end.axes
             for axis in (0, 1):
                 places = np.round(end.offsets[:, axis], 6)
-                out.counts[row, device, side, axis] = _log2_places(places.tobytes())
-                out.table[row, device, side, axis] = tables.row(
+                out["counts"][row, device, side, axis] = _log2_places(places.tobytes())
+                out["table"][row, device, side, axis] = tables.row(
                     places.tobytes(), functools.partial(_real_table, end, axis, wavenumber)
                 )
 

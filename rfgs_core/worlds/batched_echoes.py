@@ -9,7 +9,7 @@ takes 2e-3 rad of a path of 20 m at 62 GHz.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -73,6 +73,14 @@ class _Ways(NamedTuple):
     """Amplitude at the wall, times 4π d_t d_r of the centre."""
     sees: tuple[Bool[Tensor, "way facet"], Bool[Tensor, "way facet"]]
     """What the ends see."""
+
+    def some(self, rows: slice | Tensor) -> _Ways:
+        """Some of them."""
+        return _Ways(
+            self.moment[rows], self.pair[rows], self.ends[rows], self.table[rows],
+            self.cosines[rows], self.first_m[rows], self.gain[rows],
+            (self.sees[0][rows], self.sees[1][rows]),
+        )  # fmt: skip
 
 
 class BatchedEchoes:
@@ -162,11 +170,11 @@ class BatchedEchoes:
             ends[:, :, end] = images[straight.moment, :, device, end]
             later_m = ends[..., 0, :].norm(dim=-1).sum(2) - straight_m[:, None]
             way, wall = ((gains > 0.0) & (later_m <= LATEST_M)).nonzero(as_tuple=True)
-            lit = [straight.sees[0][way], straight.sees[1][way]]
-            lit[end] = seen[straight.moment[way], wall, device[way]]
-            ways = _Ways(*(values[way] for values in straight[:-1]), (lit[0], lit[1]))
+            ways = straight.some(way)
+            lit = list(ways.sees)
+            lit[end] = seen[ways.moment, wall, device[way]]
             gain = ways.gain * gains[way, wall] * math.sqrt(EVERY)
-            out.append(ways._replace(ends=ends[way, wall], gain=gain))
+            out.append(ways._replace(ends=ends[way, wall], gain=gain, sees=(lit[0], lit[1])))
         return out
 
     def _add(
@@ -180,8 +188,7 @@ class BatchedEchoes:
         at_once = max(_AT_ONCE // len(facets.areas), 1)
         for first in range(0, len(ways.moment), at_once):
             rows = slice(first, first + at_once)
-            lit = (ways.sees[0][rows], ways.sees[1][rows])
-            some = _Ways(*(values[rows] for values in ways[:-1]), lit)
+            some = ways.some(rows)
             out.index_put_((some.moment, some.pair), self._sum(batch, facets, some), True)
 
     def _sum(
@@ -221,6 +228,7 @@ class BatchedEchoes:
         lit = ways.sees[0].to(torch.uint8) + 2 * ways.sees[1].to(torch.uint8)
         beams = numbers.new_empty(count, UP * ACROSS, total)
         waves = numbers.new_empty(count, 2 * ranges, total)
+        sizes: dict[str, Any] = {"BLOCK": BLOCK}
         if count == 0:
             return torch.zeros(0, UP * ACROSS, ranges, dtype=torch.complex64, device=self.device)
         facet_waves[(-(-total // BLOCK), count)](
@@ -229,7 +237,7 @@ class BatchedEchoes:
             torch.view_as_real(batch.responses).contiguous(), beams, waves,
             total, ranges, batch.responses.shape[1] - 1, self._wavenumber / (2.0 * math.pi),
             self._wavenumber**2 / 24.0, 1.0 / self._skin, 1.0 / self._ranges.step_m,
-            self._ranges.step_m / self._cell_m * PER_CELL, BLOCK=BLOCK,
+            self._ranges.step_m / self._cell_m * PER_CELL, **sizes,
         )  # fmt: skip
         heard = beams @ waves.mT
         return torch.complex(heard[..., :ranges], heard[..., ranges:])

@@ -97,7 +97,7 @@ def _middles(views: list[View]) -> dict[int, Float64[np.ndarray, "3"]]:
     sends = {view.pair[0]: view.tx.centre for view in views}
     hears = {view.pair[1]: view.rx.centre for view in views}
     return {
-        device: 0.5 * (sends.get(device, hears.get(device)) + hears.get(device, sends.get(device)))
+        device: 0.5 * ((hears | sends)[device] + (sends | hears)[device])
         for device in {*sends, *hears}
     }
 

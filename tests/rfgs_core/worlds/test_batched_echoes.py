@@ -24,7 +24,7 @@ from rfgs_core.worlds.moments import Acted, acted
 
 def tensors(name: str, done: Acted) -> Batch:
     radio = preset(name)
-    return Batch(*(torch.from_numpy(value) for value in batch_of(radio, done, pairs_of(radio))))
+    return batch_of(radio, done, pairs_of(radio))
 
 
 def one_by_one(name: str, done: Acted) -> list[tuple[list[View], np.ndarray, np.ndarray]]:
@@ -53,6 +53,28 @@ def test_many_at_once_hear_what_each_hears(name: str) -> None:
                 # A facet on the edge of a cell may fall to either side of it in single precision.
                 off = np.abs(np.sqrt(one) - np.sqrt(other)) / peak
                 assert np.median(off) < 1e-3 and off.max() < 0.05
+
+
+@pytest.mark.parametrize("name", ["mmwave", "wifi"])
+def test_the_kernel_writes_the_factors_of_the_plain_product(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In Triton's interpreter where there is no GPU: one moment of few facets."""
+    pytest.importorskip("triton", reason="kernels for a GPU need triton: pip install triton")
+    device = "cuda" if torch.cuda.is_available() else "cpu"
+    batch = tensors(name, next(acted(preset(name), 4, 1)))
+    few = slice(None, None, 40)
+    points, normals, areas = batch.points[few], batch.normals[few], 10.0 * batch.areas_m2[few]
+    pairs, there = batch.pairs[:, :6], batch.there[:, :6]
+    batch = batch._replace(points=points, normals=normals, areas_m2=areas, pairs=pairs, there=there)
+    found = []
+    for where, kernels in (("cpu", False), (device, True)):
+        echoes = BatchedEchoes(preset(name), where, kernels)
+        monkeypatch.setattr(echoes, "_shares", echoes._shares[few])
+        found.append(echoes.maps(Batch(*(value.to(where) for value in batch))).cpu().sqrt())
+    peak = found[0].amax((2, 3, 4), keepdim=True).clamp_min(1e-20)
+    assert float(found[0].max()) > 0.0
+    assert float(((found[0] - found[1]).abs() / peak).max()) < 2e-3
 
 
 def test_a_chunk_is_the_frames_packed() -> None:

@@ -67,12 +67,9 @@ def test_rows_and_controls_on_point_clouds(tmp_path: Path, network, write) -> No
     }
     # Dense points of a whole side, as no radar gives them.
     assert error["network, place told"] < 0.2
-    # One radar's points say little of the pose of the moment: docs/captures.md tells so. Those of
-    # another moment are not better for all that, nor is a place that is told worse than one found.
-    assert 0.02 < min(error.values()) and max(error.values()) < 0.2
-    told = error["network, place told"]
-    assert told < error["network, another frame"] + 0.02
-    assert told < error["network, place found"] + 0.02
+    # One radar's points say little of the pose of the moment: docs/captures.md tells so.
+    spread = max(error.values()) - min(error.values())
+    assert 0.02 < min(error.values()) and spread < 0.05
     assert float(table["mean walk, place told: joints [m]"]) < 0.5
     # The walker may face either way; told the wrong side, the mean walk is no better than that.
     assert "network, place found: the same, sides swapped [m]" in table

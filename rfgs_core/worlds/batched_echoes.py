@@ -127,8 +127,7 @@ class BatchedEchoes:
         thin = facets.thinned()
         for ways in self._by_bounces(batch, thin, direct[..., ::EVERY]):
             self._add(out, batch, thin, ways)
-        power = (out * self._skin).abs().square()
-        return power.unflatten(2, (len(ELEVATIONS), len(AZIMUTHS)))
+        return (out * self._skin).abs().square().unflatten(2, (len(ELEVATIONS), len(AZIMUTHS)))
 
     def _posed(self, batch: Batch) -> _Facets:
         """Facets in the world, as `Figure.posed`."""
@@ -187,8 +186,7 @@ class BatchedEchoes:
         """Adds what comes along some ways."""
         at_once = max(_AT_ONCE // len(facets.areas), 1)
         for first in range(0, len(ways.moment), at_once):
-            rows = slice(first, first + at_once)
-            some = ways.some(rows)
+            some = ways.some(slice(first, first + at_once))
             out.index_put_((some.moment, some.pair), self._sum(batch, facets, some), True)
 
     def _sum(
@@ -208,11 +206,10 @@ class BatchedEchoes:
         window = self._window(batch, ways, path) * wave[..., None]
         # Direction cosines at either end along either axis, less those of the centre.
         off = (units @ ways.ends[:, :, 1:].mT) - ways.cosines[:, :, None]
-        across = self._beam(batch, ways, off, 0)
-        up = self._beam(batch, ways, off, 1)
+        across, up = (self._beam(batch, ways, off, axis) for axis in (0, 1))
         beams = (up[..., :, None] * across[..., None, :]).flatten(2)
-        flat = torch.view_as_real(window).flatten(2)
-        return torch.view_as_complex((beams.mT @ flat).unflatten(-1, (-1, 2)))
+        heard = beams.mT @ torch.view_as_real(window).flatten(2)
+        return torch.view_as_complex(heard.unflatten(-1, (-1, 2)))
 
     def _sum_by_kernel(
         self, batch: Batch, facets: _Facets, ways: _Ways
@@ -223,8 +220,8 @@ class BatchedEchoes:
         count, total, ranges = len(ways.moment), len(facets.areas), self._ranges.count
         flat = [ways.ends.flatten(1), ways.cosines.flatten(1), ways.first_m[:, None]]
         numbers = torch.cat([*flat, ways.gain[:, None]], 1).contiguous()
-        response = batch.band[ways.moment] * batch.responses.shape[1]
-        rows = [ways.moment[:, None], ways.table.flatten(1) * TABLE, response[:, None]]
+        response = (batch.band[ways.moment] * batch.responses.shape[1])[:, None]
+        rows = [ways.moment[:, None], ways.table.flatten(1) * TABLE, response]
         lit = ways.sees[0].to(torch.uint8) + 2 * ways.sees[1].to(torch.uint8)
         beams = numbers.new_empty(count, UP * ACROSS, total)
         waves = numbers.new_empty(count, 2 * ranges, total)
@@ -265,8 +262,7 @@ class BatchedEchoes:
     ) -> Float[Tensor, "way facet beam"]:
         """What both arrays of a way make of each facet in the beams along an axis."""
         beams = self._beams[1 - axis]
-        at = (off[..., axis, None] - beams + WIDEST) * PER_COSINE
-        at = at.clamp(0.0, TABLE - 1.001)
+        at = ((off[..., axis, None] - beams + WIDEST) * PER_COSINE).clamp(0.0, TABLE - 1.001)
         low = at.long()
         row = ways.table[:, :, axis, None, None] * TABLE
         flat = batch.tables.flatten()
@@ -277,11 +273,10 @@ class BatchedEchoes:
         self, batch: Batch, ways: _Ways, path: Float[Tensor, "way facet"]
     ) -> Complex64[Tensor, "way facet range"]:
         """What the band makes of each facet's path in every range."""
-        step = self._ranges.step_m
+        step, size = self._ranges.step_m, batch.responses.shape[1]
         at = (path - ways.first_m[:, None]) / step
         ranges = torch.arange(self._ranges.count, device=self.device)
         x = (ranges - at[..., None]) * (step / self._cell_m * PER_CELL) + LOBES_OF_GAP * PER_CELL
-        size = batch.responses.shape[1]
         near = (x >= 0.0) & (x <= size - 1)
         x = x.clamp(0.0, size - 1.001)
         low = x.long()

@@ -67,9 +67,14 @@ def test_rows_and_controls_on_point_clouds(tmp_path: Path, network, write) -> No
     }
     # Dense points of a whole side, as no radar gives them.
     assert error["network, place told"] < 0.2
-    # One radar's points say little of the pose of the moment: docs/captures.md tells so.
-    spread = max(error.values()) - min(error.values())
-    assert 0.02 < min(error.values()) and spread < 0.05
+    found, told, other = error.values()
+    assert 0.02 < min(found, told, other)
+    if write is write_m4human:
+        # The moment's own points tell its pose, best at the true place: docs/captures.md.
+        assert told < found < other and other - told > 0.03
+    else:
+        # One radar's points say little of the pose of the moment.
+        assert max(found, told, other) - min(found, told, other) < 0.03
     assert float(table["mean walk, place told: joints [m]"]) < 0.5
     # The walker may face either way; told the wrong side, the mean walk is no better than that.
     assert "network, place found: the same, sides swapped [m]" in table

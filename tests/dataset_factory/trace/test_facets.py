@@ -7,8 +7,8 @@ import trimesh
 from scipy.spatial import KDTree
 
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.simulate.surface.cells import Cells
 from rfgs_core.simulate.surface.facets import facet_sum
-from rfgs_core.simulate.surface.lloyd import Cells
 from rfgs_core.simulate.surface.points import surface_points
 
 FREQ_HZ = np.array([5.8e9])

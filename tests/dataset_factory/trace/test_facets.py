@@ -128,6 +128,15 @@ def test_nearest_centres_are_those_of_a_plain_search() -> None:
         np.testing.assert_array_equal(cells.around(centres), nearest)
 
 
+def test_of_centres_that_are_as_near_the_tree_says_which() -> None:
+    """Points of datasets stay where they were."""
+    centres = np.stack(np.meshgrid(*3 * [np.arange(4.0)]), axis=-1).reshape(-1, 3)
+    centres = np.random.default_rng(5).permutation(centres)
+    places = centres[:40] + [0.5, 0.5, 0.0]
+    _, nearest = KDTree(centres).query(places)
+    np.testing.assert_array_equal(Cells(places, np.arange(40)).around(centres), nearest)
+
+
 def test_small_inner_parts_are_left_out() -> None:
     body = trimesh.creation.icosphere(subdivisions=3, radius=0.2)
     eye = trimesh.creation.icosphere(subdivisions=1, radius=0.02)

@@ -139,7 +139,7 @@ def test_evidence_and_a_network_count_together(
 ) -> None:
     alone = read_limbs(train(tiny_dataset, tmp_path / "alone", CONFIG).path)
     assert alone is not None
-    aside = alone.joints.xyz + [0.3, 0.0, 0.0]
+    aside = alone.joints.xyz + np.array([0.3, 0.0, 0.0])
     sigma = np.full((2, 1, 17), 0.06)
 
     def tell(*_: object) -> Told:

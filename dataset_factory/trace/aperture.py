@@ -47,7 +47,7 @@ class ApertureTracer(BaseTracer):
         # The same antennas, each place a device of its own.
         standing = replace(radio, antennas_move=False)
         every = layout(standing, devices)
-        with self._timed("environment"):
+        with self.timings.stage("environment"):
             environment = Environment(bundle, standing, every, devices, self._rays)
             self._static_paths = self._by_place(environment.paths())
             vehicles = self._bodies.vehicles
@@ -77,15 +77,15 @@ class ApertureTracer(BaseTracer):
         for place, own in enumerate(paths):
             passed = None
             if points is not None:
-                with self._timed("shadow"):
+                with self.timings.stage("shadow"):
                     scene = self._environment.scene
                     outlines = self._bodies.outlines(vertices, own.vertices, scene)
                     elements = self._layouts[place]
                     passed = transmission(own, elements, outlines, self._grid, self._shadow)
-            with self._timed("environment"):
+            with self.timings.stage("environment"):
                 channel = environment_channel(own, self._radio, self._layouts[place], passed)
             if points is not None:
-                with self._timed("people_direct"):
+                with self.timings.stage("people_direct"):
                     channel += self._echo(place, points, gamma)
             channels.append(channel)
         return np.stack(channels).astype(np.complex64)
@@ -102,7 +102,7 @@ class ApertureTracer(BaseTracer):
         vehicles = self._bodies.vehicles
         if not len(vehicles):
             return self._static_paths
-        with self._timed("environment"):
+        with self.timings.stage("environment"):
             return self._by_place(self._environment.paths(vehicles.posed(vertices)))
 
     def _by_place(self, paths: PathSet) -> list[PathSet]:

@@ -3,10 +3,6 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-
 import drjit as dr
 
 from dataset_factory.scene.bundle import Bundle
@@ -19,6 +15,7 @@ from rfgs_core.seeds import sub_seed
 from rfgs_core.simulate.shadow.environment import node_frequencies
 from rfgs_core.simulate.shadow.frequencies import fine_grid
 from rfgs_core.simulate.shadow.kirchhoff import Shadow
+from rfgs_core.simulate.timings import Timings
 
 #: Dr.Jit keeps kernels and memory of every frame; they are dropped this often [frames].
 FLUSH_EVERY = 10
@@ -61,9 +58,7 @@ class BaseTracer:
         self._grid = fine_grid(node_frequencies(radio, slab_s))
         self._bodies = Bodies(bundle, radio, sub_seed(seed, "points"))
         self._frames_done = 0
-        self.timings: dict[str, float] = dict.fromkeys(
-            ("environment", "shadow", "people_direct", "people_bounces"), 0.0
-        )
+        self.timings = Timings("environment", "shadow", "people_direct", "people_bounces")
 
     def _flush(self) -> None:
         """Drops what Dr.Jit keeps of past frames, every few frames."""
@@ -71,12 +66,3 @@ class BaseTracer:
         if self._frames_done % FLUSH_EVERY == 0:
             dr.flush_kernel_cache()
             dr.flush_malloc_cache()
-
-    @contextmanager
-    def _timed(self, stage: str) -> Iterator[None]:
-        """Adds the block's wall time to a stage."""
-        start = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.timings[stage] += time.perf_counter() - start

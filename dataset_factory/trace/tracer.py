@@ -56,7 +56,7 @@ class Tracer(BaseTracer):
         self._layout = layout(radio, devices)
         self._samples = frame_samples(radio, bundle.fps)
         bodies = self._bodies
-        with self._timed("environment"):
+        with self.timings.stage("environment"):
             environment = Environment(bundle, radio, self._layout, devices, self._rays)
             self._static_paths = environment.paths()
             self._static_corners = CornerObjects(bundle, environment.scene, bodies.vehicles)
@@ -183,12 +183,12 @@ class Tracer(BaseTracer):
         if points is None:
             return Trace(environment, paths, outlines)
         self._bodies.move(vertices)
-        with self._timed("people_direct"):
+        with self.timings.stage("people_direct"):
             seen = in_sight(self._bodies.scene.mi_scene, points, self._layout)
         bounced = None
         around = self._environment.around
         if self._bounces is not None and around is not None:
-            with self._timed("people_bounces"):
+            with self.timings.stage("people_bounces"):
                 bounced = self._bounces.paths(points, around)
         return Trace(environment, paths, outlines, points, seen, bounced)
 
@@ -200,16 +200,16 @@ class Tracer(BaseTracer):
 
     def _outlines(self, paths: PathSet, vertices: np.ndarray) -> list[Outline]:
         """What shades paths that were just traced, people at places [m], shape (V, 3)."""
-        with self._timed("shadow"):
+        with self.timings.stage("shadow"):
             return self._bodies.outlines(vertices, paths.vertices, self._environment.scene)
 
     def _environment_of(self, paths: PathSet, outlines: list[Outline]) -> np.ndarray:
         """Channel of the environment's paths past what casts shadows."""
         passed = None
         if outlines:
-            with self._timed("shadow"):
+            with self.timings.stage("shadow"):
                 passed = transmission(paths, self._layout, outlines, self._grid, self._shadow)
-        with self._timed("environment"):
+        with self.timings.stage("environment"):
             return environment_channel(paths, self._radio, self._layout, passed)
 
     def _channel(
@@ -232,7 +232,7 @@ class Tracer(BaseTracer):
             environment = mixed([(trace.environment, share) for trace, share in weighted])
         channel = environment
         if points is not None:
-            with self._timed("people_direct"):
+            with self.timings.stage("people_direct"):
                 channel += direct_channel(
                     points,
                     mixed([(trace.seen, share) for trace, share in weighted]),
@@ -243,7 +243,7 @@ class Tracer(BaseTracer):
                 )
             for trace, share in weighted:
                 if share and trace.bounced is not None:
-                    with self._timed("people_bounces"):
+                    with self.timings.stage("people_bounces"):
                         channel += share * self._bounced(points, trace)
         channel[~self._layout.measured] = 0.0
         return channel
@@ -253,7 +253,7 @@ class Tracer(BaseTracer):
         vehicles = self._bodies.vehicles
         if not len(vehicles):
             return self._static_paths
-        with self._timed("environment"):
+        with self.timings.stage("environment"):
             return self._environment.paths(vehicles.posed(vertices))
 
     def _bounced(self, points: PosedPoints, trace: Trace) -> np.ndarray:

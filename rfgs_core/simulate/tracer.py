@@ -3,9 +3,7 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -37,6 +35,7 @@ from rfgs_core.simulate.shadow.outline import Outline, coarse_mesh
 from rfgs_core.simulate.sight.free import free_segments
 from rfgs_core.simulate.surface.bodies import BodySurface
 from rfgs_core.simulate.surface.movers import Movers
+from rfgs_core.simulate.timings import Timings
 
 
 @dataclass(frozen=True)
@@ -95,8 +94,8 @@ class FastTracer:
         self._nodes = node_frequencies(radio, room.slab_delay_s(radio.centre_hz))
         self._grid = fine_grid(self._nodes)
         self._sight = Sight(*centres(self._layout))
-        self.timings: dict[str, float] = dict.fromkeys(("environment", "shadow", "people"), 0.0)
-        with self._timed("environment"):
+        self.timings = Timings("environment", "shadow", "people")
+        with self.timings.stage("environment"):
             around = self._look(room)
             self._static_paths = self._paths(room, around)
         # Every frame's channel holds what people do not change.
@@ -107,7 +106,7 @@ class FastTracer:
         ]
         self._surface: BodySurface | None = None
         if len(people):
-            with self._timed("people"):
+            with self.timings.stage("people"):
                 self._surface = BodySurface(people, vehicles, radio, sub_seed(seed, "points"))
                 self._echoes = PeopleChannel(room, around, self._layout, devices, radio, depth)
                 self._gamma = self._reflections()
@@ -140,7 +139,7 @@ class FastTracer:
         environment = self._environment_at(vertices)
         arrivals: list[Arrivals] = []
         if self._surface is not None:
-            with self._timed("people"):
+            with self.timings.stage("people"):
                 arrivals = self._echoes.arrivals(self._surface.facets(vertices))
         return Instant(environment, arrivals)
 
@@ -164,7 +163,7 @@ class FastTracer:
             for trace, share in zip(traces[1:], shares[1:], strict=True):
                 channel = channel + share * trace.environment
         if self._surface is not None:
-            with self._timed("people"):
+            with self.timings.stage("people"):
                 facets = self._surface.facets(vertices)
                 for trace, share in zip(traces, shares, strict=True):
                     if share and trace.arrivals:
@@ -177,21 +176,21 @@ class FastTracer:
         """Channel of everything but people's echoes, complex128, (tx, rx, subcarrier)."""
         paths, room, channel = self._static_paths, self._room, self._unshaded
         if len(self._vehicles):
-            with self._timed("environment"):
+            with self.timings.stage("environment"):
                 room = self._with_vehicles(vertices)
                 paths = self._paths(room, self._look(room))
                 channel = environment_channel(paths, self._radio, self._layout)
         outlines = self._shades(paths, room.faces.bvh, vertices)
         if not outlines:
             return channel
-        with self._timed("shadow"):
+        with self.timings.stage("shadow"):
             passed = transmission(paths, self._layout, outlines, self._grid, self._shadow)
             return channel + shadow_channel(paths, self._radio, self._layout, passed)
 
     def _shades(self, paths: PathSet, standing: Bvh, vertices: np.ndarray) -> list[Outline]:
         """What casts the shadow of each person."""
         posed, outlines = self._people.posed(vertices), []
-        with self._timed("shadow"):
+        with self.timings.stage("shadow"):
             for kept, mesh in self._outlines:
                 body = posed[kept]
                 near = near_segments(paths, body, float(self._grid.max()))
@@ -231,12 +230,3 @@ class FastTracer:
             name = self._room.materials[index].name
             gamma[index] = normal_reflection(material_permittivity(name, node_hz))
         return gamma
-
-    @contextmanager
-    def _timed(self, stage: str) -> Iterator[None]:
-        """Adds the block's wall time to a stage."""
-        start = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.timings[stage] += time.perf_counter() - start

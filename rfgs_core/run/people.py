@@ -116,8 +116,10 @@ def counted(
     frames: list[int],
     config: TrainConfig,
     people: People,
-) -> HeadCount:
+) -> HeadCount | None:
     """How many people a run in a folder is about; sensing is not repeated where it knows.
+
+    None of a run from a random start, which knows of nobody.
 
     Args:
         out: Folder of the run, which may be new.
@@ -130,6 +132,13 @@ def counted(
     Raises:
         RfgsError: They shall be sensed where that cannot be, or nobody is sensed.
     """
+    if config.start == "random":
+        if people not in ("auto", "told"):
+            raise RfgsError(
+                f"--people {people}: --start random knows of no people; leave it out, or choose "
+                "--start prior"
+            )
+        return None
     kept = HeadCount.read(out)
     if kept is None and (out / CONFIG_FILE).exists():
         # Runs without a word of it were told.

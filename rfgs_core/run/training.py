@@ -62,7 +62,7 @@ from rfgs_core.run.limbs import (
     looks_at,
 )
 from rfgs_core.run.log import Scalars, TrainingLog
-from rfgs_core.run.people import People, counted
+from rfgs_core.run.people import People, counted, need_no_people
 from rfgs_core.run.static import (
     has_static_set,
     need_phases,
@@ -103,6 +103,7 @@ def train_sequence(
         RfgsError: `out` holds a run with other settings, or they do not go together or ask of the
             radio and the sequence what these do not have.
     """
+    need_no_people(config, people)
     _check(dataset, sequence, radio, config)
     if encoder_file is not None:
         refuse_other_radios(encoder_file, sequence, radio, config.packets)

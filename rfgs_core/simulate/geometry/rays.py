@@ -69,7 +69,9 @@ def crossings(
 
 
 @numba.njit(cache=True, nogil=True)
-def nearest(bvh: Bvh, start: np.ndarray, way: np.ndarray, rim_m: float) -> tuple[float, int]:
+def nearest(
+    bvh: Bvh, start: np.ndarray, way: np.ndarray, rim_m: float, stack: np.ndarray
+) -> tuple[float, int]:
     """Distance of the first triangle that a ray meets [m], and which; infinite and −1 for none.
 
     Args:
@@ -77,12 +79,12 @@ def nearest(bvh: Bvh, start: np.ndarray, way: np.ndarray, rim_m: float) -> tuple
         start: Where it starts [m], shape (3,).
         way: Where to, a unit vector, shape (3,).
         rim_m: What is nearer than this does not count [m].
+        stack: Scratch, from `new_stack`.
     """
     x, y, z, wx, wy, wz = start[0], start[1], start[2], way[0], way[1], way[2]
     inverse = _inverse(wx), _inverse(wy), _inverse(wz)
     box, first, count, corners = bvh.box, bvh.first, bvh.count, bvh.corners
-    stack = np.zeros(_STACK, dtype=np.int64)
-    size, best, found = 1, np.inf, -1
+    stack[0], size, best, found = 0, 1, np.inf, -1
     while size:
         size -= 1
         node = stack[size]
@@ -101,7 +103,7 @@ def nearest(bvh: Bvh, start: np.ndarray, way: np.ndarray, rim_m: float) -> tuple
 
 @numba.njit(cache=True, nogil=True)
 def new_stack() -> np.ndarray:
-    """Scratch for many calls of `blocked`."""
+    """Scratch for many calls of `nearest` and `blocked`."""
     return np.zeros(_STACK, dtype=np.int64)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from rfgs_core.simulate.geometry.bvh import SAME_M, triangle_at
 from rfgs_core.simulate.geometry.faces import Faces, height, mirrored
-from rfgs_core.simulate.geometry.rays import blocked, nearest
+from rfgs_core.simulate.geometry.rays import blocked, nearest, new_stack
 from rfgs_core.simulate.sight.panorama import Panorama, sees_face
 
 #: Step of the places on a mirror that are looked by way of [m], and most of them along a side.
@@ -60,6 +60,7 @@ def _looked(
     n_w = min(max(int(math.ceil(sides[1] / step_m)), 1), most)  # noqa: RUF046
     seen = np.zeros((n_u, n_w), dtype=np.float32)
     holds = np.zeros((n_u, n_w), dtype=np.int8)
+    stack = new_stack()
     for i in range(n_u):
         for j in range(n_w):
             u = faces.low[face, 0] + sides[0] * (i + 0.5) / n_u
@@ -68,7 +69,7 @@ def _looked(
             place = place + u * faces.axes[face, 0] + w * faces.axes[face, 1]
             way = place - image
             way = way / math.sqrt((way * way).sum())
-            seen[i, j] = nearest(faces.bvh, place, way, 2.0 * SAME_M)[0]
+            seen[i, j] = nearest(faces.bvh, place, way, 2.0 * SAME_M, stack)[0]
             holds[i, j] = triangle_at(faces.bvh, faces.of_triangle, face, place) >= 0
     near, far, covered = np.zeros_like(seen), np.zeros_like(seen), np.zeros_like(holds)
     for i in range(n_u):

@@ -15,7 +15,7 @@ import numpy as np
 
 from rfgs_core.simulate.geometry.bvh import SAME_M, Bvh
 from rfgs_core.simulate.geometry.faces import Faces
-from rfgs_core.simulate.geometry.rays import blocked, nearest
+from rfgs_core.simulate.geometry.rays import blocked, nearest, new_stack
 
 #: Directions along a side of each of six pictures; things narrower than 0.4° may be overlooked.
 SIZE = 256
@@ -53,7 +53,8 @@ def panorama(faces: Faces, place: np.ndarray, size: int) -> Panorama:
     seen = np.zeros((size + 2, size + 2), dtype=np.float32)
     of = np.full((size + 2, size + 2), -1, dtype=np.int32)
     face = np.zeros((6, size, size), dtype=np.int32)
-    way = np.zeros(3)
+    # Arrays are made once: making them takes as long as the ray.
+    way, unit, stack = np.zeros(3), np.zeros(3), new_stack()
     for side in range(6):
         axis = side // 2
         for i in range(size + 2):
@@ -61,8 +62,9 @@ def panorama(faces: Faces, place: np.ndarray, size: int) -> Panorama:
                 way[axis] = 1.0 - 2.0 * (side % 2)
                 way[(axis + 1) % 3] = (2.0 * i - 1.0) / size - 1.0
                 way[(axis + 2) % 3] = (2.0 * j - 1.0) / size - 1.0
-                unit = way / math.sqrt((way * way).sum())
-                seen[i, j], hit = nearest(faces.bvh, place, unit, SAME_M)
+                length = math.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
+                unit[0], unit[1], unit[2] = way[0] / length, way[1] / length, way[2] / length
+                seen[i, j], hit = nearest(faces.bvh, place, unit, SAME_M, stack)
                 of[i, j] = faces.of_triangle[hit] if hit >= 0 else -1
         for i in range(size):
             for j in range(size):

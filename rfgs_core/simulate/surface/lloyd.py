@@ -9,9 +9,10 @@ next to the centroid, which lies on the surface where the centroid does not.
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 from scipy.spatial import KDTree
+
+from rfgs_core.simulate.surface.cells import Cells
 
 _SAMPLES_PER_POINT = 40
 _LLOYD_STEPS = 20
@@ -181,33 +182,6 @@ def _moved(corners: np.ndarray, barycentric: np.ndarray, places: np.ndarray) -> 
     along_v = np.einsum("px,px->p", np.cross(u, way), normal) / twice
     found = np.stack([1.0 - along_u - along_v, along_u, along_v], axis=1)
     return np.where(np.abs(found).max(axis=1, keepdims=True) < _FARTHEST, found, barycentric)
-
-
-class Cells:
-    """Which centre is the nearest to each of many places, asked again and again.
-
-    Neighbours are asked one after the other, which finds the tree in the cache, and no further
-    than the farthest of the last time, which cuts the search short. The answers are the same.
-    """
-
-    def __init__(self, places: np.ndarray, along: np.ndarray) -> None:
-        """Args are the places, shape (N, 3), and their order along a space-filling curve."""
-        self._ordered, self._along = places[along], along
-        self._reach_m = np.inf
-
-    def around(self, centres: np.ndarray) -> np.ndarray:
-        """Index of the nearest centre of each place, shape (N,)."""
-        # As many threads as the kernels have: one in a tracing process.
-        tree, threads = KDTree(centres), numba.get_num_threads()
-        found = tree.query(self._ordered, distance_upper_bound=self._reach_m, workers=threads)
-        distance_m, nearest = (np.asarray(values) for values in found)
-        (beyond,) = np.nonzero(nearest == tree.n)
-        if len(beyond):
-            distance_m[beyond], nearest[beyond] = tree.query(self._ordered[beyond])
-        self._reach_m = distance_m.max()
-        cell = np.zeros_like(nearest)
-        cell[self._along] = nearest
-        return cell
 
 
 def _morton(places: np.ndarray) -> np.ndarray:

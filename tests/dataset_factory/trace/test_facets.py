@@ -7,8 +7,8 @@ import trimesh
 from scipy.spatial import KDTree
 
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.simulate.surface.cells import Cells
 from rfgs_core.simulate.surface.facets import facet_sum
-from rfgs_core.simulate.surface.lloyd import Cells
 from rfgs_core.simulate.surface.points import surface_points
 
 FREQ_HZ = np.array([5.8e9])
@@ -126,6 +126,15 @@ def test_nearest_centres_are_those_of_a_plain_search() -> None:
         centres = rng.normal(size=(count, 3)) + 0.1 * count
         _, nearest = KDTree(centres).query(places)
         np.testing.assert_array_equal(cells.around(centres), nearest)
+
+
+def test_of_centres_that_are_as_near_the_tree_says_which() -> None:
+    """Points of datasets stay where they were."""
+    centres = np.stack(np.meshgrid(*3 * [np.arange(4.0)]), axis=-1).reshape(-1, 3)
+    centres = np.random.default_rng(5).permutation(centres)
+    places = centres[:40] + [0.5, 0.5, 0.0]
+    _, nearest = KDTree(centres).query(places)
+    np.testing.assert_array_equal(Cells(places, np.arange(40)).around(centres), nearest)
 
 
 def test_small_inner_parts_are_left_out() -> None:

@@ -74,7 +74,7 @@ def test_a_refitted_hierarchy_meets_what_has_moved() -> None:
         np.testing.assert_array_equal(found, share < 1.0)
     lengths = np.linalg.norm(ends - PLACE, axis=1)
     for end, length, at in zip(ends, lengths, share, strict=True):
-        got, index = nearest(bvh, PLACE, (end - PLACE) / length, 1e-6)
+        got, index = nearest(bvh, PLACE, (end - PLACE) / length, 1e-6, stack)
         if at < 1.0:
             assert index >= 0 and abs(got - at * length) < 1e-6
 

@@ -132,7 +132,7 @@ def test_of_centres_that_are_as_near_the_tree_says_which() -> None:
     """Points of datasets stay where they were."""
     centres = np.stack(np.meshgrid(*3 * [np.arange(4.0)]), axis=-1).reshape(-1, 3)
     centres = np.random.default_rng(5).permutation(centres)
-    places = centres[:40] + [0.5, 0.5, 0.0]
+    places = centres[:40] + np.array([0.5, 0.5, 0.0])
     _, nearest = KDTree(centres).query(places)
     np.testing.assert_array_equal(Cells(places, np.arange(40)).around(centres), nearest)
 

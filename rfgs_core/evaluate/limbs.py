@@ -23,7 +23,7 @@ from rfgs_core.evaluate.grid import Grid, splat_gaussians
 from rfgs_core.limbs.evidence.library import headings_of, upright
 from rfgs_core.limbs.evidence.tell import tell
 from rfgs_core.limbs.network import LimbNetwork
-from rfgs_core.limbs.propose import Joints, propose, smoothed
+from rfgs_core.limbs.propose import Joints, combined, propose, smoothed
 from rfgs_core.limbs.skins import PosedPeople
 from rfgs_core.measure.observations import Observations, observe
 from rfgs_core.seeds import sub_seed
@@ -35,6 +35,8 @@ LIMBS = [
     JOINTS.index(f"{s}_{n}") for s in ("left", "right") for n in ("knee", "ankle", "elbow", "wrist")
 ]
 WRISTS = [JOINTS.index(f"{s}_wrist") for s in ("left", "right")]
+#: Rows that are told together.
+_SMOOTH, _EVIDENCE = "network, smoothed", "evidence of a walk"
 #: Seed of walks and of whose radio is swapped.
 _SEED = 0
 #: Walks whose mean pose is a row, and moments of each.
@@ -113,10 +115,14 @@ def limb_table(
     person = Person.of(sequence, radio, frames, everything, on_frame)
     # Frames from the other half of the sequence.
     other = [(k + len(frames) // 2) % len(frames) for k in range(len(frames))]
-    rows: dict[str, Float64[np.ndarray, "frame 17 3"]] = {}
-    if network is not None:
-        rows |= _by_network(network, person, other)
-    rows |= _by_evidence(person, other, _SEED)
+    told = {} if network is None else _by_network(network, person, other)
+    told |= _by_evidence(person, other, _SEED)
+    if _SMOOTH in told and _EVIDENCE in told:
+        both = combined(told[_EVIDENCE], told[_SMOOTH])
+        told = {"evidence and network together": _on_bodies(both)} | told
+    if _SMOOTH in told:
+        told[_SMOOTH] = _on_bodies(told[_SMOOTH])
+    rows = {name: joints.xyz[:, 0] for name, joints in told.items()}
     mean, phases = _walking(person, _SEED)
     own = people().body(np.zeros(0))
     rows |= {
@@ -129,31 +135,31 @@ def limb_table(
     return {name: _scores(joints, person, surfaces) for name, joints in rows.items()}
 
 
-def _by_network(
-    network: LimbNetwork, person: Person, other: list[int]
-) -> dict[str, Float64[np.ndarray, "frame 17 3"]]:
+def _by_network(network: LimbNetwork, person: Person, other: list[int]) -> dict[str, Joints]:
     """Joints by the network, and those it gives to the radio of other frames."""
     proposed = _proposed(network, person, person.seen)
     swapped = _proposed(network, person, [person.seen[k] for k in other])
-    smooth = smoothed(proposed, person.time_s)
     return {
-        "network, smoothed": PosedPeople.through(smooth).joints17()[:, 0],
-        "network, one frame": proposed.xyz[:, 0],
-        "radio of another frame": swapped.xyz[:, 0],
+        _SMOOTH: smoothed(proposed, person.time_s),
+        "network, one frame": proposed,
+        "radio of another frame": swapped,
     }
 
 
-def _by_evidence(
-    person: Person, other: list[int], seed: int
-) -> dict[str, Float64[np.ndarray, "frame 17 3"]]:
+def _by_evidence(person: Person, other: list[int], seed: int) -> dict[str, Joints]:
     """Joints by evidence, and by that of other frames' radio, where they are told."""
     swapped = [
         replace(person.seen[k], time_s=one.time_s)
         for k, one in zip(other, person.seen, strict=True)
     ]
-    rows = {"evidence of a walk": person.seen, "evidence, radio of another frame": swapped}
+    rows = {_EVIDENCE: person.seen, "evidence, radio of another frame": swapped}
     told = {name: tell(seen, person.axes_xy, seed) for name, seen in rows.items()}
-    return {name: one.joints.xyz[:, 0] for name, one in told.items() if one is not None}
+    return {name: one.joints for name, one in told.items() if one is not None}
+
+
+def _on_bodies(joints: Joints) -> Joints:
+    """Joints of the bodies that are posed through them, as a run has them."""
+    return Joints(PosedPeople.through(joints).joints17(), joints.sigma_m)
 
 
 def _proposed(network: LimbNetwork, person: Person, seen: list[Observations]) -> Joints:

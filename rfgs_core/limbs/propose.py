@@ -108,3 +108,13 @@ def smoothed(joints: Joints, time_s: Float64[np.ndarray, "frame"]) -> Joints:
         xyz[frame] = np.einsum("bjk,bjkx->bjx", inverse[..., 0, :], moment)
         sigma[frame] = joints.sigma_m[near].mean(axis=0)
     return Joints(xyz, sigma)
+
+
+def combined(one: Joints, other: Joints) -> Joints:
+    """Joints told in two ways whose errors have little to do with each other.
+
+    Each way weighs 1/σ², as the product of two Gaussian densities does.
+    """
+    weights = [joints.sigma_m**-2.0 for joints in (one, other)]
+    share = (weights[0] / (weights[0] + weights[1]))[..., None]
+    return Joints(share * one.xyz + (1.0 - share) * other.xyz, sum(weights) ** -0.5)

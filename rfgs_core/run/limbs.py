@@ -20,7 +20,7 @@ from rfgs_core.bodies.tracks import Tracks
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.fit.frame import OnSkins, followed
 from rfgs_core.limbs.evidence.tell import long_enough, looks, stands, tell
-from rfgs_core.limbs.propose import SMOOTH_S, Joints, propose, smoothed
+from rfgs_core.limbs.propose import SMOOTH_S, Joints, combined, propose, smoothed
 from rfgs_core.limbs.skins import PosedPeople
 from rfgs_core.limbs.weights import Trained, own_network
 from rfgs_core.measure.observations import Observations
@@ -57,7 +57,7 @@ class Limbs:
     tracks: list[Tracks]
     """Where people are in each frame, and how fast."""
     joints: Joints
-    """What the network says, smoothed, or evidence, shape (frame, body, 17, ·)."""
+    """What evidence and the network say, shape (frame, body, 17, ·)."""
     people: PosedPeople
     """Bodies in these poses."""
 
@@ -92,7 +92,7 @@ def limbs_wanted(run: Run, config: TrainConfig) -> bool:
 
 
 def limbs_network(run: Run) -> Trained | None:
-    """The network for a run's radio; None where there is none, and evidence tells or nothing."""
+    """The network for a run's radio; None where there is none, and evidence alone may tell."""
     coordinates = run.sequence.coordinates(run.config.radio)
     return own_network(np.asarray(coordinates["freq_hz"].values, dtype=np.float64))
 
@@ -105,9 +105,9 @@ def find_limbs(
 ) -> Limbs | None:
     """Follows people through a run's frames and poses them; what is kept is read.
 
-    Evidence tells those of people who walk, the network those of everybody else; where it tells
-    some, others stand. Frames of the sequence beside those of the run, near enough to smooth them,
-    are read as well.
+    Evidence tells those of people who walk, the network those of everybody: both together count
+    where both tell. Where neither does for some, these stand. Frames of the sequence beside those
+    of the run, near enough to smooth them, are read as well.
 
     Args:
         run: The run.
@@ -146,8 +146,11 @@ def find_limbs(
     if walks:
         told = _by_evidence(alone, tracks, config.seed, on_frame)
     if trained is not None:
-        said = _by_network(trained, alone, tracks) if None in told else told
-        told = [one or other for one, other in zip(told, said, strict=True)]
+        said = _by_network(trained, alone, tracks)
+        told = [
+            other if one is None else combined(one, other)
+            for one, other in zip(told, said, strict=True)
+        ]
     joints = _together(told, alone, tracks)
     if joints is None:
         return None
@@ -205,10 +208,10 @@ def _by_evidence(
 
 def _by_network(
     trained: Trained, alone: list[list[Observations]], tracks: list[Tracks]
-) -> list[Joints | None]:
+) -> list[Joints]:
     """Joints of each person in all frames, on curves through them."""
     time_s = np.array([track.time_s for track in tracks])
-    found: list[Joints | None] = []
+    found = []
     for body in range(len(alone[0])):
         said = [
             propose(trained.network, frame[body], track.axes_xy[[body]])

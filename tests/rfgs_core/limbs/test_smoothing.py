@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rfgs_core.articulated import people
-from rfgs_core.limbs.propose import SMOOTH_S, Joints, smoothed
+from rfgs_core.limbs.propose import SMOOTH_S, Joints, combined, smoothed
 from rfgs_core.limbs.skins import PosedPeople
 from rfgs_core.worlds.motion import random_motion
 
@@ -40,6 +40,27 @@ def test_noise_is_averaged_and_outliers_with_a_large_sigma_are_ignored() -> None
     sigma[4] = 1e3
     told = smoothed(Joints(xyz, sigma), TIME_S).xyz
     assert np.linalg.norm(told - truth, axis=-1).mean() < before
+
+
+def test_two_ways_together_are_nearer_than_either_and_say_how_near() -> None:
+    rng = np.random.default_rng(3)
+    truth, _ = noisy(0.0)
+    sigmas = rng.uniform(0.02, 0.2, (2, *truth.shape[:3]))
+    ways = [
+        # σ is of a length in three dimensions.
+        Joints(truth + rng.normal(size=truth.shape) * sigma[..., None] / np.sqrt(3.0), sigma)
+        for sigma in sigmas
+    ]
+    both = combined(*ways)
+    errors = [np.sqrt(np.mean((way.xyz - truth) ** 2)) for way in (*ways, both)]
+    assert errors[2] < 0.8 * min(errors[:2])
+    scaled = np.linalg.norm(both.xyz - truth, axis=-1) / both.sigma_m
+    assert np.sqrt(np.mean(scaled**2)) == pytest.approx(1.0, abs=0.1)
+    swapped = combined(*ways[::-1])
+    np.testing.assert_allclose(swapped.xyz, both.xyz, atol=1e-12)
+    # Who knows nothing has no say.
+    blind = Joints(ways[1].xyz + 5.0, np.full_like(sigmas[1], 1e4))
+    np.testing.assert_allclose(combined(ways[0], blind).xyz, ways[0].xyz, atol=1e-3)
 
 
 def test_frames_far_apart_are_left_alone() -> None:

@@ -134,6 +134,27 @@ def test_without_a_network_evidence_tells_who_walks(
         assert np.abs(pelvis - found).max() < 0.1
 
 
+def test_evidence_and_a_network_count_together(
+    network: Path, train, tiny_dataset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    alone = read_limbs(train(tiny_dataset, tmp_path / "alone", CONFIG).path)
+    assert alone is not None
+    aside = alone.joints.xyz + np.array([0.3, 0.0, 0.0])
+    sigma = np.full((2, 1, 17), 0.06)
+
+    def tell(*_: object) -> Told:
+        return Told(Joints(aside, sigma), 5.0, 1.0)
+
+    monkeypatch.setattr(limbs_of_run, "long_enough", lambda time_s: True)
+    monkeypatch.setattr(limbs_of_run, "tell", tell)
+    both = read_limbs(train(tiny_dataset, tmp_path / "both", CONFIG).path)
+    assert both is not None
+    share = sigma**-2.0 / (sigma**-2.0 + alone.joints.sigma_m**-2.0)
+    moved = both.joints.xyz - alone.joints.xyz
+    np.testing.assert_allclose(moved[..., 0], 0.3 * share, atol=1e-6)
+    assert (both.joints.sigma_m < np.minimum(0.06, alone.joints.sigma_m)).all()
+
+
 def test_of_two_people_one_walks_and_the_other_stands(
     tiny_dataset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -24,7 +24,7 @@ from .splats import COLOR, POSITION, ROTATION, SCALE
 _NAMES = (*POSITION, "nx", "ny", "nz", *COLOR, "opacity", *SCALE, *ROTATION)
 #: The same file is imported at least so many times, and until so many seconds of it were timed:
 #: what takes a moment is easily doubled by other work on the machine.
-_TIMES, _SPAN_S = 3, 2.0
+_TIMES, _SPAN_S = 3, 1.0
 
 
 def bench_gaussians(

@@ -12,6 +12,8 @@ from rfgs_core.errors import RfgsError
 
 Objective = Literal["paper", "csi", "both"]
 Recipe = Literal["rfgs", "paper"]
+#: prior: where bodies are likely; random: anywhere in the bounds, every frame anew.
+Start = Literal["prior", "random"]
 EncoderKind = Literal["matched_filter", "cnn", "paths"]
 #: complex: the channel itself; power: |csi|² per link and subcarrier; delay_power: the power of
 #: each link's delay profile; csi_ratio, conjugate: what the links of one packet between two devices
@@ -39,8 +41,9 @@ Density = Literal["none", "paper", "3dgs", "residual", "motion"]
 class TrainOptions:
     """What a user chooses of a training run; each is an option of `rfgs train`."""
 
-    objective: Objective = "csi"
-    """csi: the propagation model; paper: eq. 4-7 of the paper; both: their sum."""
+    objective: Objective | None = None
+    """csi: the propagation model; paper: eq. 4-7 of the paper; both: their sum. Left out: the
+    recipe's own."""
     channel: Observed = "clean"
     """clean: the traced channel; impaired: what `rfgs-factory impair` made of it. The empty room
     stays clean, since its capture can be averaged."""
@@ -63,7 +66,11 @@ class TrainOptions:
     motion, between frames, more for a body that moves fast and fewer for one that stands still.
     Left out: paper with the paper's losses, else none."""
     recipe: Recipe = "rfgs"
-    """rfgs: our start, rates and steps; paper: the paper's numbers (sections 3.2-3.6)."""
+    """rfgs: our start, objective, rates and steps; paper: the paper's (sections 3.2-3.6)."""
+    start: Start | None = None
+    """Where Gaussians start: prior, where the radio finds bodies, on what is likely of them;
+    random, anywhere in the bounds, which knows of no bodies. Left out: random with the paper's
+    recipe and its objective, else prior."""
     calibrate: Calibrate = "none"
     """Estimate each device's phase and timing offset and take them out: of oscillators (phase), of
     clocks (timing) or both. From the empty room first, then together with the Gaussians."""
@@ -92,7 +99,7 @@ class TrainOptions:
         Raises:
             RfgsError: One is out of range, or two do not go together.
         """
-        if self.without and self.objective == "csi":
+        if self.without and _objective(self) == "csi":
             raise RfgsError(
                 "--without leaves out parts of the paper's losses; expected --objective paper or "
                 "both"
@@ -100,6 +107,14 @@ class TrainOptions:
         if not self.temporal >= 0.0:
             raise RfgsError(f"--temporal {self.temporal}: expected at least 0")
 
+
+def _objective(options: TrainOptions) -> Objective:
+    """The objective that is asked for, or else the recipe's own."""
+    return options.objective or ("paper" if options.recipe == "paper" else "csi")
+
+
+#: Gaussians of a random start, the least of the paper's M (section 3.3).
+RANDOM_GAUSSIANS = 100_000
 
 #: What numbers may be; beyond these something else was meant.
 _LIMITS: dict[str, tuple[float, float]] = {
@@ -121,6 +136,10 @@ _LIMITS: dict[str, tuple[float, float]] = {
 class TrainConfig(TrainOptions):
     """Settings of the fit of one frame; saved as JSON beside every result."""
 
+    objective: Objective = "csi"
+    """What is descended on."""
+    start: Start = "prior"
+    """Where Gaussians start."""
     packets: Packets = "first"
     """Which packets of a frame are read; see `packets_to_read`."""
     num_gaussians: int = 6000
@@ -159,15 +178,44 @@ class TrainConfig(TrainOptions):
                 option = {"num_gaussians": "gaussians"}.get(name, name)
                 bounds = f"at least {least}" if value < least else f"at most {most}"
                 raise RfgsError(f"--{option.replace('_', '-')} {value}: expected {bounds}")
+        if self.start == "random":
+            self._need_paper()
+
+    def _need_paper(self) -> None:
+        """Refuses what knows of bodies or of the frame before, beside a start that does not."""
+        if self.recipe != "paper" or self.objective != "paper":
+            raise RfgsError(
+                "--start random is the paper's: its losses draw Gaussians to where echoes come "
+                "from; expected --recipe paper with --objective paper"
+            )
+        if self.temporal:
+            raise RfgsError(
+                f"--temporal {self.temporal:g} holds Gaussians from frame to frame, and --start "
+                "random draws every frame anew; expected --start prior"
+            )
+        if self.calibrate != "none":
+            raise RfgsError(
+                f"--calibrate {self.calibrate} finds offsets by the echoes of bodies, and --start "
+                "random knows of none; expected --start prior"
+            )
+        if self.density in ("motion", "residual"):
+            raise RfgsError(
+                f"--density {self.density} puts Gaussians on bodies, and --start random knows of "
+                "none; expected --start prior"
+            )
 
     @staticmethod
     def chosen(
         options: TrainOptions, *, iterations: int | None = None, num_gaussians: int | None = None
     ) -> TrainConfig:
         """Settings of the chosen recipe; what is None is the recipe's own."""
-        paper = options.recipe == "paper"
+        paper, objective = options.recipe == "paper", _objective(options)
+        start = options.start or ("random" if paper and objective == "paper" else "prior")
         own = {"iterations": 10_000, "refine_levels": 0} if paper else {}
+        if start == "random":
+            own["num_gaussians"] = RANDOM_GAUSSIANS
         asked = {"iterations": iterations, "num_gaussians": num_gaussians}
         values = {field.name: getattr(options, field.name) for field in fields(TrainOptions)}
+        values |= {"objective": objective, "start": start}
         asked = {name: value for name, value in asked.items() if value is not None}
         return TrainConfig(**{**values, **own, **asked})

@@ -30,7 +30,9 @@ class Moving:
 
     @property
     def body(self) -> Int64[np.ndarray, "M"]:
-        """Body that each belongs to."""
+        """Body that each belongs to; −1 where there are none."""
+        if len(self.bodies.axes_xy) == 0:
+            return np.full(len(self.points), -1, dtype=np.int64)
         return nearest_axis(self.points, self.bodies.axes_xy)
 
 

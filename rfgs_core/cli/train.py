@@ -95,7 +95,8 @@ def run(args: TrainArgs) -> int:
             dataset, sequence, args.radio, frames, config, args.out, encoder_file,
             people=args.people, log=args.log,
         )  # fmt: skip
-    sys.stdout.write(f"people: {HeadCount.read(args.out)}\n")
+    if (heads := HeadCount.read(args.out)) is not None:
+        sys.stdout.write(f"people: {heads}\n")
     if args.options.calibrate != "none":
         sys.stdout.write(f"offsets: {calibration_text(args.out, frames)}\n")
     if shader and not (args.out / "shader.npz").exists():

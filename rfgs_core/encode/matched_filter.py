@@ -11,6 +11,8 @@ link, which is exact to the interpolation error of a linear reading between prof
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from jaxtyping import Complex, Float, Float32, Float64, Int
 
@@ -20,6 +22,7 @@ from rfgs_core.encode.back_projection import (
     back_project,
     oversampled_profiles,
 )
+from rfgs_core.encode.preprocess import hamming, normalise_subcarriers
 from rfgs_core.encode.protocol import FEATURES, FrameChannel
 from rfgs_core.radio import Layout
 
@@ -123,12 +126,17 @@ def matched_filter_map(
     return np.abs(matched_filter(csi, layout, pair, freq_hz, points)[:, 0]) ** 2
 
 
+@dataclass(frozen=True)
 class MatchedFilter:
     """The default encoder: matched-filter amplitude per sub-band, incoherent between pairs.
 
     The entries are ordered by frequency, which gives the paper's gradient across frequency bins
     (section 3.5) a meaning.
     """
+
+    preprocessed: bool = False
+    """Whether every subcarrier is divided by its RMS amplitude and the band is weighed by a Hamming
+    window first (paper section 3.6). Phases stay complex, so that none has to be unwrapped."""
 
     def __call__(
         self, seen: FrameChannel, points: Float64[np.ndarray, "N 3"]
@@ -138,15 +146,24 @@ class MatchedFilter:
         # A radio with fewer subcarriers than features has its sub-bands repeated, still in order.
         repeated = np.arange(FEATURES) * bands // FEATURES
         pair, _ = seen.pairs
+        delta = _preprocessed(seen) if self.preprocessed else seen.delta
         rows = [np.zeros((0, FEATURES), np.float32)]
         # Images of all pairs and sub-bands at once would take a gigabyte for the paper's grid.
         for start in range(0, len(points), POINTS):
             here = points[start : start + POINTS]
-            focused = matched_filter(seen.delta, seen.layout, pair, seen.freq_hz, here, bands)
+            focused = matched_filter(delta, seen.layout, pair, seen.freq_hz, here, bands)
             power = (np.abs(focused) ** 2).mean(axis=0)
             rows.append(np.sqrt(power).T[:, repeated])
         return np.concatenate(rows)
 
 
-#: It has no settings, so one is enough.
-MATCHED_FILTER = MatchedFilter()
+def _preprocessed(seen: FrameChannel) -> Complex[np.ndarray, "tx rx subcarrier"]:
+    """The change over the RMS of its links at each subcarrier, windowed over the whole band."""
+    normalised, _ = normalise_subcarriers(seen.delta, seen.links)
+    freq_hz = seen.freq_hz
+    window = hamming(freq_hz, 0.5 * float(freq_hz[0] + freq_hz[-1]), float(np.ptp(freq_hz)))
+    return (normalised * window).astype(np.complex64)
+
+
+#: The filter as it is, and as the paper preprocesses.
+MATCHED_FILTER, PAPER_FILTER = MatchedFilter(), MatchedFilter(preprocessed=True)

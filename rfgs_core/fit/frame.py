@@ -27,8 +27,8 @@ from rfgs_core.fit.sampling import encode
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.measure.observations import Observations
 from rfgs_core.model.channel import Channel
-from rfgs_core.model.first_gaussians import gaussians_at
-from rfgs_core.model.first_powers import fit_power, new_head
+from rfgs_core.model.first_gaussians import gaussians_at, lone_gaussians
+from rfgs_core.model.first_powers import fit_power, level_of_power, new_head
 from rfgs_core.model.head import RadioHead
 from rfgs_core.model.reflectivity import fitted_reflectivities
 from rfgs_core.seeds import sub_seed
@@ -159,6 +159,41 @@ def start_frame(
     normals = outward_normals(points, bodies)
     state = state_at(points, normals, observations, config, tracks, encoder, head)
     return replace(state, track_id=track_id, goes_on=goes_on, next_track=next_track)
+
+
+def start_anywhere(
+    observations: Observations,
+    config: TrainConfig,
+    seed: int,
+    before: FrameState | None,
+    encoder: Encoder = MATCHED_FILTER,
+) -> FrameState:
+    """Gaussians anywhere in the bounds, as the paper starts: they know of no bodies.
+
+    Nothing but the head goes on from frame to frame, and no track number is given twice. Each has
+    the features of its place, as new ones have in section 3.5 of the paper.
+
+    Args:
+        observations: The frame.
+        config: Settings.
+        seed: Seed of the draw.
+        before: The fitted frame before; None in a first one.
+        encoder: φ.
+
+    Raises:
+        RfgsError: Nobody changes the channel.
+    """
+    _need_change(observations)
+    low, high = observations.bounds_m
+    points = np.random.default_rng(seed).uniform(low, high, (config.num_gaussians, 3))
+    at = encode(observations, points, encoder)
+    gaussians = lone_gaussians(at.xyz, at.features)
+    power = level_of_power(observations, gaussians)
+    head = new_head(observations, config, power) if before is None else before.head
+    first = 0 if before is None else before.unused_track
+    track_id = first + np.arange(len(points), dtype=np.int64)
+    nobody = Tracks.begun(np.zeros((0, 2)), observations.time_s)
+    return FrameState(gaussians, power, head, nobody, track_id, next_track=first + len(points))
 
 
 def state_at(

@@ -40,7 +40,10 @@ def nearest_gaussian(
     """Index of and distance [m] to the Gaussian closest to each point."""
     if means.device.type != "cpu":
         return _nearest_in_batches(points, means.detach())
-    distance, index = KDTree(means.detach().numpy()).query(points.numpy())
+    # Of a tree that few points ask, most of the time is its making: half as long unbalanced.
+    much = len(points) >= len(means)
+    tree = KDTree(means.detach().numpy(), compact_nodes=much, balanced_tree=much)
+    distance, index = tree.query(points.numpy())
     return torch.from_numpy(np.asarray(index)), torch.from_numpy(np.asarray(distance)).float()
 
 

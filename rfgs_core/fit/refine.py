@@ -226,7 +226,8 @@ def density_control(
     need_sample_points(config)
     kind = config.density or ("none" if task.points is None else "paper")
     if kind == "paper":
-        return PaperDensity(DensityRule.without(config.without))
+        assert task.points is not None
+        return PaperDensity(DensityRule.without(config.without), task.points)
     if kind == "3dgs":
         layout = observations.layout
         antennas = np.concatenate([layout.tx_xyz, layout.rx_xyz])
@@ -292,18 +293,21 @@ def _with_gaussians(
 ) -> FrameState:
     """The state with the trained Gaussians; what came anew has its own power and track.
 
-    With the paper's objective features are no reflectivities, and all powers are new.
+    With the paper's objective features are no reflectivities: powers are shared by α ‖f‖², whether
+    rows have come or gone or not, and together stay what the start explained the channel with.
     """
     gaussians = on_device(trained.gaussians.detach(), state.gaussians.means.device)
+    if config.objective == "paper":
+        strength = torch.linalg.norm(gaussians.features, dim=1) ** 2 * gaussians.opacities
+        share = strength / strength.sum().clamp(min=1e-30)
+        state = replace(state, power=share * state.power.sum())
     if not trained.edited:
         return replace(state, gaussians=gaussians)
     origin = trained.origin.to(gaussians.means.device)
     unused = state.unused_track
     tracks = {"track_id": _tracks(state.track_id, origin.numpy(), unused), "next_track": unused}
     if config.objective == "paper":
-        strength = torch.linalg.norm(gaussians.features, dim=1) ** 2 * gaussians.opacities
-        power = strength * state.head.gamma_scale_m**2
-        return replace(state, gaussians=gaussians, power=power, **tracks)
+        return replace(state, gaussians=gaussians, **tracks)
     known = origin >= 0
     shares = torch.bincount(origin[known], minlength=len(state.power)).clamp(min=1)
     inherited = (state.power / shares)[origin.clamp(min=0)]

@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from jaxtyping import Float, Float64
 
-from rfgs_core.encode import MATCHED_FILTER, Encoder, unit_rms
+from rfgs_core.encode import Encoder, MatchedFilter, unit_rms
 from rfgs_core.errors import RfgsError
 from rfgs_core.fit.losses import SamplePoints
 from rfgs_core.measure.delay_maps import delay_features
@@ -72,7 +72,7 @@ def _features(
     """
     if observations.kind != "delay_power":
         return encoder(observations, points)
-    if encoder is not MATCHED_FILTER:
+    if not isinstance(encoder, MatchedFilter):
         raise RfgsError(
             "a learned encoder reads the channel over subcarriers, and `--observe delay_power` "
             "hides it; leave --encoder out, or choose --observe complex or power"

@@ -14,6 +14,8 @@ from rfgs_core.gaussians import FEATURE_DIM, Gaussians
 
 #: Standard deviation of a new Gaussian along the surface and across it [m].
 START_SCALES_M = (0.04, 0.04, 0.025)
+#: Standard deviation [m] and opacity of a Gaussian that knows of no surface (paper section 3.5).
+LONE_SCALE_M, LONE_OPACITY = 0.01, 0.1
 #: Layers that the new Gaussians put on a body's silhouette. The shadow model multiplies
 #: transmissions of complex blobs, which is only sound while few layers overlap.
 START_COVERAGE = 1.5
@@ -46,4 +48,23 @@ def gaussians_at(
         log_scales=torch.log(torch.tensor(scales_m)).repeat(count, 1),
         logit_opacities=torch.logit(opacity),
         features=torch.zeros(count, FEATURE_DIM),
+    )
+
+
+def lone_gaussians(
+    xyz: Float[Tensor, "N 3"],
+    features: Float[Tensor, "N 32"],
+    scale_m: float = LONE_SCALE_M,
+    opacity: float = LONE_OPACITY,
+) -> Gaussians:
+    """Small round Gaussians that no surface turns, as the paper's density control makes them."""
+    count = len(xyz)
+    quats = xyz.new_zeros(count, 4)
+    quats[:, 0] = 1.0
+    return Gaussians(
+        means=xyz,
+        quats=quats,
+        log_scales=torch.full_like(xyz, math.log(scale_m)),
+        logit_opacities=xyz.new_full((count,), math.log(opacity / (1.0 - opacity))),
+        features=features,
     )

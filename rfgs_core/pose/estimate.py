@@ -55,6 +55,8 @@ def estimate_poses(run: Run, on_step: Callable[[], Any] = lambda: None) -> PoseE
     Raises:
         RfgsError: The run does not say which Gaussian belongs to whom.
     """
+    if run.config.settings.start == "random":
+        raise RfgsError(f"{run.path}: --start random knows of no people; train with --start prior")
     sequence = run.sequence
     floor_m = float(np.asarray(sequence.bounds_m)[0, 2])
     clouds = [_clouds(run, frame, floor_m) for frame in run.frames]

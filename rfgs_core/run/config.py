@@ -82,6 +82,8 @@ class RunConfig:
                 f"{path}: expected schema {SCHEMA}, found {stored.get('schema')}; "
                 "use the version of rfgs that made it, or train again"
             )
+        # Runs without a word of it started from the prior.
+        stored.setdefault("start", "prior")
         _need_entries(path, stored)
         own = {name: stored[name] for name in (*_OWN, "train_s") if name in stored}
         try:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from rfgs_core.dataset import Sequence
-from rfgs_core.encode import MATCHED_FILTER, Encoder
+from rfgs_core.encode import MATCHED_FILTER, PAPER_FILTER, Encoder
 from rfgs_core.encode.learned import load_encoder
 from rfgs_core.encode.learned.signature import RadioSignature
 from rfgs_core.encode.path_features import PathFeatures
@@ -82,7 +82,8 @@ def run_encoder(run: Path, config: RunConfig, sequence: Sequence, frame: int) ->
     if config.settings.encoder == "paths":
         return PathFeatures(moving_paths(sequence, config.radio, frame))
     if config.settings.encoder != "cnn":
-        return MATCHED_FILTER
+        # Networks bring the preprocessing that they were trained with.
+        return PAPER_FILTER if config.settings.recipe == "paper" else MATCHED_FILTER
     file = run / ENCODER_FILE
     expected = config.settings.encoder_sha256
     if file.is_file() and sha256(file) != expected:

@@ -187,7 +187,10 @@ class Run:
         return read_ply(self.ply_path(frame), _REMEDY).to_gaussians(features)
 
     def bodies(self, frame: int) -> Bodies | None:
-        """Where the bodies of a frame are and how they hold themselves; None without checkpoint.
+        """Where the bodies of a frame are and how they hold themselves.
+
+        Returns:
+            None without checkpoint, and of a run that knows of no bodies.
 
         Raises:
             RfgsFormatError: The checkpoint is damaged, or of a version that told no postures.
@@ -200,6 +203,8 @@ class Run:
         types["lying"] = "f8"
         may_be_nan, lying = ("knees_rad", "lying"), {"lying": ("body", 2)}
         stored = load_arrays(path, _REMEDY, shapes, may_be_nan, types=types, optional=lying)
+        if len(stored["axes_xy"]) == 0:
+            return None
         return Bodies(stored["axes_xy"], stored["knees_rad"], stored.get("lying"))
 
     @property

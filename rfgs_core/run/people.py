@@ -109,6 +109,19 @@ def why_not_sensed(sequence: Sequence, radio: str, config: TrainConfig, fewest: 
     return None
 
 
+def need_no_people(config: TrainConfig, people: People) -> None:
+    """Refuses to count people for a start that knows of none.
+
+    Raises:
+        RfgsError: They shall be sensed, or so many be there.
+    """
+    if config.start == "random" and people not in ("auto", "told"):
+        raise RfgsError(
+            f"--people {people}: --start random knows of no people; leave it out, or choose "
+            "--start prior"
+        )
+
+
 def counted(
     out: Path,
     sequence: Sequence,
@@ -116,8 +129,10 @@ def counted(
     frames: list[int],
     config: TrainConfig,
     people: People,
-) -> HeadCount:
+) -> HeadCount | None:
     """How many people a run in a folder is about; sensing is not repeated where it knows.
+
+    None of a run from a random start, which knows of nobody.
 
     Args:
         out: Folder of the run, which may be new.
@@ -130,6 +145,8 @@ def counted(
     Raises:
         RfgsError: They shall be sensed where that cannot be, or nobody is sensed.
     """
+    if config.start == "random":
+        return None
     kept = HeadCount.read(out)
     if kept is None and (out / CONFIG_FILE).exists():
         # Runs without a word of it were told.

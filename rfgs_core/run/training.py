@@ -22,7 +22,7 @@ from rfgs_core.device import need_device
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import sweep
 from rfgs_core.fit.calibrate import calibrate
-from rfgs_core.fit.frame import FrameState, start_frame, start_on_skins
+from rfgs_core.fit.frame import FrameState, start_anywhere, start_frame, start_on_skins
 from rfgs_core.fit.refine import need_sample_points
 from rfgs_core.fit.stages import fit_frame
 from rfgs_core.gaussians.ply import GaussianCloud, read_ply, write_ply
@@ -62,7 +62,7 @@ from rfgs_core.run.limbs import (
     looks_at,
 )
 from rfgs_core.run.log import Scalars, TrainingLog
-from rfgs_core.run.people import People, counted
+from rfgs_core.run.people import People, counted, need_no_people
 from rfgs_core.run.static import (
     has_static_set,
     need_phases,
@@ -103,6 +103,7 @@ def train_sequence(
         RfgsError: `out` holds a run with other settings, or they do not go together or ask of the
             radio and the sequence what these do not have.
     """
+    need_no_people(config, people)
     _check(dataset, sequence, radio, config)
     if encoder_file is not None:
         refuse_other_radios(encoder_file, sequence, radio, config.packets)
@@ -121,12 +122,13 @@ def train_sequence(
             sequence=sequence.name,
             radio=radio,
             frames=frames,
-            settings=replace(config, bodies=max(heads.count, 1)),
+            settings=config if heads is None else replace(config, bodies=max(heads.count, 1)),
             train_s=round(time.perf_counter() - begin, 2),
         )
         # The file of a run does not keep every setting: the device is free.
         run = _open_or_create(out, asked)
-        heads.write(out)
+        if heads is not None:
+            heads.write(out)
         return _train(run, asked.settings, sequence, encoder_file, log)
 
 
@@ -242,7 +244,9 @@ def _fit(
     if config.density == "motion" and before is not None:
         earlier = run.observations(run.frames[run.frames.index(frame) - 1])
     bar.begin(f"frame {frame}, finding bodies")
-    if limbs is None:
+    if config.start == "random":
+        state = start_anywhere(observations, config, seed, before, encoder)
+    elif limbs is None:
         state = start_frame(observations, config, seed, before, encoder, earlier)
     else:
         skins = limbs.on_skins(frame, config)

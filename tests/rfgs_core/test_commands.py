@@ -23,6 +23,7 @@ from rfgs_core.gaussians.ply import read_ply
 from rfgs_core.run import Run
 
 PICTURES = ("images", "depth", "normal", "mask")
+PAPER = ["--radio", "wifi", "--recipe", "paper"]
 TINY = ["--gaussians", "40", "--iterations", "1", "--posture", "standing", "--no-shader"]
 
 
@@ -94,6 +95,16 @@ def test_train_without_a_dataset(tmp_path: Path, capsys) -> None:
         (["--radio", "wifi", "--channel", "impaired"], "holds no impaired channels"),
         (["--radio", "wifi", "--background", "learned"], "expected at least 3 to learn"),
         (["--radio", "wifi", "--density", "paper"], "reads the sample points of the paper's"),
+        (
+            ["--radio", "wifi", "--start", "random"],
+            "expected --recipe paper with --objective paper",
+        ),
+        ([*PAPER, "--start", "random", "--objective", "both"], "expected --recipe paper with"),
+        ([*PAPER, "--temporal", "0.5"], "--temporal 0.5 holds Gaussians from frame to frame"),
+        ([*PAPER, "--calibrate", "phase"], "--calibrate phase finds offsets by the echoes"),
+        ([*PAPER, "--people", "2"], "--people 2: --start random knows of no people"),
+        ([*PAPER, "--density", "motion"], "--density motion puts Gaussians on bodies"),
+        ([*PAPER, "--density", "residual"], "--density residual puts Gaussians on bodies"),
     ],
 )
 def test_train_refuses_what_the_dataset_does_not_hold(

@@ -79,15 +79,29 @@ def test_the_strongest_of_others_is_named_even_where_it_wins() -> None:
 
 def test_ablations_differ_by_what_they_leave_out() -> None:
     chosen = cells(TABLES["table2"], SIZES["smoke"], 1)
-    assert chosen.pop(0).method == "rfgs"
+    assert [chosen.pop(0).method for _ in range(2)] == ["rfgs", "paper"]
     assert len(chosen) == len(VARIANTS) == 7
     train = [settings_of(cell, SIZES["smoke"])["train"] for cell in chosen]
     # The whole recipe is the row of table 1, so that its cell is shared.
-    assert chosen[0].method == "paper" and train[0]["without"] == []
+    assert chosen[0].method == "paper_prior" and train[0]["without"] == []
     for other in train[1:]:
         changed = {key for key, value in other.items() if value != train[0][key]}
         assert changed in ({"without"}, {"density"})
     assert len({str(one) for one in train}) == 7
+    # Where it was made is no setting of a cell.
+    assert all("device" not in one for one in train)
+
+
+def test_the_papers_recipe_has_both_starts_in_both_tables() -> None:
+    for table in ("table1", "table2"):
+        starts = {}
+        for cell in cells(TABLES[table], SIZES["paper-cpu"], 1):
+            train = settings_of(cell, SIZES["paper-cpu"])["train"]
+            starts[cell.method] = (train["start"], train["num_gaussians"], train["objective"])
+        assert starts["paper"] == ("random", 100_000, "paper")
+        assert starts["paper_prior"] == ("prior", 6000, "paper")
+        assert starts["rfgs"] == ("prior", 6000, "csi")
+    assert {start for start, *_ in starts.values()} == {"prior", "random"}
 
 
 def test_every_radio_is_traced_as_deep_as_it_can_be() -> None:
@@ -107,13 +121,13 @@ def everybody_stands(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
         study.cells,
         "train_config",
-        lambda cell, size: replace(whole(cell, size), posture="standing"),
+        lambda cell, size: replace(whole(cell, size), posture="standing", num_gaussians=200),
     )
 
 
 @pytest.mark.usefixtures("everybody_stands")
 @pytest.mark.parametrize(
-    "method", ["paper", "paper_fixed", "nerf_features", "ngp_propagation_prior"]
+    "method", ["paper", "paper_prior", "paper_fixed", "nerf_features", "ngp_propagation_prior"]
 )
 def test_a_cell_is_kept_until_its_settings_change(
     method: str, tiny_dataset: Path, tmp_path: Path

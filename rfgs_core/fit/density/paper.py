@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
@@ -16,7 +15,7 @@ from torch import Tensor
 
 from rfgs_core.fit.losses import SamplePoints, nearest_gaussian
 from rfgs_core.fit.parameters import TrainableGaussians
-from rfgs_core.gaussians import Gaussians
+from rfgs_core.model.first_gaussians import LONE_OPACITY, LONE_SCALE_M, lone_gaussians
 
 
 @dataclass(frozen=True)
@@ -31,9 +30,9 @@ class DensityRule:
     """A point is poorly covered when its nearest Gaussian is this many medians away."""
     gradient_threshold: float = 0.1
     """τ: least gradient of φ over frequency bins."""
-    scale_m: float = 0.01
+    scale_m: float = LONE_SCALE_M
     """Standard deviation of a new Gaussian [m]."""
-    opacity: float = 0.1
+    opacity: float = LONE_OPACITY
     """Opacity of a new Gaussian."""
     least_opacity: float = 0.005
     """Gaussians more transparent than this go."""
@@ -81,10 +80,16 @@ def redundant(
 
 @dataclass
 class PaperDensity:
-    """The paper's density control, called after every optimisation step."""
+    """The paper's density control, called after every optimisation step.
+
+    Errors are watched where the losses look, on batches. New Gaussians may come at any sample
+    point: the median of section 3.5 is over all of them, and no batch bounds the number.
+    """
 
     rule: DensityRule
     """Thresholds."""
+    points: SamplePoints
+    """All sample points."""
     error_sum: Tensor = field(default_factory=lambda: torch.zeros(0))
     """Feature error of each Gaussian, summed over the current window."""
     error_count: Tensor = field(default_factory=lambda: torch.zeros(0))
@@ -99,7 +104,7 @@ class PaperDensity:
         if step % self.rule.prune_every == 0:
             self._prune(trained)
         if step % self.rule.densify_every == 0:
-            self._densify(trained, points)
+            self._densify(trained)
 
     def _watch(self, step: int, trained: TrainableGaussians, points: SamplePoints) -> None:
         since_prune = step % self.rule.prune_every or self.rule.prune_every
@@ -124,7 +129,8 @@ class PaperDensity:
             trained.edit_rows(~drop)
             self.error_sum = torch.zeros(0)
 
-    def _densify(self, trained: TrainableGaussians, points: SamplePoints) -> None:
+    def _densify(self, trained: TrainableGaussians) -> None:
+        points = self.points
         _, distance = nearest_gaussian(points.xyz, trained.gaussians.means)
         add = distance > self.rule.distance_factor * distance.median()
         add &= frequency_gradient(points.features) >= self.rule.gradient_threshold
@@ -132,18 +138,8 @@ class PaperDensity:
         chosen = torch.nonzero(add)[:room, 0]
         if len(chosen) == 0:
             return
-        xyz = points.xyz[chosen]
-        quats = xyz.new_zeros(len(chosen), 4)
-        quats[:, 0] = 1.0
-        new = Gaussians(
-            means=xyz,
-            quats=quats,
-            log_scales=torch.full_like(xyz, math.log(self.rule.scale_m)),
-            logit_opacities=xyz.new_full(
-                (len(chosen),), math.log(self.rule.opacity / (1 - self.rule.opacity))
-            ),
-            features=points.features[chosen],
-        )
+        at = points.rows(chosen)
+        new = lone_gaussians(at.xyz, at.features, self.rule.scale_m, self.rule.opacity)
         trained.edit_rows(torch.ones_like(trained.origin, dtype=torch.bool), new)
         self.error_sum = torch.zeros(0)
 

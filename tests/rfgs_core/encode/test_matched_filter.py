@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from antennas import one_device
 
-from rfgs_core.encode import MATCHED_FILTER, matched_filter_map, unit_rms
+from rfgs_core.encode import MATCHED_FILTER, PAPER_FILTER, matched_filter_map, unit_rms
 from rfgs_core.encode.matched_filter import matched_filter
 from rfgs_core.radio import Layout, layout, place_devices, preset
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
@@ -207,3 +207,26 @@ def test_left_out_links_are_never_read(small: tuple) -> None:
         other = matched_filter(poisoned, elements, pair, freq_hz, points, bands)
         np.testing.assert_array_equal(other, clean)
         assert np.isfinite(clean).all()
+
+
+def test_the_paper_divides_by_subcarrier_power_and_windows_the_band(small: tuple) -> None:
+    csi, elements, pair, freq_hz = small
+    links, points = pair >= 0, np.random.default_rng(2).uniform(0, 4, (20, 3))
+    uneven = (csi * np.geomspace(1e-3, 1e2, 64)).astype(np.complex64)
+    uneven[..., 5] = 0.0
+
+    def seen(delta: np.ndarray) -> SimpleNamespace:
+        return SimpleNamespace(
+            delta=delta, layout=elements, freq_hz=freq_hz, pairs=(pair, []), links=links
+        )
+
+    power = np.mean(np.abs(uneven[links].astype(np.complex128)) ** 2, axis=0)
+    level = np.where(power > 0.0, np.sqrt(np.where(power > 0.0, power, 1.0)), np.inf)
+    plainly = np.where(links[..., None], uneven / level * np.hamming(64), 0.0)
+    expected = MATCHED_FILTER(seen(plainly.astype(np.complex64)), points)
+    found = PAPER_FILTER(seen(uneven), points)
+    np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-6 * expected.max())
+    # However loud a subcarrier is, it says as much.
+    np.testing.assert_allclose(
+        found[:, 8:], PAPER_FILTER(seen(csi), points)[:, 8:], rtol=1e-3, atol=1e-6 * found.max()
+    )

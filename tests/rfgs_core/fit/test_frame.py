@@ -12,14 +12,16 @@ import pytest
 import torch
 
 from rfgs_core.dataset import open_dataset
+from rfgs_core.encode import PAPER_FILTER
 from rfgs_core.errors import RfgsError
-from rfgs_core.fit.frame import solve_reflectivity, start_frame
+from rfgs_core.fit.frame import solve_reflectivity, start_anywhere, start_frame
+from rfgs_core.fit.sampling import encode
 from rfgs_core.measure.observations import Observations, observe
 from rfgs_core.model.channel import Channel
 from rfgs_core.model.comparison import comparison_of
 from rfgs_core.model.delay_power import DelayPowerModel
-from rfgs_core.model.first_powers import fit_power, noise_per_link, visibility
-from rfgs_core.settings import TrainConfig
+from rfgs_core.model.first_powers import fit_power, level_of_power, noise_per_link, visibility
+from rfgs_core.settings import TrainConfig, TrainOptions
 
 
 @pytest.fixture
@@ -141,3 +143,33 @@ def test_the_number_of_a_gaussian_that_is_gone_is_not_given_again(
     second = start_frame(observe(sequence, "wifi", 2), quick_config, 4, left)
     assert second.track_id[~second.goes_on].min() == 40
     assert second.unused_track == 40 + 13
+
+
+def test_a_random_start_fills_the_bounds_and_knows_of_no_bodies(observations) -> None:
+    config = TrainConfig.chosen(TrainOptions(recipe="paper"), num_gaussians=4000)
+    state = start_anywhere(observations, config, 3, None, PAPER_FILTER)
+    gaussians, (low, high) = state.gaussians, observations.bounds_m
+    share = (gaussians.means.numpy() - low) / (high - low)
+    assert share.min() >= 0.0 and share.max() <= 1.0
+    # Mean and deviation of a uniform draw, to four deviations of theirs.
+    np.testing.assert_allclose(share.mean(axis=0), 0.5, atol=4 * 0.2887 / 4000**0.5)
+    np.testing.assert_allclose(share.std(axis=0), 1 / 12**0.5, atol=0.01)
+    torch.testing.assert_close(gaussians.scales, torch.full((4000, 3), 0.01))
+    torch.testing.assert_close(gaussians.opacities, torch.full((4000,), 0.1))
+    here = encode(observations, gaussians.means.numpy().astype(np.float64), PAPER_FILTER)
+    torch.testing.assert_close(gaussians.features, here.features, rtol=1e-2, atol=1e-3)
+    assert len(state.tracks.bodies.axes_xy) == 0
+    assert (state.moving.body == -1).all()
+    # Every frame anew: other places, and no number twice.
+    after = start_anywhere(observations, config, 4, state, PAPER_FILTER)
+    assert not np.isin(after.track_id, state.track_id).any()
+    assert not torch.isclose(after.gaussians.means, gaussians.means).all(dim=1).any()
+    assert after.head is state.head
+
+
+def test_many_gaussians_have_the_power_of_a_few(observations) -> None:
+    config = TrainConfig.chosen(TrainOptions(recipe="paper"), num_gaussians=6000)
+    many = start_anywhere(observations, config, 3, None, PAPER_FILTER).gaussians
+    found, whole = level_of_power(observations, many), fit_power(observations, many)
+    assert float(found.sum()) == pytest.approx(float(whole.sum()), rel=0.1)
+    assert len(found.unique()) == 1

@@ -19,7 +19,7 @@ from rfgs_core.measure.observations import Observations
 from rfgs_core.model.channel import Channel
 from rfgs_core.model.comparison import comparison_of
 from rfgs_core.model.first_powers import noise_per_link
-from rfgs_core.settings import TrainConfig
+from rfgs_core.settings import Density, TrainConfig
 
 
 def cost(observations: Observations, state: FrameState, config: TrainConfig) -> float:
@@ -160,9 +160,24 @@ def test_density_control_resumes_exactly(
     again = refine(observations, state, config, 0, checkpoint)
     assert same(again, undisturbed)
     # Powers [m²] and tracks belong to the new rows.
-    gamma_m = again.gaussians.features.norm(dim=1) * state.head.gamma_scale_m
-    torch.testing.assert_close(again.power, gamma_m**2 * again.gaussians.opacities)
+    assert_shares(again, state)
     assert len(again.power) == len(again.track_id) == len(again.gaussians) == counts[-1]
+
+
+def assert_shares(fitted: FrameState, start: FrameState) -> None:
+    """Powers are shared by α ‖f‖², and together those of the start."""
+    share = fitted.gaussians.features.norm(dim=1) ** 2 * fitted.gaussians.opacities
+    torch.testing.assert_close(fitted.power, share / share.sum() * start.power.sum())
+
+
+@pytest.mark.parametrize("density", ["paper", "none"])
+def test_every_density_of_the_papers_losses_is_read_out_alike(
+    observations, state, quick_config, density: Density
+) -> None:
+    config = replace(quick_config, objective="paper", recipe="paper", density=density)
+    fitted = refine(observations, state, config, 0)
+    assert_shares(fitted, state)
+    assert fitted.power.std() > 0.0
 
 
 def test_checkpoints_fall_on_prunings() -> None:

@@ -62,7 +62,9 @@ def test_transparent_gaussians_go() -> None:
     gaussians.logit_opacities = torch.logit(torch.tensor([0.5, 0.0049, 0.0051, 0.001]))
     trained = trainable(gaussians)
     rule = DensityRule()
-    PaperDensity(rule).after_step(rule.prune_every, trained, points_at(gaussians))
+    PaperDensity(rule, points_at(gaussians)).after_step(
+        rule.prune_every, trained, points_at(gaussians)
+    )
     assert trained.gaussians.means[:, 0].tolist() == [0.0, 2.0]
 
 
@@ -71,7 +73,7 @@ def test_close_gaussians_go_by_opacity() -> None:
     gaussians.means[1, 0] = 0.009
     gaussians.logit_opacities[0] = 1.0
     trained = trainable(gaussians)
-    PaperDensity(DensityRule()).after_step(50, trained, points_at(gaussians))
+    PaperDensity(DensityRule(), points_at(gaussians)).after_step(50, trained, points_at(gaussians))
     assert trained.gaussians.means[:, 0].tolist() == pytest.approx([0.0, 0.04])
 
 
@@ -82,7 +84,7 @@ def test_errors_count_only_in_the_window_before_pruning() -> None:
     wrong.features[1] = math.sqrt(0.6)
     # Error 0.6 of the middle one; wrong in 1 of 10 window steps: 0.06 on average, else 0.
     for bad_step, expected in ((40, 3), (41, 2), (50, 2)):
-        trained, density = trainable(gaussians), PaperDensity(DensityRule())
+        trained, density = trainable(gaussians), PaperDensity(DensityRule(), good)
         for step in range(1, 51):
             density.after_step(step, trained, wrong if step == bad_step else good)
         assert len(trained.gaussians) == expected, bad_step
@@ -94,7 +96,7 @@ def test_errors_are_averaged_over_the_window() -> None:
     good, wrong = points_at(gaussians), points_at(gaussians)
     wrong.features[1] = math.sqrt(0.2)
     for bad_steps, expected in ((2, 3), (3, 2)):
-        trained, density = trainable(gaussians), PaperDensity(DensityRule())
+        trained, density = trainable(gaussians), PaperDensity(DensityRule(), good)
         for step in range(1, 51):
             density.after_step(step, trained, wrong if step > 50 - bad_steps else good)
         assert len(trained.gaussians) == expected
@@ -104,7 +106,7 @@ def test_never_all_are_pruned() -> None:
     gaussians = line_of_gaussians(3)
     gaussians.logit_opacities -= 20.0
     trained = trainable(gaussians)
-    PaperDensity(DensityRule()).after_step(50, trained, points_at(gaussians))
+    PaperDensity(DensityRule(), points_at(gaussians)).after_step(50, trained, points_at(gaussians))
     assert len(trained.gaussians) == 3
 
 
@@ -125,7 +127,7 @@ def test_poorly_covered_points_with_a_gradient_become_gaussians(
 ) -> None:
     start = line_of_gaussians(7)
     trained = trainable(start)
-    PaperDensity(DensityRule())._densify(trained, poorly_covered)
+    PaperDensity(DensityRule(), poorly_covered)._densify(trained)
     g = trained.gaussians.detach()
     assert len(g) == 8
     assert torch.equal(g.means[:7], start.means)
@@ -138,9 +140,8 @@ def test_poorly_covered_points_with_a_gradient_become_gaussians(
 
 def test_a_gradient_below_the_threshold_adds_nothing(poorly_covered: SamplePoints) -> None:
     trained = trainable(line_of_gaussians(7))
-    PaperDensity(DensityRule())._densify(
-        trained, SamplePoints(poorly_covered.xyz, 0.9 * poorly_covered.features)
-    )
+    flatter = SamplePoints(poorly_covered.xyz, 0.9 * poorly_covered.features)
+    PaperDensity(DensityRule(), flatter)._densify(trained)
     assert len(trained.gaussians) == 7
 
 
@@ -148,7 +149,7 @@ def test_the_cap_limits_new_gaussians(poorly_covered: SamplePoints) -> None:
     poorly_covered.features[6] = poorly_covered.features[5]
     for cap, expected in ((7, 7), (8, 8), (100, 9)):
         trained = trainable(line_of_gaussians(7))
-        PaperDensity(DensityRule(cap=cap))._densify(trained, poorly_covered)
+        PaperDensity(DensityRule(cap=cap), poorly_covered)._densify(trained)
         assert len(trained.gaussians) == expected
 
 
@@ -157,7 +158,7 @@ def test_density_changes_every_50_and_every_100_steps(poorly_covered: SamplePoin
     gaussians = line_of_gaussians(7)
     gaussians.features = poorly_covered.features.clone()
     gaussians.logit_opacities[0] = -20.0
-    trained, density = trainable(gaussians), PaperDensity(DensityRule())
+    trained, density = trainable(gaussians), PaperDensity(DensityRule(), poorly_covered)
     counts = []
     for step in range(1, 201):
         density.after_step(step, trained, poorly_covered)
@@ -166,3 +167,20 @@ def test_density_changes_every_50_and_every_100_steps(poorly_covered: SamplePoin
     assert changes == [50, 100]
     # One pruned at 50; at 100 its point has lost its Gaussian, and point 5 never had one.
     assert (counts[48], counts[49], counts[99]) == (7, 6, 8)
+
+
+def test_new_gaussians_are_not_bounded_by_the_batch() -> None:
+    """Every sample point that is poorly covered gets one, whichever of them the step looked at."""
+    generator = torch.Generator().manual_seed(0)
+    xyz = torch.rand(3000, 3, generator=generator)
+    # Four in ten are far away from the Gaussians, among which the other six are.
+    xyz[:1200, 0] += 100.0
+    everywhere = SamplePoints(xyz, (0.02 * torch.arange(32.0)).repeat(3000, 1))
+    trained = trainable(line_of_gaussians(7, spacing_m=0.1))
+    density = PaperDensity(DensityRule(), everywhere)
+    batch = everywhere.rows(torch.arange(2))
+    for step in range(1, 101):
+        density.after_step(step, trained, batch)
+    # Two points at each of a hundred steps could not have made so many.
+    assert len(trained.gaussians) >= 1200 > 2 * 100 + 7
+    assert (trained.gaussians.means[:, 0] > 50.0).sum() == 1200

@@ -103,7 +103,7 @@ class Resolving:
 
 
 _ENOUGH = "more numbers than unknowns"
-_PRIOR = "fewer numbers than unknowns, so what bodies are like decides the rest"
+_PRIOR = "fewer numbers than unknowns, so where Gaussians start decides the rest"
 
 
 def resolving(

@@ -14,7 +14,7 @@ import pytest
 from rfgs_core.past import forecast
 from rfgs_core.run import costs
 from rfgs_core.run.costs import USUAL, CostBar, Costs, expected, price_line, stages
-from rfgs_core.settings import TrainConfig
+from rfgs_core.settings import TrainConfig, TrainOptions
 
 STEPS = 10
 #: What the stages of the pretended training take [s].
@@ -131,3 +131,15 @@ def test_a_bar_whose_costs_do_not_add_up_ends_at_its_total(
         bar.finish_frame()
     assert bar._bar.n == bar._bar.total
     bar.close()
+
+
+def test_a_step_of_the_papers_losses_costs_less_than_one_of_the_channel(run: Any) -> None:
+    """By proportion to a step of the channel's loss its 10,000 steps were said to take 7 hours."""
+    settings = TrainConfig.chosen(TrainOptions(recipe="paper"))
+    config = SimpleNamespace(radio="wifi", settings=settings)
+    taken_s = sum(
+        stage.usual.step_s * stage.steps
+        for stage in stages(config, run.sequence, 1, settings.iterations)
+    )
+    assert settings.num_gaussians == 100_000
+    assert 15 * 60.0 < taken_s < 60 * 60.0

@@ -14,7 +14,7 @@ import zarr
 from rfgs_core.dataset import open_dataset
 from rfgs_core.dataset.csi_store import digest
 from rfgs_core.dataset.names import SequenceFiles
-from rfgs_core.encode.matched_filter import MatchedFilter, matched_filter_map
+from rfgs_core.encode import MATCHED_FILTER, PAPER_FILTER, matched_filter_map
 from rfgs_core.errors import RfgsError
 from rfgs_core.evaluate.metrics import evaluate_run
 from rfgs_core.files import write_json
@@ -114,9 +114,15 @@ def test_profiles_bound_the_change_from_below(make_observations) -> None:
 
 def test_learned_encoders_are_refused_without_subcarriers(make_observations) -> None:
     seen = reports(make_observations(), echo(make_observations(), PLACE_M, 1e-3), "delay_power")
-    # Any encoder but the default one stands for a learned one.
+
+    def learned(_: object, points: np.ndarray) -> np.ndarray:
+        """Stands for a learned one: it is no matched filter."""
+        return np.zeros((len(points), 32), np.float32)
+
     with pytest.raises(RfgsError, match="learned encoder reads the channel over subcarriers"):
-        encode(seen, PLACE_M[None], MatchedFilter())
+        encode(seen, PLACE_M[None], learned)
+    plain, paper = (encode(seen, PLACE_M[None], one) for one in (MATCHED_FILTER, PAPER_FILTER))
+    assert torch.equal(plain.features, paper.features)
 
 
 def turn_phases(dataset: Path, per_subcarrier: bool) -> None:

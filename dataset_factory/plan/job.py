@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -18,6 +17,7 @@ from dataset_factory.scene.overrides import overrides_file
 from rfgs_core.dataset.names import SequenceFiles
 from rfgs_core.files import write_json
 from rfgs_core.past import Clock, Speed
+from rfgs_core.timings import Timings
 
 
 @dataclass
@@ -40,7 +40,7 @@ class Job:
     """What Sionna RT traces on."""
     overrides_label: str = "command line"
     """Where the plan's overrides come from, for messages."""
-    seconds: dict[str, float] = field(default_factory=dict)
+    seconds: Timings = field(default_factory=Timings)
     """Wall time per stage of this run [s]."""
     speeds: dict[str, Speed] = field(default_factory=dict)
     """Speed of the stages of this run that had enough steps to tell."""
@@ -95,9 +95,9 @@ class Job:
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
         """Measures a stage; times go to the log, never into the data."""
-        start = time.perf_counter()
         try:
-            yield
+            with self.seconds.stage(name):
+                yield
         finally:
-            self.seconds[name] = round(time.perf_counter() - start, 3)
-            write_json(self.out / "log" / "generate.json", {"seconds": self.seconds})
+            rounded = {stage: round(seconds, 3) for stage, seconds in self.seconds.items()}
+            write_json(self.out / "log" / "generate.json", {"seconds": rounded})

@@ -77,7 +77,7 @@ def _trace(
             speed.step(task)
             told = {"seconds": seconds, "memory_bytes": answer.memory_bytes}
             job.traced.append((task.radio, task.frame, told))
-    job.seconds.update({f"trace.{name}": round(value, 3) for name, value in sorted(spent.items())})
+    job.seconds.update({f"trace.{name}": value for name, value in sorted(spent.items())})
 
 
 def _request(job: Job, bundle: Bundle, sequence: SequenceInfo, log: str) -> Request:

@@ -15,7 +15,7 @@ from rfgs_core.seeds import sub_seed
 from rfgs_core.simulate.shadow.environment import node_frequencies
 from rfgs_core.simulate.shadow.frequencies import fine_grid
 from rfgs_core.simulate.shadow.kirchhoff import Shadow
-from rfgs_core.simulate.timings import Timings
+from rfgs_core.timings import Timings
 
 #: Dr.Jit keeps kernels and memory of every frame; they are dropped this often [frames].
 FLUSH_EVERY = 10

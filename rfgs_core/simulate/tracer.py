@@ -35,7 +35,7 @@ from rfgs_core.simulate.shadow.outline import Outline, coarse_mesh
 from rfgs_core.simulate.sight.free import free_segments
 from rfgs_core.simulate.surface.bodies import BodySurface
 from rfgs_core.simulate.surface.movers import Movers
-from rfgs_core.simulate.timings import Timings
+from rfgs_core.timings import Timings
 
 
 @dataclass(frozen=True)

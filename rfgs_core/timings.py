@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How long each stage of a tracer takes."""
+"""How long each stage of a work takes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 
 class Timings(dict[str, float]):
-    """Wall time of each stage so far [s], by its name."""
+    """Wall time of each stage so far [s], by its name; those that are named begin at 0."""
 
     def __init__(self, *stages: str) -> None:
         super().__init__(dict.fromkeys(stages, 0.0))
@@ -21,4 +21,4 @@ class Timings(dict[str, float]):
         try:
             yield
         finally:
-            self[name] += time.perf_counter() - start
+            self[name] = self.get(name, 0.0) + time.perf_counter() - start

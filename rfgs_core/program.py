@@ -30,8 +30,10 @@ class Program:
     """A program and its commands.
 
     A command's module holds its arguments, a frozen dataclass that says in its docstring what
-    the command does, and `run`, which takes them and returns the exit code. Paths of arguments
-    called `out` or `json` are known to be writable then, and no link leads out of a folder there.
+    the command does, and `run`, which takes them and returns the exit code. A command of several
+    parts has a union of such dataclasses instead, and a line on all of them, SUMMARY. Paths of
+    arguments called `out` or `json` are known to be writable then, and no link leads out of a
+    folder there.
     """
 
     name: str
@@ -72,15 +74,18 @@ class Program:
         )
 
     def _summary(self, name: str) -> str:
-        _, kind = self._command(name)
-        return f"  {name:<10}{(kind.__doc__ or '').strip().splitlines()[0]}"
+        module, kind = self._command(name)
+        # A command of parts has a class of arguments for each of them.
+        about = kind.__doc__ if isinstance(kind, type) else module.SUMMARY
+        return f"  {name:<10}{(about or '').strip().splitlines()[0]}"
 
     def _run(self, name: str, arguments: Sequence[str]) -> int | None:
         import tyro
 
         module, kind = self._command(name)
         run: Callable[[Any], int | None] = module.run
-        parsed = tyro.cli(kind, args=list(arguments), prog=f"{self.name} {name}")
+        about = None if isinstance(kind, type) else module.SUMMARY
+        parsed = tyro.cli(kind, args=list(arguments), prog=f"{self.name} {name}", description=about)
         with ExitStack() as stack:
             for output in _OUTPUTS:
                 place = getattr(parsed, output, None)
@@ -90,7 +95,7 @@ class Program:
                         stack.enter_context(filled(place))
             return run(parsed)
 
-    def _command(self, name: str) -> tuple[Any, type]:
+    def _command(self, name: str) -> tuple[Any, Any]:
         file, kind = self.commands[name]
         module: Any = importlib.import_module(f"{self.package}.{file}")
         return module, getattr(module, kind)

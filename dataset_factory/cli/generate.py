@@ -125,9 +125,9 @@ def job_of(args: GenerateArgs) -> tuple[Job, Outline]:
         usual_radios,
     )
     from dataset_factory.scene.overrides import label, read_options
-    from dataset_factory.schedule.spread import Spread
     from rfgs_core.llvm import use_llvm
     from rfgs_core.radio import pose_span_s
+    from rfgs_core.schedule.spread import Spread
 
     Spread(args.workers, args.worker_memory, args.scheduler).check()
     scene, said = find_scene(args.scene), read_options(args.options)

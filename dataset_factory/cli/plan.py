@@ -25,8 +25,8 @@ def run(args: PlanArgs) -> int:
     from dataset_factory.plan.disk import expected_space, refuse_small_disk
     from dataset_factory.plan.price import price_table
     from dataset_factory.plan.stages import size_of_outline
-    from dataset_factory.schedule.workers import count_workers
     from rfgs_core.interrupts import nothing_is_made
+    from rfgs_core.schedule.workers import count_workers
 
     nothing_is_made()
     job, outline = job_of(args)

@@ -78,11 +78,11 @@ def run(args: WorldsArgs) -> int:
 
     from dataset_factory.make.worlds import MOST, make_worlds, missing, parse_shard
     from dataset_factory.scene.radios import SCENE_RADIO, chosen_radios
-    from dataset_factory.schedule.spread import Spread
     from rfgs_core.extras import require
     from rfgs_core.files import refuse_place
     from rfgs_core.links import filled
     from rfgs_core.past import count_in_words
+    from rfgs_core.schedule.spread import Spread
     from rfgs_core.worlds.motion import FAMILIES
     from rfgs_core.worlds.settings_file import WorldsFile
     from rfgs_core.worlds.world import WorldSettings

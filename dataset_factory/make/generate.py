@@ -26,7 +26,6 @@ from dataset_factory.scene.radios import SCENE_RADIO, scene_radio
 from dataset_factory.scene.report import table
 from dataset_factory.scene.report_rows import read_report
 from dataset_factory.schedule.channels import trace
-from dataset_factory.schedule.workers import count_workers
 from rfgs_core.dataset import Sequence
 from rfgs_core.dataset.csi_store import create_csi
 from rfgs_core.dataset.impaired_store import has_impaired, remove_impaired
@@ -42,6 +41,7 @@ from rfgs_core.files import read_json, sweep, write_json
 from rfgs_core.radio import DevicePose, frame_samples, layout, pose_span_s
 from rfgs_core.radio.check import too_far
 from rfgs_core.radio.impairments import impairments_from_json
+from rfgs_core.schedule.workers import count_workers
 
 logger = logging.getLogger(__name__)
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dataset_factory.make.world_files import name_of, write_world
 from dataset_factory.plan.contents import versions
-from dataset_factory.schedule.archive import packed
-from dataset_factory.schedule.worker import Answer, answer_of, begin, refuse_other_versions
-from dataset_factory.schedule.workers import Workers
+from rfgs_core.schedule.answers import Answer, answer_of, begin, refuse_other_versions
+from rfgs_core.schedule.archive import packed
+from rfgs_core.schedule.workers import Workers
 from rfgs_core.worlds.settings_file import WorldsFile
 from rfgs_core.worlds.world import random_world, sounded
 
@@ -48,7 +48,8 @@ def archives_of(
     def submit(task: _Task) -> Future:
         return workers.client.submit(_world, shared, versions(), here, task.index, pure=False)
 
-    for task, answer in workers.answers([_Task(index) for index in indices], submit):
+    tasks = [_Task(index) for index in indices]
+    for task, answer in workers.answers(tasks, submit, doing="tracing"):
         yield task.index, answer.value
 
 
@@ -62,7 +63,7 @@ def _world(shared: WorldsFile, wanted: dict[str, str], log: str, index: int) -> 
     from distributed import get_worker
 
     worker: Any = get_worker()
-    refuse_other_versions(wanted)
+    refuse_other_versions(versions(), wanted)
     if log:
         begin(Path(log) / f"worker{worker.name}.log")
     numba.set_num_threads(1)
@@ -74,4 +75,4 @@ def _world(shared: WorldsFile, wanted: dict[str, str], log: str, index: int) -> 
     with tempfile.TemporaryDirectory(prefix="rfgs-", dir=worker.local_directory) as folder:
         write_world(Path(folder), heard, shared.settings, shared.seed)
         archive = packed(Path(folder))
-    return answer_of(worker, archive, b"", {}, frames=0)
+    return answer_of(worker, archive, {}, done=0)

@@ -12,12 +12,12 @@ from dataset_factory.make.world_files import name_of, write_world
 from dataset_factory.plan.contents import make_plan, versions
 from dataset_factory.scene.builder import build_scene
 from dataset_factory.scene.catalogue import find_scene
-from dataset_factory.schedule.archive import unpack
-from dataset_factory.schedule.spread import Spread
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json, replacing_folder, write_json
 from rfgs_core.links import refuse_link
 from rfgs_core.locks import alone_in
+from rfgs_core.schedule.archive import unpack
+from rfgs_core.schedule.spread import Spread
 from rfgs_core.worlds.settings_file import SETTINGS_FILE, WorldsFile
 from rfgs_core.worlds.world import random_world, refuse_radio, sounded
 
@@ -100,7 +100,7 @@ def make_worlds(
     spread = spread or Spread()
     if spread.scheduler:
         # A cluster that is not there is known before the folder is claimed.
-        from dataset_factory.schedule.workers import count_workers
+        from rfgs_core.schedule.workers import count_workers
 
         count_workers(spread.scheduler)
     claim(out, shared)

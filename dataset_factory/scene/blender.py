@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from dataset_factory.children import child_environment, end_with_parent
+from rfgs_core.children import child_environment, end_with_parent
 from rfgs_core.errors import MissingToolError, RfgsError
 
 Progress = Callable[[int, int], None]

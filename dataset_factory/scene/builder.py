@@ -6,7 +6,7 @@ from __future__ import annotations
 import subprocess
 import sys
 
-from dataset_factory.children import child_environment, end_with_parent
+from rfgs_core.children import child_environment, end_with_parent
 from rfgs_core.errors import RfgsError
 
 

@@ -18,15 +18,15 @@ from tqdm import tqdm
 from dataset_factory.plan.contents import missing_channels, versions
 from dataset_factory.plan.job import Job
 from dataset_factory.scene.bundle import Bundle, frame_file
-from dataset_factory.schedule.archive import packed
-from dataset_factory.schedule.spread import Spread
-from dataset_factory.schedule.worker import Answer, Request, Task, trace_frame
-from dataset_factory.schedule.workers import Workers
+from dataset_factory.schedule.worker import Request, Task, Traced, close_place, trace_frame
 from rfgs_core.dataset.csi_store import write_csi
 from rfgs_core.dataset.names import SequenceFiles
 from rfgs_core.dataset.schema import SequenceInfo, device_pose
 from rfgs_core.files import write_bytes
 from rfgs_core.past import Clock
+from rfgs_core.schedule.archive import packed
+from rfgs_core.schedule.spread import Spread
+from rfgs_core.schedule.workers import Workers
 
 if TYPE_CHECKING:
     from distributed import Future
@@ -47,7 +47,9 @@ def trace(job: Job, bundle: Bundle, sequence: SequenceInfo) -> None:
     if not tasks:
         return
     spread = Spread(job.workers, job.worker_memory_gb, job.scheduler)
-    with spread.ready(len(tasks), job.work / "workers", job.out / "log") as workers:
+    with spread.ready(
+        len(tasks), job.work / "workers", job.out / "log", leave=close_place
+    ) as workers:
         if job.scheduler:
             job.workers = workers.count
         _trace(job, bundle, sequence, tasks, workers)
@@ -67,9 +69,9 @@ def _trace(
 
     speed, spent = _Speeds(job), Counter()
     with speed, tqdm(total=len(tasks), desc="trace", unit="frame") as bar:
-        for task, answer in workers.answers(tasks, submit):
+        for task, answer in workers.answers(tasks, submit, doing="tracing"):
             start = time.perf_counter()
-            _write(job.files, sequence, task, answer)
+            _write(job.files, sequence, task, answer.value)
             seconds = {**answer.seconds, "write": time.perf_counter() - start}
             spent.update({f"{task.radio}.{stage}": value for stage, value in seconds.items()})
             bar.set_postfix_str(str(task), refresh=False)
@@ -104,13 +106,13 @@ def _request(job: Job, bundle: Bundle, sequence: SequenceInfo, log: str) -> Requ
     )
 
 
-def _write(files: SequenceFiles, sequence: SequenceInfo, task: Task, answer: Answer) -> None:
+def _write(files: SequenceFiles, sequence: SequenceInfo, task: Task, traced: Traced) -> None:
     """Writes the table of paths, if there is one, then a channel and its marker."""
-    if answer.paths:
-        write_bytes(files.paths(task.radio, task.frame), answer.paths)
+    if traced.paths:
+        write_bytes(files.paths(task.radio, task.frame), traced.paths)
     index = None if task.frame is None else sequence.frames.index(task.frame)
     marker = files.csi_done(task.radio, task.frame)
-    write_csi(files.csi(task.radio), index, answer.value, marker)
+    write_csi(files.csi(task.radio), index, traced.channel, marker)
 
 
 class _Speeds:

@@ -8,35 +8,25 @@ go back.
 
 from __future__ import annotations
 
-import os
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numba
 import numpy as np
-import psutil
 
-from dataset_factory.children import end_with_parent
 from dataset_factory.plan.contents import versions
 from dataset_factory.plan.tracers import TracerName, TracingDevice
 from dataset_factory.scene.bundle import BundleFrame, frame_file, read_bundle
-from dataset_factory.schedule.archive import unpack
 from rfgs_core.dataset.path_store import write_paths
 from rfgs_core.dataset.schema import device_pose, radio_from_json
-from rfgs_core.errors import RfgsError
 from rfgs_core.radio.path_table import PathTable
+from rfgs_core.schedule.answers import Answer, answer_of, begin, refuse_other_versions
+from rfgs_core.schedule.archive import unpack
 
 if TYPE_CHECKING:
     from dataset_factory.trace import AnyTracer, Tracer
-
-V = TypeVar("V")
-
-#: Frames after which a worker asks for another process: a start costs seconds.
-FRESH_AFTER_FRAMES = 300
-#: Share of its memory limit beyond which it asks for one.
-FRESH_AFTER_SHARE = 0.8
 
 
 @dataclass(frozen=True)
@@ -52,22 +42,13 @@ class Task:
         return f"{self.radio}, " + ("static" if self.frame is None else f"frame {self.frame}")
 
 
-@dataclass(frozen=True)
-class Answer(Generic[V]):
-    """What a worker has to say of a frame, or of another task."""
+class Traced(NamedTuple):
+    """What was traced of a frame."""
 
-    value: V
-    """What was made: of a frame, its channel."""
+    channel: np.ndarray
+    """Its channel."""
     paths: bytes
     """Its table of paths as a file; empty if there is none."""
-    seconds: dict[str, float]
-    """Time spent on it per stage [s]."""
-    memory_bytes: int
-    """Memory of the process after it [B]."""
-    worker: str
-    """Address of the worker."""
-    wants_fresh_process: bool
-    """Whether the worker has traced, or holds, so much that another process should go on."""
 
 
 @dataclass(frozen=True)
@@ -167,7 +148,7 @@ class _Place:
     """Where this worker keeps the scene of a run."""
 
     def __init__(self, request: Request, scene: bytes, worker: Any) -> None:
-        refuse_other_versions(request.versions)
+        refuse_other_versions(versions(), request.versions)
         if request.log:
             begin(Path(request.log) / f"worker{worker.name}.log")
         self.key, self.frames = request.key, 0
@@ -186,7 +167,7 @@ class _Place:
 _place: _Place | None = None
 
 
-def trace_frame(request: Request, scene: bytes, moving: bytes, task: Task) -> Answer[np.ndarray]:
+def trace_frame(request: Request, scene: bytes, moving: bytes, task: Task) -> Answer[Traced]:
     """Traces one frame.
 
     Args:
@@ -214,22 +195,7 @@ def trace_frame(request: Request, scene: bytes, moving: bytes, task: Task) -> An
         write_paths(file, table)
         paths = file.read_bytes()
     _place.frames += 1
-    return answer_of(worker, value, paths, seconds, _place.frames)
-
-
-def answer_of(
-    worker: Any, value: V, paths: bytes, seconds: dict[str, float], frames: int
-) -> Answer[V]:
-    """The answer of a worker, with what it holds now; `frames` is how many it has traced."""
-    memory_bytes = psutil.Process().memory_info().rss
-    fresh = wants_fresh_process(memory_bytes, worker.memory_manager.memory_limit, frames)
-    return Answer(value, paths, seconds, memory_bytes, worker.address, fresh)
-
-
-def wants_fresh_process(memory_bytes: int, limit_bytes: int | None, frames: int) -> bool:
-    """Whether a worker that holds so much after so many frames should be replaced."""
-    full = bool(limit_bytes) and memory_bytes > FRESH_AFTER_SHARE * limit_bytes
-    return full or frames >= FRESH_AFTER_FRAMES
+    return answer_of(worker, Traced(value, paths), seconds, _place.frames)
 
 
 def close_place() -> None:
@@ -238,25 +204,3 @@ def close_place() -> None:
     if _place is not None:
         _place.close()
         _place = None
-
-
-def refuse_other_versions(wanted: dict[str, str]) -> None:
-    """Refuses to trace with other packages than those of the process that asks.
-
-    Raises:
-        RfgsError: Naming the first package that differs.
-    """
-    for name, version in versions().items():
-        if version != wanted[name]:
-            raise RfgsError(
-                f"a worker of the cluster has {name} {version}, this machine {wanted[name]}; "
-                "bytes would depend on who traced, so install the same everywhere"
-            )
-
-
-def begin(log: Path) -> None:
-    """Makes this process a quiet child: libraries print to a file, and it ends with the factory."""
-    end_with_parent()
-    with log.open("a") as stream:
-        os.dup2(stream.fileno(), 1)
-        os.dup2(stream.fileno(), 2)

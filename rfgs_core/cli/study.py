@@ -4,12 +4,18 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from rfgs_core.study.cases import CONDITIONS, RADIOS, SCENES
+from rfgs_core.cli.spreading import Spreading
+from rfgs_core.study.cases import CONDITIONS, RADIOS, SCENES, Case
+
+if TYPE_CHECKING:
+    from rfgs_core.schedule.spread import Spread
 
 
 @dataclass(frozen=True)
@@ -34,6 +40,38 @@ class StudyArgs:
     """Which radios."""
     seeds: int = 3
     """Trainings of each case, with root seeds 0, 1, ..."""
+    spread: Annotated[Spreading, tyro.conf.arg(name="")] = field(default_factory=Spreading)
+
+
+@dataclass(frozen=True)
+class CasePart:
+    """A case as a part of a study, made by the commands that anybody may give."""
+
+    case: Case
+    """Which one."""
+
+    def __str__(self) -> str:
+        return self.case.run.name
+
+    @property
+    def dataset(self) -> Path:
+        """Folder of its dataset within the study's."""
+        return self.case.dataset
+
+    @property
+    def made(self) -> tuple[Path, ...]:
+        """Its run, with the metrics in it."""
+        return (self.case.run,)
+
+    def make(self, out: Path) -> None:
+        """Trains and evaluates it."""
+        from rfgs_core.cli.calls import call
+        from rfgs_core.study.price import timed_work
+
+        with timed_work("train", self.case, out):
+            call(*self.case.train(out))
+        with timed_work("evaluate", self.case, out):
+            call(*self.case.evaluate(out))
 
 
 def run(args: StudyArgs) -> int:
@@ -42,39 +80,58 @@ def run(args: StudyArgs) -> int:
 
     from tqdm import tqdm
 
-    from rfgs_core.cli.calls import call
     from rfgs_core.errors import RfgsError
     from rfgs_core.files import write_json, write_text
     from rfgs_core.report.metrics_file import read_metrics
     from rfgs_core.study.cases import cases
-    from rfgs_core.study.price import price_line, timed_work
+    from rfgs_core.study.price import price_line
     from rfgs_core.study.summary import summarise
     from rfgs_core.study.table import study_table
 
     chosen = cases(args.scenes, args.conditions, args.radios, args.seeds)
     if args.out.exists() and not args.out.is_dir():
         raise RfgsError(f"{args.out} is a file; expected a folder, choose another")
+    spread = args.spread.checked()
     sys.stderr.write(f"{price_line(chosen, args.out)}\n")
-    results, failed = [], {}
-    with tqdm(chosen, desc="study", unit="case") as bar:
-        for case in bar:
-            bar.set_postfix_str(case.run.name)
-            dataset, metrics = args.out / case.dataset, args.out / case.run / "metrics.json"
-            try:
-                if not metrics.exists():
-                    if not (dataset / "dataset.json").exists():
-                        with timed_work("generate", case, args.out):
-                            call(*case.generate(args.out))
-                    with timed_work("train", case, args.out):
-                        call(*case.train(args.out))
-                    with timed_work("evaluate", case, args.out):
-                        call(*case.evaluate(args.out))
-                results.append((case, read_metrics(args.out / case.run)))
-            except RfgsError as error:
-                failed[case.run.name] = str(error)
-            rows = summarise(results)
+    results: dict[Case, Any] = {}
+    failed: dict[str, str] = {}
+    rows = []
+    with tqdm(total=len(chosen), desc="study", unit="case") as bar:
+        for case, failure in _outcomes(chosen, args.out, spread, bar.set_postfix_str):
+            bar.update()
+            if failure:
+                failed[case.run.name] = failure
+            else:
+                results[case] = read_metrics(args.out / case.run)
+            rows = summarise([(one, results[one]) for one in chosen if one in results])
             write_json(args.out / "study.json", [asdict(row) for row in rows])
             write_text(args.out / "study.md", study_table(rows, failed))
-    sys.stdout.write(study_table(summarise(results), failed))
+    sys.stdout.write(study_table(rows, failed))
     sys.stdout.write(f"\n{args.out / 'study.md'} written\n")
     return 1 if failed else 0
+
+
+def _outcomes(
+    chosen: Sequence[Case], out: Path, spread: Spread, tell: Callable[[str], None]
+) -> Iterator[tuple[Case, str]]:
+    """Cases as they are there, and why they are not; first what is finished, then datasets."""
+    from rfgs_core.cli.calls import call
+    from rfgs_core.study.parts import datasets_missing, made
+    from rfgs_core.study.price import timed_work
+
+    def generate(case: Case) -> None:
+        with timed_work("generate", case, out):
+            call(*case.generate(out))
+
+    left = []
+    for case in chosen:
+        if (out / case.run / "metrics.json").exists():
+            yield case, ""
+        else:
+            left.append(case)
+    missing = datasets_missing(left, out, generate, tell)
+    yield from ((case, missing[case.dataset]) for case in left if case.dataset in missing)
+    parts = [CasePart(case) for case in left if case.dataset not in missing]
+    for part, failure in made(parts, out, spread):
+        tell(str(part))
+        yield part.case, failure

@@ -11,7 +11,7 @@ import numpy as np
 
 from rfgs_core.evaluate.residual import GAUSSIANS_ALONE
 from rfgs_core.study.ablation import VARIANTS
-from rfgs_core.study.cells import ABLATED, FIELDS, TRAINED
+from rfgs_core.study.paper_tables import ABLATED, FIELDS, TRAINED
 from rfgs_core.study.table import number
 
 #: Columns: group and key of the metrics, header, format.

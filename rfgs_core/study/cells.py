@@ -6,11 +6,12 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from msgspec import Struct
 
 from rfgs_core.dataset import Dataset, open_dataset
+from rfgs_core.device import Device
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.evaluate.field_run import Given, fit_fields
 from rfgs_core.evaluate.metrics import METHOD, evaluate_method, evaluate_run
@@ -20,137 +21,16 @@ from rfgs_core.evaluate.scene import EvaluatedRun
 from rfgs_core.links import refuse_link
 from rfgs_core.measure.observations import observe
 from rfgs_core.neural.settings import FieldSettings
-from rfgs_core.radio import preset
 from rfgs_core.records import record
 from rfgs_core.render.bench import frames_per_second
 from rfgs_core.run import Run
 from rfgs_core.run.training import train_sequence
 from rfgs_core.seals import read_sealed_json, write_sealed_json
 from rfgs_core.seeds import sub_seed
-from rfgs_core.settings import TrainConfig, TrainOptions
-from rfgs_core.study.ablation import VARIANTS
+from rfgs_core.settings import TrainConfig
 from rfgs_core.study.cases import SCENES
-
-SizeName = Literal["smoke", "paper-cpu", "full"]
-TableName = Literal["table1", "table2", "table3"]
-
-#: Settings of neural fields that `rfgs bench fields` found best, see `docs/results/fields.json`.
-TUNED: dict[tuple[str, str], dict[str, Any]] = {
-    ("nerf", "features"): {"octaves": 4, "contrast": 2.0},
-    ("mip", "features"): {"octaves": 4, "contrast": 1.0},
-    ("ngp", "features"): {"finest_m": 0.06, "contrast": 2.0},
-    ("nerf", "propagation"): {"octaves": 4, "learning_rate": 2e-3},
-    ("mip", "propagation"): {"octaves": 4, "learning_rate": 2e-3},
-    ("ngp", "propagation"): {"finest_m": 0.06, "learning_rate": 2e-3},
-}
-
-
-@dataclass(frozen=True)
-class Size:
-    """How much of everything a table is made of."""
-
-    scenes: tuple[str, ...]
-    """Scenes."""
-    seeds: int
-    """Seeds of trainings; the data have seed 0."""
-    frames: str | None
-    """Frames of each scene; None takes the study's."""
-    field_steps: int
-    """Adam steps of neural fields."""
-    field_width: int
-    """Width of their networks."""
-    paper_steps: int
-    """Adam steps of the paper's recipe."""
-    grid_side: int
-    """Sample points per side, of the paper's recipe and neural fields alike."""
-    refine_levels: int
-    """How often sample points are refined, of both."""
-
-
-SIZES: dict[SizeName, Size] = {
-    "smoke": Size(("living_room_walk",), 2, "10:40:30", 200, 64, 500, 32, 2),
-    "paper-cpu": Size(tuple(SCENES), 3, None, 2000, 128, 10_000, 64, 0),
-    "full": Size(tuple(SCENES), 5, None, 10_000, 256, 10_000, 64, 0),
-}
-
-#: Methods of ours that are trained, and the options that make them.
-TRAINED: dict[str, TrainOptions] = {
-    "rfgs": TrainOptions(),
-    "rfgs_no_limbs": TrainOptions(limbs="off"),
-    "paper": TrainOptions(recipe="paper"),
-    "paper_prior": TrainOptions(recipe="paper", start="prior"),
-}
-#: The paper's recipe from our start, whole and less one part at a time; whole, it is table 1's
-#: `paper_prior`. From the paper's start, a cell takes too long for a small table.
-ABLATED: dict[str, TrainOptions] = {
-    row.method: replace(TRAINED["paper_prior"], without=row.without, density=row.density)
-    for row in VARIANTS
-}
-#: Methods with neural fields.
-FIELDS: dict[str, FieldSettings] = {
-    f"{kind}_{objective}" + ("_prior" if prior else ""): FieldSettings(
-        kind=kind,  # type: ignore[arg-type]
-        objective=objective,  # type: ignore[arg-type]
-        prior=prior,
-        **changes,
-    )
-    for (kind, objective), changes in TUNED.items()
-    for prior in (False, True)
-}
-
-
-@dataclass(frozen=True)
-class Table:
-    """What one of the paper's tables compares."""
-
-    radios: tuple[str, ...]
-    """Radios."""
-    methods: tuple[str, ...]
-    """Names of `TRAINED`, `ABLATED` or `FIELDS`."""
-
-
-TABLES: dict[TableName, Table] = {
-    "table1": Table(("wifi", "mmwave"), (*TRAINED, *FIELDS)),
-    # RF-GS brings every baseline, so that the strongest is named.
-    "table2": Table(("wifi",), ("rfgs", "paper", *ABLATED)),
-    "table3": Table(("wifi", "mmwave", "uwb", "sar"), ("rfgs",)),
-}
-
-
-@dataclass(frozen=True)
-class Cell:
-    """One method on one scene and radio with one seed."""
-
-    scene: str
-    radio: str
-    method: str
-    """A name of `TRAINED`, `ABLATED` or `FIELDS`; `rfgs` brings all baselines without training."""
-    seed: int
-
-    @property
-    def dataset(self) -> Path:
-        """Folder of the dataset within the table's; seeds and methods share it."""
-        return Path("data") / f"{self.scene}-{self.radio}"
-
-    @property
-    def name(self) -> str:
-        """Name of its file and of its run."""
-        return f"{self.scene}-{self.radio}-{self.method}-seed{self.seed}"
-
-    def generate(self, out: Path, size: Size) -> tuple[str, ...]:
-        """Arguments of the command that makes the dataset: fast tracer, people over walls too.
-
-        The fast tracer's antennas stand still, and Sionna RT traces those that move. Where a radio
-        is not traced over walls, people are heard directly.
-        """
-        scene, radio = SCENES[self.scene], preset(self.radio)
-        depth = min(max(2, scene.least_depth), radio.deepest)
-        tracer = "sionna" if radio.antennas_move else "fast"
-        return (
-            *("dataset_factory", "generate", self.scene, "--radio", self.radio),
-            *("--frames", size.frames or scene.frames, "--no-images", "--tracer", tracer),
-            *("--depth", str(depth), "--out", str(out / self.dataset)),
-        )
+from rfgs_core.study.paper_tables import ABLATED, FIELDS, TRAINED, Cell, Size
+from rfgs_core.threads import one_torch_thread
 
 
 class _Geometry(Struct):
@@ -181,21 +61,6 @@ class _Made(Struct):
     train_s: float
     gaussians: int | None = None
     render_fps: float | None = None
-
-
-def cells(table: Table, size: Size, seeds: int) -> list[Cell]:
-    """All cells: first one seed of everything, of each dataset ours first.
-
-    A scene that nobody is heard in by as few bounces as a radio is traced over has no cell of it.
-    """
-    return [
-        Cell(scene, radio, method, seed)
-        for seed in range(seeds)
-        for scene in size.scenes
-        for radio in table.radios
-        if SCENES[scene].least_depth <= preset(radio).deepest
-        for method in table.methods
-    ]
 
 
 def stored(cell: Cell, out: Path, size: Size) -> dict[str, Any] | None:
@@ -246,7 +111,37 @@ def field_settings(cell: Cell, size: Size) -> FieldSettings:
     )
 
 
-def make(cell: Cell, out: Path, size: Size) -> dict[str, Any]:
+@dataclass(frozen=True)
+class CellPart:
+    """A cell as a part of a table, by itself."""
+
+    cell: Cell
+    """Which one."""
+    size: Size
+    """How much of everything."""
+    device: Device = "cpu"
+    """Where Gaussians are trained."""
+
+    def __str__(self) -> str:
+        return self.cell.name
+
+    @property
+    def dataset(self) -> Path:
+        """Folder of its dataset within the table's."""
+        return self.cell.dataset
+
+    @property
+    def made(self) -> tuple[Path, ...]:
+        """Its run, if it has one, and its file."""
+        run = () if self.cell.method in FIELDS else (Path("runs") / self.cell.name,)
+        return (*run, Path("cells") / f"{self.cell.name}.json")
+
+    def make(self, out: Path) -> None:
+        """Trains and evaluates it."""
+        make(self.cell, out, self.size, self.device)
+
+
+def make(cell: Cell, out: Path, size: Size, device: Device = "cpu") -> dict[str, Any]:
     """Trains and evaluates a cell, and writes its file.
 
     Raises:
@@ -254,7 +149,10 @@ def make(cell: Cell, out: Path, size: Size) -> dict[str, Any]:
     """
     dataset = open_dataset(out / cell.dataset)
     maker = _field if cell.method in FIELDS else _trained
-    run, groups = maker(cell, dataset, out, size)
+    config = replace(train_config(cell, size), device=device)
+    # Otherwise a field's sums, and so its figures, would follow from how many cores there are.
+    with one_torch_thread():
+        run, groups = maker(cell, dataset, out, config, size)
     result = {
         **asdict(cell),
         "settings": settings_of(cell, size),
@@ -280,15 +178,13 @@ def _rendering(run: EvaluatedRun) -> dict[str, Any]:
 
 
 def _trained(
-    cell: Cell, dataset: Dataset, out: Path, size: Size
+    cell: Cell, dataset: Dataset, out: Path, config: TrainConfig, size: Size
 ) -> tuple[EvaluatedRun, dict[str, Any]]:
     """Gaussians; with `rfgs` all baselines that are looked at the same frames."""
     sequence = dataset.sequence()
     (out / "runs").mkdir(parents=True, exist_ok=True)
-    run = train_sequence(
-        dataset, sequence, cell.radio, sequence.frames, train_config(cell, size),
-        out / "runs" / cell.name,
-    )  # fmt: skip
+    place = out / "runs" / cell.name
+    run = train_sequence(dataset, sequence, cell.radio, sequence.frames, config, place)
     if cell.method != "rfgs":
         return run, _named(cell.method, evaluate_method(run))
     metrics = evaluate_run(run, oracle=False)
@@ -302,12 +198,12 @@ def _trained(
 
 
 def _field(
-    cell: Cell, dataset: Dataset, out: Path, size: Size
+    cell: Cell, dataset: Dataset, out: Path, config: TrainConfig, size: Size
 ) -> tuple[EvaluatedRun, dict[str, Any]]:
     """A neural field per frame."""
     sequence = dataset.sequence()
     people = sum(1 for row in sequence.instances if row["class"] == "person")
-    config = replace(train_config(cell, size), bodies=max(people, 1))
+    config = replace(config, bodies=max(people, 1))
     shared = replace(config, seed=0)
     run = fit_fields(
         dataset, cell.radio, sequence.frames, field_settings(cell, size), config,

@@ -28,7 +28,8 @@ from rfgs_core.live.records import READERS, Packets, decode
 from rfgs_core.run import open_run
 from rfgs_core.seals import write_sealed_json
 from rfgs_core.study.cell_rows import method_rows, method_table
-from rfgs_core.study.cells import SIZES, TABLES, cells, settings_of, stored
+from rfgs_core.study.cells import settings_of, stored
+from rfgs_core.study.paper_tables import SIZES, TABLES, cells
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "rfgs_core/live"))
 from sending import esp32_stream, feitcsi_stream, picoscenes_stream

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import pytest
+from argument_classes import argument_classes
 from capture_files import feitcsi_file
 from whole_metrics import whole_metrics
 
@@ -238,7 +239,8 @@ def _output(row: str) -> str:
 
 
 def _fields(module: str, kind: str) -> tuple[dataclasses.Field[Any], ...]:
-    return dataclasses.fields(getattr(importlib.import_module(module), kind))
+    classes = argument_classes(getattr(importlib.import_module(module), kind))
+    return tuple(field for made in classes for field in dataclasses.fields(made))
 
 
 @pytest.mark.parametrize("command", PIPES)
@@ -270,6 +272,6 @@ def test_the_tables_know_every_input() -> None:
 
 def _reads(module: str, kind: str) -> bool:
     """Whether a command takes the name of a file or folder to read."""
-    made = getattr(importlib.import_module(module), kind)
-    hints = typing.get_type_hints(made)
-    return any("Path" in str(hints[name]) for name in hints if name not in OUTPUTS)
+    classes = argument_classes(getattr(importlib.import_module(module), kind))
+    hints = [pair for made in classes for pair in typing.get_type_hints(made).items()]
+    return any("Path" in str(hint) for name, hint in hints if name not in OUTPUTS)

@@ -9,14 +9,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import torch
 
 from rfgs_core import study
-from rfgs_core.cli.bench import BenchArgs, run
+from rfgs_core.cli import main
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json
 from rfgs_core.study.ablation import VARIANTS
 from rfgs_core.study.cell_rows import method_rows, method_table, strongest
-from rfgs_core.study.cells import (
+from rfgs_core.study.cells import make, settings_of, stored
+from rfgs_core.study.paper_tables import (
     FIELDS,
     SIZES,
     TABLES,
@@ -24,9 +26,7 @@ from rfgs_core.study.cells import (
     Cell,
     Size,
     cells,
-    make,
-    settings_of,
-    stored,
+    narrowed,
 )
 
 TINY = Size(("living_room_walk",), 2, "1:2", 3, 8, 2, 6, 0)
@@ -150,8 +150,33 @@ def test_a_cell_is_kept_until_its_settings_change(
         assert make(cell, tmp_path, TINY)["methods"] == made["methods"]
 
 
-def test_a_table_without_a_folder_is_refused() -> None:
-    with pytest.raises(RfgsError, match="expected --out FOLDER"):
-        run(BenchArgs("table1"))
-    with pytest.raises(RfgsError, match="--seeds 0: expected at least 1"):
-        run(BenchArgs("table1", seeds=0))
+def test_a_table_may_be_narrowed_to_what_it_has() -> None:
+    table, size = narrowed("table1", SIZES["smoke"], ["two_crossing"], ["wifi"], ["rfgs", "paper"])
+    assert [cell.name for cell in cells(table, size, 1)] == [
+        "two_crossing-wifi-rfgs-seed0",
+        "two_crossing-wifi-paper-seed0",
+    ]
+    assert narrowed("table2", SIZES["smoke"]) == (TABLES["table2"], SIZES["smoke"])
+    with pytest.raises(RfgsError, match=r"--radios uwb: expected some of wifi, mmwave in table1"):
+        narrowed("table1", SIZES["smoke"], radios=["uwb"])
+    with pytest.raises(RfgsError, match="--scenes kitchen: expected some of living_room_walk"):
+        narrowed("table1", SIZES["smoke"], scenes=["kitchen"])
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("--seeds 0", "--seeds 0: expected at least 1"),
+        ("--methods 3dgs", "--methods 3dgs: expected some of rfgs, rfgs_no_limbs"),
+        ("--workers 0", "--workers 0: expected 1 to 256"),
+        ("--device cuda", "cuda"),
+    ],
+)
+def test_options_of_a_table_are_refused_before_it_begins(
+    words: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if words == "--device cuda" and torch.cuda.is_available():
+        pytest.skip("there is a GPU")
+    assert main(["bench", "table1", "--out", str(tmp_path / "out"), *words.split()]) == 2
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

@@ -88,7 +88,7 @@ def test_stopped_workers_go_on_to_the_same_worlds(
 def test_workers_that_are_not_there_are_named_before_anything_is_made(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("dataset_factory.schedule.workers._PATIENCE_S", 1)
+    monkeypatch.setattr("rfgs_core.schedule.workers._PATIENCE_S", 1)
     out = tmp_path / "out"
     for more, said in (
         (("--scheduler", "tcp://127.0.0.1:9"), "no Dask scheduler answers there"),

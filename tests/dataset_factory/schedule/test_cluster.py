@@ -89,7 +89,7 @@ def test_workers_with_other_versions_are_refused(
 def test_an_address_without_a_scheduler_is_named(
     make_job: MakeJob, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("dataset_factory.schedule.workers._PATIENCE_S", 1)
+    monkeypatch.setattr("rfgs_core.schedule.workers._PATIENCE_S", 1)
     job = make_job(tmp_path / "out", images=False, scheduler="tcp://127.0.0.1:9")
     with pytest.raises(RfgsError, match=r"--scheduler tcp://127.0.0.1:9: no Dask scheduler"):
         generate(job)

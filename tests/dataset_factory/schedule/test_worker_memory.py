@@ -14,10 +14,10 @@ from dataset_factory.plan.contents import versions
 from dataset_factory.plan.job import Job
 from dataset_factory.scene.bundle import frame_file, read_bundle
 from dataset_factory.scene.devices import choose_devices
-from dataset_factory.schedule.archive import packed
 from dataset_factory.schedule.worker import Request, Task, trace_frame
-from dataset_factory.schedule.workers import workers_here
 from rfgs_core.radio import preset
+from rfgs_core.schedule.archive import packed
+from rfgs_core.schedule.workers import workers_here
 
 MakeJob = Callable[..., Job]
 
@@ -48,7 +48,7 @@ def test_memory_is_flat_over_300_frames(make_job: MakeJob, tmp_path: Path) -> No
             return workers.client.submit(trace_frame, request, known, moving, task, pure=False)
 
         tasks = [Task("wifi", 1 + turn % 4) for turn in range(300)]
-        for _, answer in workers.answers(tasks, submit):
+        for _, answer in workers.answers(tasks, submit, doing="tracing"):
             held.append(answer.memory_bytes)
             processes.add(answer.worker)
     assert len(held) == 300 and len(processes) == 1

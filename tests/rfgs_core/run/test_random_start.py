@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +14,9 @@ import pytest
 from rfgs_core.cli import main
 from rfgs_core.errors import RfgsError
 from rfgs_core.evaluate.metrics import evaluate_method
+from rfgs_core.fit.sampling import SamplePoints, sample_points
 from rfgs_core.gaussians.ply import read_ply
+from rfgs_core.measure.observations import Observations
 from rfgs_core.pose import estimate_poses
 from rfgs_core.run import Run, open_run
 from rfgs_core.run.config import RunConfig
@@ -22,12 +26,21 @@ from rfgs_core.settings import TrainConfig, TrainOptions
 
 
 @pytest.fixture(scope="module")
-def random_run(tiny_dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """The command with the paper's recipe and nothing else but sizes."""
+def random_run(tiny_dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Run]:
+    """The command with the paper's recipe and nothing else but sizes; a coarse grid of points."""
     out = tmp_path_factory.mktemp("random") / "run"
     words = f"train {tiny_dataset} --radio wifi --recipe paper --gaussians 300 --iterations 3"
-    assert main([*words.split(), "--no-shader", "--out", str(out)]) == 0
-    return open_run(out)
+    with pytest.MonkeyPatch.context() as patch:
+        asked = []
+
+        def coarse(observations: Observations, side: int, *more: Any) -> SamplePoints:
+            asked.append(side)
+            return sample_points(observations, 24, *more)
+
+        patch.setattr("rfgs_core.fit.refine.sample_points", coarse)
+        assert main([*words.split(), "--no-shader", "--out", str(out)]) == 0
+        assert set(asked) == {64}
+        yield open_run(out)
 
 
 def test_one_flag_is_the_papers_recipe(random_run: Run) -> None:

@@ -15,14 +15,13 @@ from typing import Any
 from urllib.error import HTTPError
 from urllib.request import urlopen
 
-import numpy as np
 import psutil
 import pytest
 
-from dataset_factory.schedule import worker
-from dataset_factory.schedule.worker import Answer, Task, wants_fresh_process
-from dataset_factory.schedule.workers import Workers, memory_bytes, workers_here
 from rfgs_core.errors import RfgsError
+from rfgs_core.schedule import answers
+from rfgs_core.schedule.answers import Answer, answer_of, wants_fresh_process
+from rfgs_core.schedule.workers import Workers, memory_bytes, workers_here
 
 hoard: list[bytearray] = []
 
@@ -48,9 +47,7 @@ def misbehave(frame: int, marks: str) -> Answer:
     if frame == 7:
         hoard.append(bytearray(os.urandom(1)) * 760_000_000)
     here: Any = get_worker()
-    memory = psutil.Process().memory_info().rss
-    fresh = wants_fresh_process(memory, here.memory_manager.memory_limit, frames=0)
-    return Answer(np.array([os.getpid()]), b"", {}, memory, here.address, fresh)
+    return answer_of(here, os.getpid(), {}, done=0)
 
 
 @pytest.fixture
@@ -75,11 +72,10 @@ def two(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workers]:
 
 
 def run(workers: Workers, marks: Path, frames: list[int]) -> dict[int, Answer]:
-    def submit(task: Task) -> Any:
-        return workers.client.submit(misbehave, task.frame, str(marks), pure=False)
+    def submit(frame: int) -> Any:
+        return workers.client.submit(misbehave, frame, str(marks), pure=False)
 
-    tasks = [Task("wifi", frame) for frame in frames]
-    return {task.frame or 0: answer for task, answer in workers.answers(tasks, submit)}
+    return dict(workers.answers(frames, submit, doing="frame"))
 
 
 def asked(marks: Path) -> list[int]:
@@ -92,20 +88,20 @@ def test_a_worker_that_dies_costs_its_frame_one_try(two: Workers, marks: Path) -
 
 
 def test_a_frame_that_kills_twice_is_named(two: Workers, marks: Path) -> None:
-    with pytest.raises(RfgsError, match=r"wifi, frame 13: its worker died \(tried twice\)"):
+    with pytest.raises(RfgsError, match=r"frame failed: 13: its worker died \(tried twice\)"):
         run(two, marks, [13])
     assert asked(marks) == [13, 13]
 
 
 def test_a_worker_that_grows_is_killed_and_named(marks: Path) -> None:
-    message = r"wifi, frame 99: a worker took more than 0.4 GB; raise --worker-memory"
+    message = r"frame failed: 99: a worker took more than 0.4 GB; raise --worker-memory"
     with starting(marks, memory_gb=0.4) as workers, pytest.raises(RfgsError, match=message):
         run(workers, marks, [99])
     assert asked(marks) == [99, 99]
 
 
 def test_a_frame_that_cannot_be_traced_is_named_once(two: Workers, marks: Path) -> None:
-    with pytest.raises(RfgsError, match=r"wifi, frame 17: ValueError: no such triangle; the"):
+    with pytest.raises(RfgsError, match=r"frame failed: 17: ValueError: no such triangle; the"):
         run(two, marks, [17])
     with pytest.raises(RfgsError, match=r"^the wall is open$"):
         run(two, marks, [18])
@@ -126,16 +122,16 @@ def test_nothing_is_left_running(marks: Path) -> None:
 
 def test_a_worker_is_replaced_between_frames_when_it_is_nearly_full(marks: Path) -> None:
     with starting(marks, count=1, memory_gb=1.0) as workers:
-        answers = [run(workers, marks, [frame])[frame] for frame in (1, 2, 7, 3, 4)]
-    first, second, full, fresh, last = (int(answer.value[0]) for answer in answers)
+        told = [run(workers, marks, [frame])[frame] for frame in (1, 2, 7, 3, 4)]
+    first, second, full, fresh, last = (answer.value for answer in told)
     assert first == second == full != fresh == last
-    assert answers[2].memory_bytes > 760_000_000 > 1.5 * answers[3].memory_bytes
+    assert told[2].memory_bytes > 760_000_000 > 1.5 * told[3].memory_bytes
     assert asked(marks) == [1, 2, 3, 4, 7]
 
 
 def test_a_worker_is_replaced_after_so_many_frames() -> None:
-    assert wants_fresh_process(10, 0, worker.FRESH_AFTER_FRAMES)
-    assert not wants_fresh_process(10, 0, worker.FRESH_AFTER_FRAMES - 1)
+    assert wants_fresh_process(10, 0, answers.FRESH_AFTER_TASKS)
+    assert not wants_fresh_process(10, 0, answers.FRESH_AFTER_TASKS - 1)
 
 
 def test_a_worker_killed_while_it_starts_is_replaced(marks: Path) -> None:
@@ -171,12 +167,12 @@ def test_workers_listen_to_this_machine_alone_and_serve_no_page(two: Workers, ma
 PROGRAM = """
 import sys, time
 from pathlib import Path
-from dataset_factory.schedule.workers import workers_here
+from rfgs_core.schedule.workers import workers_here
 
 def hold(_):
     # Holds Python's lock, as compilers do.
     import ctypes
-    from dataset_factory.children import end_with_parent
+    from rfgs_core.children import end_with_parent
     end_with_parent()
     ctypes.PyDLL(None).sleep(60)
 

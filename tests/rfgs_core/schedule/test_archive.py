@@ -8,7 +8,7 @@ import os
 import zipfile
 from pathlib import Path
 
-from dataset_factory.schedule.archive import packed, unpack
+from rfgs_core.schedule.archive import packed, unpack
 
 
 def test_a_folder_arrives_as_it_left(tmp_path: Path) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Child processes that never outlive the factory."""
+"""Child processes that never outlive the command that began them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _SOURCE = Path(__file__).resolve().parents[1]
 def end_with_parent() -> None:
     """Runs in a child before its program starts.
 
-    Without it a Blender whose factory was killed would go on writing into the folder that the
+    Without it a Blender whose command was killed would go on writing into the folder that the
     next run uses. Elsewhere than on Linux nothing happens; a worker's closed input ends it.
     """
     if _LIBC is not None:

@@ -3,14 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from dataset_factory.schedule.workers import Workers, workers_here, workers_of
 from rfgs_core.errors import RfgsError
 from rfgs_core.links import refuse_link
+from rfgs_core.schedule.workers import Workers, workers_here, workers_of
 
 
 @dataclass(frozen=True)
@@ -36,19 +36,22 @@ class Spread:
             raise RfgsError(f"--worker-memory {self.memory_gb}: expected GB, or 0")
 
     @contextmanager
-    def ready(self, tasks: int, scratch: Path, log: Path) -> Iterator[Workers]:
+    def ready(
+        self, tasks: int, scratch: Path, log: Path, leave: Callable[[], None] | None = None
+    ) -> Iterator[Workers]:
         """Workers until the block ends.
 
         Args:
             tasks: How many tasks there are; more processes than that are not started.
             scratch: Folder for what processes of this machine keep meanwhile.
             log: Folder of their logs; those of an earlier run are removed.
+            leave: What each worker of a cluster does when the block ends.
 
         Raises:
             RfgsError: No process starts, or there is no such cluster.
         """
         if self.scheduler:
-            with workers_of(self.scheduler) as workers:
+            with workers_of(self.scheduler, leave) as workers:
                 yield workers
             return
         refuse_link(log)

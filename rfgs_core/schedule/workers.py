@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Workers that trace: processes of this machine, or those of a Dask cluster that the user names.
+"""Workers: processes of this machine, or those of a Dask cluster that the user names.
 
-Either way Dask hands out the frames, watches memory, and gives the frame of a worker that died
-to another.
+Either way Dask hands out the tasks, watches memory, and gives the task of a worker that died to
+another.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import psutil
 
-from dataset_factory.schedule.worker import Answer, close_place
 from rfgs_core.errors import RfgsError
+from rfgs_core.schedule.answers import Answer
 
 if TYPE_CHECKING:
     from distributed import Client, Future, LocalCluster
@@ -40,7 +40,7 @@ _MEMORY_SHARE = 0.9
 _SINGLE_THREADED = {f"{name}_NUM_THREADS": 1 for name in ("OMP", "OPENBLAS", "MKL")}
 #: Dask's settings for workers of this machine.
 _HERE = {
-    # A frame is tried twice.
+    # A task is tried twice.
     "distributed.scheduler.allowed-failures": 1,
     # Compilers hold Python's lock for minutes; a process that is gone shows without that.
     "distributed.scheduler.worker-ttl": None,
@@ -73,13 +73,14 @@ class Workers:
     """Whether they work for this run alone."""
 
     def answers(
-        self, tasks: Sequence[T], submit: Callable[[T], Future]
+        self, tasks: Sequence[T], submit: Callable[[T], Future], doing: str
     ) -> Iterator[tuple[T, Answer[Any]]]:
         """Has tasks done, in any order.
 
         Args:
             tasks: What to do.
             submit: Submits a task that ends in an `Answer`.
+            doing: What is being done, for messages.
 
         Raises:
             RfgsError: A task failed, lost its worker too often, or the cluster is gone.
@@ -98,7 +99,7 @@ class Workers:
         running = as_completed([start(task) for task in first])
         for future in running:
             task = task_of.pop(future.key)
-            answer = self._answer(future, task)
+            answer = self._answer(future, f"{doing} failed: {task}")
             # Whatever is still wanted of a worker that goes would be made again.
             future.release()
             if answer.wants_fresh_process and self.ours:
@@ -106,7 +107,7 @@ class Workers:
             running.update([start(following) for following in islice(waiting, 1)])
             yield task, answer
 
-    def _answer(self, future: Future, task: Any) -> Answer[Any]:
+    def _answer(self, future: Future, failed: str) -> Answer[Any]:
         from distributed import KilledWorker
 
         if future.status == "cancelled":
@@ -122,7 +123,7 @@ class Workers:
             tries = error.allowed_failures + 1
             often = "twice" if tries == 2 else f"{tries} times"
             raise RfgsError(
-                f"tracing failed: {task}: {self._cause(error.last_worker)} (tried {often}); "
+                f"{failed}: {self._cause(error.last_worker)} (tried {often}); "
                 f"the log is in {self.place}"
             ) from error
         except Exception as error:
@@ -130,8 +131,7 @@ class Workers:
                 # Such as a full disk; those of connections have no number.
                 raise
             raise RfgsError(
-                f"tracing failed: {task}: {type(error).__name__}: {error}; the log is in "
-                f"{self.place}"
+                f"{failed}: {type(error).__name__}: {error}; the log is in {self.place}"
             ) from error
         return answer
 
@@ -209,14 +209,15 @@ def memory_bytes(workers: int, memory_gb: float) -> int:
 
 
 @contextmanager
-def workers_of(address: str) -> Iterator[Workers]:
+def workers_of(address: str, leave: Callable[[], None] | None = None) -> Iterator[Workers]:
     """The workers of a cluster.
 
     Args:
         address: Its scheduler's, as in `tcp://node1:8786`.
+        leave: What each worker does when the block ends.
 
     Raises:
-        RfgsError: There is no such cluster, or none that can trace.
+        RfgsError: There is no such cluster, or no worker of one thread.
     """
     from distributed import Client
 
@@ -240,29 +241,29 @@ def workers_of(address: str) -> Iterator[Workers]:
         for worker, threads in of_worker.items():
             if threads > 1:
                 raise RfgsError(
-                    f"--scheduler {address}: worker {worker} has {threads} threads, and frames "
-                    "are traced in one; start it with --nworkers "
-                    f"{threads} --nthreads 1"
+                    f"--scheduler {address}: worker {worker} has {threads} threads, and work is "
+                    f"done in one; start it with --nworkers {threads} --nthreads 1"
                 )
         try:
             yield Workers(client, max(len(of_worker), 1), address, ours=False)
         finally:
-            with suppress(OSError):
-                client.run(close_place)
+            if leave is not None:
+                with suppress(OSError):
+                    client.run(leave)
 
 
 def count_workers(address: str) -> int:
-    """How many frames a cluster traces at the same time.
+    """How many tasks a cluster does at the same time.
 
     Raises:
-        RfgsError: There is no such cluster, or none that can trace.
+        RfgsError: There is no such cluster, or no worker of one thread.
     """
     with workers_of(address) as workers:
         return workers.count
 
 
 def _hush() -> None:
-    """Keeps Dask's log off the terminal: lost workers are told by what becomes of their frames."""
+    """Keeps Dask's log off the terminal: lost workers are told by what becomes of their tasks."""
     for name in ("distributed", "distributed.client"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
     quiet = "ignore:resource_tracker"
@@ -275,7 +276,7 @@ def _hush() -> None:
 def _interrupts_held_back() -> Iterator[None]:
     """Ctrl-C waits for the block to end, and never reaches threads and processes begun in it.
 
-    A terminal sends it to the whole group of processes: the factory alone shall answer.
+    A terminal sends it to the whole group of processes: the command alone shall answer.
     """
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -285,7 +286,7 @@ def _interrupts_held_back() -> Iterator[None]:
 
 
 def _kill(cluster: LocalCluster) -> None:
-    """Ends workers at once: they have nothing to keep, and a frame may take minutes."""
+    """Ends workers at once: they have nothing to keep, and a task may take minutes."""
     for nanny in cluster.workers.values():
         nanny.close_gracefully()
         if nanny.pid:

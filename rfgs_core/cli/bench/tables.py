@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`rfgs bench table1`, `table2`, `table3`: the paper's tables, measured."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+import tyro
+
+from rfgs_core.cli.bench.numbers import need_at_least_one
+from rfgs_core.cli.spreading import Spreading
+from rfgs_core.device import Device
+from rfgs_core.study.paper_tables import Cell, Size, SizeName, TableName
+
+if TYPE_CHECKING:
+    from rfgs_core.schedule.spread import Spread
+    from rfgs_core.study.cell_rows import MethodRow
+
+
+@dataclass(frozen=True, kw_only=True)
+class PaperTable:
+    """One of the paper's tables."""
+
+    name: ClassVar[TableName]
+
+    out: Path
+    """Folder of datasets, runs and cells; what is finished is kept, and the same command goes on
+    where it stopped."""
+    size: SizeName = "smoke"
+    """smoke: one scene, minutes; paper-cpu: the study's four with the paper's steps, hours; full:
+    these with five seeds and larger neural fields, days."""
+    seeds: int | None = None
+    """Trainings of each method; left out: what the size has."""
+    scenes: tuple[str, ...] = ()
+    """Which scenes; left out: those of the size."""
+    radios: tuple[str, ...] = ()
+    """Which radios; left out: those of the table."""
+    methods: tuple[str, ...] = ()
+    """Which methods; left out: those of the table. rfgs brings all that need no training."""
+    device: Device = "cpu"
+    """Where Gaussians are trained: cpu, or cuda, the current GPU."""
+    spread: Annotated[Spreading, tyro.conf.arg(name="")] = field(default_factory=Spreading)
+    json: Path | None = None
+    """Also write the rows to this file."""
+
+    def run(self) -> int:
+        """Makes what is missing, prints the table and writes OUT/NAME.md.
+
+        Returns:
+            0 when the table holds all cells, else 1.
+
+        Raises:
+            RfgsError: An option is out of range, or there are no workers.
+        """
+        from tqdm import tqdm
+
+        from rfgs_core.device import need_device
+        from rfgs_core.errors import RfgsError
+        from rfgs_core.study.cell_rows import method_rows, method_table
+        from rfgs_core.study.cells import stored
+        from rfgs_core.study.paper_tables import SIZES, cells, narrowed
+
+        need_at_least_one(seeds=self.seeds)
+        need_device(self.device)
+        if self.out.exists() and not self.out.is_dir():
+            raise RfgsError(f"{self.out} is a file; expected a folder, choose another --out")
+        spread = self.spread.checked()
+        table, size = narrowed(self.name, SIZES[self.size], self.scenes, self.radios, self.methods)
+        chosen = cells(table, size, self.seeds or size.seeds)
+        results: dict[Cell, dict[str, Any]] = {}
+        failed: dict[str, str] = {}
+        rows = []
+        with tqdm(total=len(chosen), desc=self.name, unit="cell") as bar:
+            for cell, failure in self._outcomes(chosen, size, spread, bar.set_postfix_str):
+                bar.update()
+                if failure:
+                    failed[cell.name] = failure
+                else:
+                    results[cell] = stored(cell, self.out, size) or {}
+                # In the order of the table, whoever was first.
+                rows = method_rows(results[one] for one in chosen if one in results)
+                self._write(rows, failed, size)
+        sys.stdout.write(method_table(rows))
+        for cell_name, why in failed.items():
+            sys.stdout.write(f"failed, and in no row: {cell_name}: {why}\n")
+        return 1 if failed else 0
+
+    def _outcomes(
+        self, chosen: Sequence[Cell], size: Size, spread: Spread, tell: Callable[[str], None]
+    ) -> Iterator[tuple[Cell, str]]:
+        """Cells as they are there, and why they are not; first what is finished, then datasets."""
+        from rfgs_core.cli.calls import call
+        from rfgs_core.errors import RfgsError
+        from rfgs_core.study.cells import CellPart, stored
+        from rfgs_core.study.parts import datasets_missing, made
+
+        left: list[Cell] = []
+        for cell in chosen:
+            try:
+                finished = stored(cell, self.out, size) is not None
+            except RfgsError as error:
+                yield cell, str(error)
+                continue
+            if finished:
+                yield cell, ""
+            else:
+                left.append(cell)
+        missing = datasets_missing(
+            left, self.out, lambda cell: call(*cell.generate(self.out, size)), tell
+        )
+        yield from ((cell, missing[cell.dataset]) for cell in left if cell.dataset in missing)
+        parts = [CellPart(cell, size, self.device) for cell in left if cell.dataset not in missing]
+        for part, failure in made(parts, self.out, spread):
+            tell(str(part))
+            yield part.cell, failure
+
+    def _write(self, rows: Sequence[MethodRow], failed: dict[str, str], size: Size) -> None:
+        """Writes the table so far."""
+        from dataclasses import asdict
+
+        from rfgs_core.bench import hardware
+        from rfgs_core.evaluate.provenance import now
+        from rfgs_core.files import write_json, write_text
+        from rfgs_core.study.cell_rows import method_table
+
+        write_text(self.out / f"{self.name}.md", method_table(rows))
+        if self.json is not None:
+            found = {"rows": [asdict(row) for row in rows], "failed": failed}
+            about = {"size": self.size, **asdict(size)}
+            write_json(self.json, {**about, **found, **hardware(), "date": now()})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table1(PaperTable):
+    """The paper's first table: methods and baselines x Wi-Fi and mmWave."""
+
+    name = "table1"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table2(PaperTable):
+    """The paper's second table: its recipe less one part at a time, on Wi-Fi."""
+
+    name = "table2"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table3(PaperTable):
+    """The paper's third table: Wi-Fi, mmWave, UWB and SAR, each beside its baselines."""
+
+    name = "table3"

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Work spread over processes of this machine, or over a Dask cluster."""

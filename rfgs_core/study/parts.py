@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Parts of a study or table, made one after another here or side by side by workers.
+
+Workers share no disk with this process: a part's dataset goes there as an archive, what was made
+of it comes back as one, and only this process writes the study.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+from rfgs_core.errors import RfgsError
+from rfgs_core.evaluate.provenance import versions
+from rfgs_core.links import refuse_link
+from rfgs_core.schedule.answers import Answer, answer_of, begin, refuse_other_versions
+from rfgs_core.schedule.archive import packed, unpack
+from rfgs_core.schedule.spread import Spread
+from rfgs_core.schedule.workers import Workers
+
+if TYPE_CHECKING:
+    from distributed import Future
+
+#: Folders within the study's: what workers of this machine keep meanwhile, and their logs.
+_SCRATCH, _LOG = Path(".work"), Path("log")
+
+
+class Part(Protocol):
+    """A piece of work by itself; its `str` names it."""
+
+    @property
+    def dataset(self) -> Path:
+        """Folder of its dataset within the study's."""
+        ...
+
+    @property
+    def made(self) -> tuple[Path, ...]:
+        """Files and folders that it makes there; the last one is what says that it is done."""
+        ...
+
+    def make(self, out: Path) -> None:
+        """Makes them.
+
+        Raises:
+            RfgsError: It cannot be made.
+        """
+        ...
+
+
+class _OfDataset(Protocol):
+    @property
+    def dataset(self) -> Path: ...
+
+
+D = TypeVar("D", bound=_OfDataset)
+P = TypeVar("P", bound=Part)
+
+
+def datasets_missing(
+    wanted: Sequence[D], out: Path, generate: Callable[[D], None], tell: Callable[[str], None]
+) -> dict[Path, str]:
+    """Generates datasets that are not there, each once.
+
+    Args:
+        wanted: Cells or cases that ask for them.
+        out: Folder of the study or table.
+        generate: Generates the dataset of a cell or case.
+        tell: Is told what is being generated.
+
+    Returns:
+        Dataset → why it could not be made.
+    """
+    missing: dict[Path, str] = {}
+    for one in wanted:
+        if one.dataset in missing or (out / one.dataset / "dataset.json").exists():
+            continue
+        tell(str(one.dataset))
+        try:
+            generate(one)
+        except RfgsError as error:
+            missing[one.dataset] = str(error)
+    return missing
+
+
+def made(parts: Sequence[P], out: Path, spread: Spread) -> Iterator[tuple[P, str]]:
+    """Makes parts, whose datasets are there.
+
+    Args:
+        parts: What is missing.
+        out: Folder of the study or table.
+        spread: Who makes them: one after another here, or workers.
+
+    Yields:
+        Each part when it is made or has failed, and why it failed; empty if it did not. Of
+        workers they come in any order.
+
+    Raises:
+        RfgsError: There are no workers, or they are gone.
+    """
+    if not spread.scheduler and (spread.workers == 1 or len(parts) < 2):
+        for part in parts:
+            try:
+                part.make(out)
+                yield part, ""
+            except RfgsError as error:
+                yield part, str(error)
+        return
+    refuse_link(out / _SCRATCH)
+    try:
+        with spread.ready(len(parts), out / _SCRATCH, out / _LOG, _leave) as workers:
+            yield from _by_workers(workers, parts, out)
+    finally:
+        shutil.rmtree(out / _SCRATCH, ignore_errors=True)
+
+
+def _by_workers(workers: Workers, parts: Sequence[P], out: Path) -> Iterator[tuple[P, str]]:
+    client, datasets = workers.client, {}
+    log = str((out / _LOG).absolute()) if workers.ours else ""
+
+    def submit(part: P) -> Future:
+        if part.dataset not in datasets:
+            # A task of its own, so that Dask makes it again where the worker that held it died.
+            archive = packed(out / part.dataset)
+            datasets[part.dataset] = client.submit(bytes, archive, pure=False)
+        return client.submit(_make, part, datasets[part.dataset], versions(), log, pure=False)
+
+    for part, answer in workers.answers(parts, submit, doing="making"):
+        archive, failure = answer.value
+        if not failure:
+            _place(archive, part, out)
+        elif workers.ours:
+            failure += f" (the log is in {out / _LOG})"
+        yield part, failure
+
+
+def _place(archive: bytes, part: Part, out: Path) -> None:
+    """Puts what a worker made where it belongs, instead of what an earlier run began."""
+    with tempfile.TemporaryDirectory(prefix=".tmp-", dir=out) as folder:
+        unpack(archive, Path(folder))
+        for name in part.made:
+            place = out / name
+            refuse_link(place)
+            place.parent.mkdir(parents=True, exist_ok=True)
+            if place.is_dir():
+                shutil.rmtree(place)
+            os.replace(Path(folder) / name, place)
+
+
+def _make(
+    part: Part, dataset: bytes, wanted: dict[str, str], log: str
+) -> Answer[tuple[bytes, str]]:
+    """Makes a part inside a worker: the archive of what was made, or why it failed.
+
+    Args:
+        part: The part.
+        dataset: Archive of its dataset.
+        wanted: Versions of the packages of the process that asks.
+        log: Folder for what is printed; empty leaves it where it goes.
+
+    Raises:
+        RfgsError: This worker has other packages.
+    """
+    import numba
+    import torch
+    from distributed import get_worker
+
+    worker: Any = get_worker()
+    refuse_other_versions(versions(), wanted)
+    if log:
+        begin(Path(log) / f"worker{worker.name}.log")
+    numba.set_num_threads(1)
+    torch.set_num_threads(1)
+    out, archive, failure = _folder_with(part, dataset, worker.local_directory), b"", ""
+    try:
+        part.make(out)
+        archive = packed(out, without=part.dataset.parts[0])
+    except RfgsError as error:
+        failure = str(error)
+    finally:
+        for rest in out.iterdir():
+            if rest.name != part.dataset.parts[0]:
+                shutil.rmtree(rest)
+    return answer_of(worker, (archive, failure), {}, done=0)
+
+
+#: Digest of the dataset that this worker keeps, and the folder that it lies in: what parts of one
+#: dataset share is computed once.
+_kept: tuple[str, tempfile.TemporaryDirectory[str]] | None = None
+
+
+def _folder_with(part: Part, dataset: bytes, scratch: str) -> Path:
+    """A folder that holds a part's dataset and nothing else."""
+    global _kept
+    digest = hashlib.sha256(dataset).hexdigest()
+    if _kept is None or _kept[0] != digest:
+        _leave()
+        folder = tempfile.TemporaryDirectory(prefix="rfgs-", dir=scratch)
+        _kept = (digest, folder)
+        unpack(dataset, Path(folder.name) / part.dataset)
+    return Path(_kept[1].name)
+
+
+def _leave() -> None:
+    """Drops what this worker keeps."""
+    global _kept
+    if _kept is not None:
+        _kept[1].cleanup()
+        _kept = None

@@ -13,10 +13,10 @@ from functools import cache
 
 import numpy as np
 from jaxtyping import Float, Float64, Int64
-from scipy.ndimage import map_coordinates
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import KDTree
 
+from rfgs_core.bodies.trilinear import read_grids
 from rfgs_core.encode.matched_filter import matched_filter_map
 from rfgs_core.measure.delay_maps import delay_power_map
 from rfgs_core.measure.observations import Observations
@@ -56,10 +56,7 @@ class PairMaps:
 
     def at(self, points: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "pair N"]:
         """Trilinear reading at `points`; the border value continues outside."""
-        index = ((points - self.origin_m) / self.spacing_m).T
-        return np.stack(
-            [map_coordinates(pair, index, order=1, mode="nearest") for pair in self.power]
-        )
+        return read_grids(self.power, (points - self.origin_m) / self.spacing_m)
 
     def upright(
         self, places: Float[np.ndarray, "P 2"], heights_m: Float[np.ndarray, "H"]
@@ -71,8 +68,8 @@ class PairMaps:
         part = z - below
         # Trilinear reading is linear along z, so the mean over heights can be taken first.
         column = ((1 - part) * self.power[..., below] + part * self.power[..., above]).mean(axis=3)
-        index = ((places - self.origin_m[:2]) / self.spacing_m).T
-        return np.stack([map_coordinates(pair, index, order=1, mode="nearest") for pair in column])
+        index = (places - self.origin_m[:2]) / self.spacing_m
+        return read_grids(column[..., None], np.column_stack([index, np.zeros(len(index))]))
 
 
 def pair_maps(observations: Observations, spacing_m: float | None = None) -> PairMaps:

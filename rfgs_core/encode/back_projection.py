@@ -141,8 +141,10 @@ def back_project(
     num_pairs = int(link_pair.max()) + 1
     out = np.zeros((num_pairs, len(centre_k), 2, len(points)), dtype=np.float32)
     # The first sample again at the end: reading between the last two needs no wrap.
-    profiles = np.concatenate([profiles, profiles[..., :1]], axis=2)
-    split = np.stack([profiles.real, profiles.imag], axis=2)
+    size = profiles.shape[2]
+    split = np.zeros((*profiles.shape[:2], 2, size + 1), profiles.real.dtype)
+    split[:, :, 0, :size], split[:, :, 1, :size] = profiles.real, profiles.imag
+    split[..., size] = split[..., 0]
     _add_profiles(
         split,
         centre_k,

@@ -6,35 +6,19 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 #: More threads than cores do not spin.
 THREADS = min(4, len(os.sched_getaffinity(0)))
-#: Fifty short kernels on all threads, 10 ms of sleep after each; prints the processor time.
-_CODE = """
-import time
-import rfgs_core, torch, numba
-import numpy as np
-
-@numba.njit(parallel=True)
-def kernel(values):
-    for i in numba.prange(len(values)):
-        values[i] += 1
-
-values = np.zeros(1000)
-kernel(values)
-start = time.process_time()
-for _ in range(50):
-    kernel(values)
-    time.sleep(0.01)
-print(time.process_time() - start)
-"""
+#: A program of fifty short kernels on all threads, 10 ms of sleep after each.
+_KERNELS = Path(__file__).with_name("short_kernel.py")
 
 
 def _processor_s(**env: str) -> float:
     kept = {name: value for name, value in os.environ.items() if name != "OMP_WAIT_POLICY"}
     env = {**kept, "NUMBA_NUM_THREADS": str(THREADS), "NUMBA_THREADING_LAYER": "omp", **env}
     done = subprocess.run(
-        [sys.executable, "-c", _CODE], env=env, capture_output=True, text=True, check=True
+        [sys.executable, str(_KERNELS)], env=env, capture_output=True, text=True, check=True
     )
     return float(done.stdout)
 

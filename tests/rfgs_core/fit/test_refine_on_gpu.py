@@ -17,7 +17,8 @@ from rfgs_core.fit import refine as refine_module
 from rfgs_core.fit.frame import FrameState, solve_reflectivity
 from rfgs_core.fit.losses import nearest_gaussian
 from rfgs_core.fit.parameters import LearningRates, TrainableGaussians
-from rfgs_core.fit.refine import Task, refine
+from rfgs_core.fit.refine import refine
+from rfgs_core.fit.task import Task
 from rfgs_core.measure.observations import Observations
 from rfgs_core.measure.phase_free import delay_amplitude
 from rfgs_core.propagation import reference

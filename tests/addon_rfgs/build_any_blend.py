@@ -15,6 +15,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from blank_file import open_blank_file
 from build_scenes import box, person
 
 import addon_rfgs
@@ -51,7 +52,7 @@ SAID: dict[str, dict[str, Any]] = {
 
 def stage() -> None:
     """A walking person over three frames and nothing else."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    open_blank_file()
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end, scene.render.fps = 1, 3, 24
     person()
@@ -338,7 +339,7 @@ def library() -> None:
 
 def linked() -> None:
     """A person of another file, instanced once, two metres away."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    open_blank_file()
     bpy.context.scene.frame_end = 3
     with bpy.data.libraries.load(str(FOLDER / "library.blend"), link=True) as (_, wanted):
         wanted.collections = ["kit"]
@@ -426,7 +427,7 @@ def main() -> None:
         if name in EXPORTED:
             export_bundle(bpy.context.scene, FOLDER / name)
     (FOLDER / "reports.json").write_text(json.dumps(reports))
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    open_blank_file()
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ import sys
 from pathlib import Path
 
 import bpy
+from blank_file import open_blank_file
 from build_scenes import person
 
 import addon_rfgs
@@ -70,7 +71,7 @@ def main(folder: Path) -> None:
     addon_rfgs.register()
     errors = {}
     for name, (footprint, height_m) in ROOMS.items():
-        bpy.ops.wm.read_factory_settings(use_empty=True)
+        open_blank_file()
         scene = bpy.context.scene
         scene.frame_start, scene.frame_end, scene.render.fps = 1, 5, 10
         person()

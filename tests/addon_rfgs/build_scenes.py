@@ -18,6 +18,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from blank_file import open_blank_file
 from mathutils import Vector
 
 import addon_rfgs
@@ -122,7 +123,7 @@ def person(rate: float = 1.0) -> tuple[bpy.types.Object, bpy.types.Object]:
 
 def room(scale: float = 1.0) -> None:
     """The scene all others start from: floor, box, person, two cameras, one access point."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    open_blank_file()
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, 5
     scene.render.fps = 10

@@ -92,10 +92,11 @@ def registered() -> Iterator[None]:
 def empty_scene(registered: None) -> Iterator[Any]:
     """A scene without anything; preferences that name the environment, $RFGS_PYTHON."""
     import bpy
+    from blank_file import open_blank_file
 
     from addon_rfgs.jobs.preferences import ADDON
 
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    open_blank_file()
     stored = bpy.context.preferences.addons.new()
     stored.module = ADDON
     stored.preferences.python = os.environ["RFGS_PYTHON"]
@@ -115,10 +116,11 @@ def in_room(registered: None) -> None:
 def settings(registered: None, tmp_path: Path) -> Any:
     """The Gaussians panel's settings, after a run of three frames was imported as point clouds."""
     import bpy
+    from blank_file import open_blank_file
     from splat_files import write_run
     from splat_scene import FRAMES
 
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    open_blank_file()
     found = bpy.context.scene.rfgs.gaussians
     found.solid_view = False  # What nodes do to single points is asked, not how it is drawn.
     found.path = str(write_run(tmp_path / "run", FRAMES))

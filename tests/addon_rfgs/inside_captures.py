@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Captures of real radios out of the panel; `test_inside_captures.py` runs this file.
+"""Captures of real radios out of the panel; `test_inside_blender.py` runs this file.
 
 $RFGS_CAPTURES holds `a.csi`, `b.csi` and `radios.yaml`, and $RFGS_PYTHON is a Python that has rfgs.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Channels of a link as an image, drawn by `rfgs`; `test_inside_channels.py` runs this file.
+"""Channels of a link as an image, drawn by `rfgs`; `test_inside_blender.py` runs this file.
 
 $RFGS_RUN is a trained run and $RFGS_PYTHON a Python that has rfgs.
 """

@@ -9,6 +9,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+from blank_file import open_blank_file
 
 from addon_rfgs.cli import open_blend, run
 from addon_rfgs.coverage.surface import read_map
@@ -34,7 +35,7 @@ def file(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def scene(registered: None, file: Path) -> bpy.types.Scene:
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    open_blank_file()
     bpy.context.scene.rfgs.coverage.path = str(file)
     return bpy.context.scene
 

@@ -9,6 +9,7 @@ import bpy
 import mathutils
 import numpy as np
 import pytest
+from blank_file import open_blank_file
 from plyfile import PlyData
 from splat_files import COLUMNS, REST, rows_of, write
 from splat_scene import FRAMES, cloud, only_cloud
@@ -111,7 +112,7 @@ def test_what_cannot_be_written_is_refused(tmp_path: Path, change, names, messag
 def test_centimetre_scenes_write_metres_bit_for_bit(tmp_path: Path) -> None:
     rows = rows_of(COLUMNS, 9)
     write(tmp_path / "in.ply", rows)
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    open_blank_file()
     bpy.context.scene.unit_settings.scale_length = 0.01
     bpy.context.scene.rfgs.gaussians.path = str(tmp_path / "in.ply")
     bpy.ops.rfgs.import_gaussians()

@@ -9,6 +9,7 @@ from itertools import pairwise
 import bpy
 import numpy as np
 import pytest
+from blank_file import open_blank_file
 from build_scenes import BONES, box, person
 from mathutils import Euler, Matrix, Vector
 
@@ -45,7 +46,7 @@ def nameless(number: int, _name: str) -> str:
 
 def renamed(name: Name) -> dict[str, str]:
     """The walking figure of the other tests under other names; returns new name by old."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    open_blank_file()
     bpy.context.scene.frame_end = 5
     rig, body = person()
     body.rfgs.object_class = "AUTO"
@@ -58,7 +59,7 @@ def renamed(name: Name) -> dict[str, str]:
 
 def armature(rows: list[Row]) -> bpy.types.Object:
     """An armature of bones given by name, parent, head and tail [m]."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    open_blank_file()
     item = bpy.data.objects.new("rig", bpy.data.armatures.new("rig"))
     bpy.context.scene.collection.objects.link(item)
     bpy.context.view_layer.objects.active = item

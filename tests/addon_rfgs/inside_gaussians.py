@@ -9,6 +9,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+from blank_file import open_blank_file
 from splat_files import BARE, COLUMNS, rows_of, write
 from splat_scene import FRAMES, cloud
 
@@ -184,7 +185,7 @@ def test_tracks_keep_their_hue(settings) -> None:
 
 
 def test_modes_without_their_numbers_say_so(tmp_path: Path) -> None:
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    open_blank_file()
     settings = bpy.context.scene.rfgs.gaussians
     settings.path = str(write(tmp_path / "plain.ply", rows_of(BARE, 4)))
     assert bpy.ops.rfgs.import_gaussians() == {"FINISHED"}
@@ -319,7 +320,7 @@ def test_settings_can_be_made_before_there_are_gaussians_and_in_edit_mode(settin
         bpy.ops.rfgs.update_display()
     bpy.ops.object.mode_set(mode="OBJECT")
     assert bpy.ops.rfgs.update_display() == {"FINISHED"}
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    open_blank_file()
     bpy.context.scene.rfgs.gaussians.size = 2.0
     assert not bpy.ops.rfgs.update_display.poll()
 
@@ -333,7 +334,7 @@ def test_an_import_while_a_cloud_is_edited(settings) -> None:
 
 
 def test_units_of_the_scene_are_kept(tmp_path: Path) -> None:
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    open_blank_file()
     scene = bpy.context.scene
     scene.unit_settings.scale_length = 0.01
     scene.rfgs.gaussians.path = str(write(tmp_path / "a.ply", rows_of(COLUMNS, 4)))

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import bpy
 import pytest
+from blank_file import open_blank_file
 from pretended_jobs import plan, rewrite
 
 import addon_rfgs
@@ -64,7 +65,7 @@ def test_operators_refuse_in_one_line_what_they_cannot_do(registered: None) -> N
 def test_buttons_of_jobs_say_why_they_cannot_be_pressed(
     registered: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    open_blank_file()
     with pytest.raises(RuntimeError, match="Save the file first"):
         bpy.ops.rfgs.generate_dataset()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "room.blend"))
@@ -79,7 +80,7 @@ def test_buttons_of_jobs_say_why_they_cannot_be_pressed(
 
 
 def test_training_waits_for_a_dataset(registered: None, jobs, tmp_path: Path, monkeypatch) -> None:
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    open_blank_file()
     scene = bpy.context.scene
     assert not starting.dataset_to_come(scene), "a file that was never saved has no folder"
     scene.rfgs.jobs.dataset_folder = str(tmp_path / "data")
@@ -109,7 +110,7 @@ def test_a_job_is_forgotten_by_command(
 
 
 def test_devices_of_one_s_own_are_what_is_generated(tmp_path: Path, registered: None) -> None:
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    open_blank_file()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "room.blend"))
     scene = bpy.context.scene
     assert starting.generate_plan(scene).radios == "wifi" and not starting.doing_without(scene)
@@ -136,7 +137,7 @@ def test_the_command_names_what_is_left_out_before_the_job_begins(
     monkeypatch: pytest.MonkeyPatch,
     named: bool,
 ) -> None:
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    open_blank_file()
     bpy.ops.rfgs.add_device(role="ACCESS_POINT", location=(1, 0, 1))
     bpy.context.object.name, bpy.context.object.rfgs.radio = "ap", "wifi"
     bpy.ops.rfgs.add_device(role="TRANSMITTER")

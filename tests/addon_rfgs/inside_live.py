@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Gaussians of `rfgs live` as a cloud; `test_inside_live.py` runs this file.
+"""Gaussians of `rfgs live` as a cloud; `test_inside_blender.py` runs this file.
 
 $RFGS_DATASET is a dataset to replay and $RFGS_PYTHON a Python that has rfgs.
 """
@@ -20,6 +20,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from blank_file import open_blank_file
 
 from addon_rfgs.cli import run
 from addon_rfgs.errors import AddonError
@@ -33,7 +34,7 @@ DATASET, PYTHON = os.environ["RFGS_DATASET"], os.environ["RFGS_PYTHON"]
 @pytest.fixture
 def said(registered: None) -> Iterator[Any]:
     """Settings of an empty scene; nothing is followed afterwards."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    open_blank_file()
     yield bpy.context.scene.rfgs.live
     following.end()
 

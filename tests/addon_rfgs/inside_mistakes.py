@@ -10,6 +10,7 @@ from pathlib import Path
 
 import bpy
 import pytest
+from blank_file import open_blank_file
 from build_scenes import room
 from splat_files import write_run
 
@@ -39,7 +40,7 @@ def library(registered: None, tmp_path: Path) -> Path:
 
 
 def empty_file(_library: Path) -> None:
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    open_blank_file()
 
 
 def startup_file(_library: Path) -> None:
@@ -129,7 +130,7 @@ def test_every_operator_answers_in_any_file(
 @pytest.fixture
 def two_scenes(tmp_path: Path) -> tuple[bpy.types.Scene, bpy.types.Scene]:
     """Scenes of one file, with a cloud each."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    open_blank_file()
     first, second = bpy.context.scene, bpy.data.scenes.new("Second")
     for scene, count in ((first, 40), (second, 30)):
         bpy.context.window.scene = scene
@@ -192,7 +193,7 @@ def test_findings_about_what_was_renamed_say_so(registered: None) -> None:
 @pytest.fixture
 def finished_job(tmp_path: Path) -> Iterator[Path]:
     """A training in the list that is done; its folder."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    open_blank_file()
     stored = bpy.context.preferences.addons.new()
     stored.module = ADDON
     folder = write_run(tmp_path / "run", (1,))

@@ -12,6 +12,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+from blank_file import open_blank_file
 
 from addon_rfgs.cli import open_blend, run
 from addon_rfgs.errors import AddonError
@@ -76,7 +77,7 @@ def data(tmp_path: Path) -> Path:
 @pytest.fixture
 def scene(registered: None, data: Path) -> bpy.types.Scene:
     """Frame 1, whose paths alone are asked for."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    open_blank_file()
     bpy.context.scene.frame_set(1)
     bpy.context.scene.rfgs.paths.dataset = str(data)
     bpy.context.scene.rfgs.paths.follow = False

@@ -11,6 +11,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+from blank_file import open_blank_file
 from splat_files import (
     BARE,
     COLUMNS,
@@ -151,7 +152,7 @@ def test_bad_text_gets_one_line(tmp_path: Path, change, message: str) -> None:
 
 
 def test_a_file_without_points_is_refused_and_changes_nothing(tmp_path: Path) -> None:
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    open_blank_file()
     path = write(tmp_path / "none.ply", rows_of(COLUMNS, 0))
     with pytest.raises(AddonError, match="holds no Gaussians"):
         import_gaussians(bpy.context.scene, path, Inspection())
@@ -191,7 +192,7 @@ def mutated(data: bytes, rng: np.random.Generator) -> bytes:
 @pytest.mark.filterwarnings("error")
 def test_500_mutated_plys_import_or_are_refused(tmp_path: Path) -> None:
     """Each goes the whole way into Blender and is evaluated, or is refused with one line."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    open_blank_file()
     seeds = [
         write(tmp_path / f"{form}{faces}.ply", rows_of(names, 30), form, faces).read_bytes()
         for form in FORMATS

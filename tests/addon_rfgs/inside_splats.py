@@ -8,6 +8,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+from blank_file import open_blank_file
 from mathutils import Quaternion
 from splat_files import COLUMNS, rows_of, write
 
@@ -32,7 +33,7 @@ def test_a_splat_fades_out_as_a_gaussian_does(
         rows[f"rot_{axis}"] = value
     for axis, scale in enumerate(stretched):
         rows[f"scale_{axis}"] = np.log(scale)
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    open_blank_file()
     scene = bpy.context.scene
     scene.rfgs.gaussians.display_mode = "splats"
     scene.rfgs.gaussians.path = str(write(tmp_path / "one.ply", rows))
@@ -55,7 +56,7 @@ def test_many_splats_are_seen_through(tmp_path: Path) -> None:
     rows["z"] = np.linspace(-2, 2, count)
     for axis in range(3):
         rows[f"scale_{axis}"] = np.log(0.3)
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    open_blank_file()
     settings = bpy.context.scene.rfgs.gaussians
     settings.display_mode, settings.path = "splats", str(write(tmp_path / "many.ply", rows))
     assert bpy.ops.rfgs.import_gaussians() == {"FINISHED"}

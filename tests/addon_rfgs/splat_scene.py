@@ -6,6 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import bpy
+from blank_file import open_blank_file
 
 #: Frames of the run that the fixture `settings` imports.
 FRAMES = (2, 5, 9)
@@ -18,7 +19,7 @@ def cloud(frame: int) -> bpy.types.Object:
 
 def only_cloud(path: Path) -> bpy.types.Object:
     """The cloud of one PLY in an empty file."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    open_blank_file()
     bpy.context.scene.rfgs.gaussians.path = str(path)
     assert bpy.ops.rfgs.import_gaussians() == {"FINISHED"}
     return bpy.data.objects["Gaussians static"]

@@ -25,15 +25,11 @@ _LATEST_M = 6.0
 
 
 class Posed(NamedTuple):
-    """A body in a pose, and what every place sees of it."""
+    """A body in a pose, and what device pairs see of it."""
 
     facets: Facets
-    seen: dict[tuple[float, ...], Bool[np.ndarray, "facet"]]
-    """Facets seen from each place, by its coordinates to the centimetre."""
-
-    def by(self, end: End) -> Bool[np.ndarray, "facet"]:
-        """Facets that an end sees."""
-        return self.seen[_key(end.centre)]
+    seen: dict[tuple[int, int], tuple[Bool[np.ndarray, "facet"], Bool[np.ndarray, "facet"]]]
+    """Facets that the transmitting and the receiving end of each pair see, by its devices."""
 
 
 def figure_of(body: Body) -> Figure:
@@ -45,18 +41,21 @@ def posed(figure: Figure, pose: Pose, pairs: list[Pair]) -> Posed:
     """A body in a pose as the ends of some pairs see it."""
     standing = figure.posed(pose)
     facets = Facets(standing.points, standing.normals, np.sqrt(figure.areas_m2))
-    seen = {}
-    for pair in pairs:
-        for end in (pair.tx, pair.rx):
-            if _key(end.centre) not in seen:
-                seen[_key(end.centre)] = seen_from(standing, figure.body.faces, end.centre)
-    return Posed(facets, seen)
+    looks: dict[tuple[float, ...], Bool[np.ndarray, "facet"]] = {}
+
+    def seen_by(end: End) -> Bool[np.ndarray, "facet"]:
+        # Elements of one device lie within millimetres: one look does for them.
+        place = tuple(np.round(end.centre, 2).tolist())
+        if place not in looks:
+            looks[place] = seen_from(standing, figure.body.faces, end.centre)
+        return looks[place]
+
+    return Posed(facets, {pair.devices: (seen_by(pair.tx), seen_by(pair.rx)) for pair in pairs})
 
 
 def direct(posed: Posed, pair: Pair, shift: np.ndarray) -> np.ndarray:
     """Covariance of the straight echoes of a posed body, moved a little by `shift` [3] m."""
-    seen = posed.by(pair.tx), posed.by(pair.rx)
-    return covariance(pair, posed.facets.moved(shift), *seen, LOBE_RAD)
+    return covariance(pair, posed.facets.moved(shift), *posed.seen[pair.devices], LOBE_RAD)
 
 
 def by_bounces(
@@ -85,8 +84,3 @@ def _images(pair: Pair, bounds_m: np.ndarray, centre: np.ndarray) -> Iterator[tu
 
 def _path_m(tx: End, rx: End, centre: np.ndarray) -> float:
     return float(np.linalg.norm(tx.centre - centre) + np.linalg.norm(rx.centre - centre))
-
-
-def _key(place: np.ndarray) -> tuple[float, ...]:
-    # Elements of one device lie within millimetres: one look does for them.
-    return tuple(np.round(place, 2).tolist())

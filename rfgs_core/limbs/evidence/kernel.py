@@ -124,7 +124,9 @@ def _with_noise(change: np.ndarray, matrix: np.ndarray, noise: float) -> float:
     """Log evidence at one share of noise and the best level, by Cholesky's factor."""
     _, cholesky, solve = _routines()
     size = len(change)
-    root, failed = cholesky(matrix + noise * np.eye(size), lower=0, clean=0)
+    noisy = matrix.copy()
+    noisy.ravel()[:: size + 1] += noise
+    root, failed = cholesky(noisy, lower=0, clean=0)
     if failed:
         return -np.inf
     white = solve(root, change, lower=0, trans=2)[0]

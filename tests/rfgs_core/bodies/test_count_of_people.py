@@ -32,7 +32,7 @@ NOBODY = Bodies.together([])
 
 @pytest.fixture
 def empty(make_observations: Callable[..., Observations]) -> Observations:
-    radio = replace(preset("wifi"), rx_rows=3, rx_cols=3, num_subcarriers=24)
+    radio = replace(preset("wifi"), rx_rows=2, rx_cols=3, num_subcarriers=24)
     return make_observations(radio=radio, bounds_m=ROOM_M)
 
 

@@ -34,7 +34,7 @@ def _heard(pose: Pose) -> Observations:
     """What a Wi-Fi radio hears of the walker's direct echoes in a pose."""
     figure = _walker()[0]
     radio = preset("wifi")
-    radio = replace(radio, rx_rows=3, rx_cols=3)
+    radio = replace(radio, rx_rows=2, rx_cols=3)
     placed = layout(radio, place_devices(radio, BOUNDS_M))
     posed = figure.posed(pose)
     csi = np.zeros((len(placed.tx_xyz), len(placed.rx_xyz), radio.num_subcarriers), complex)

@@ -92,9 +92,10 @@ def test_who_bends_the_legs_walks_lower_on_level_feet() -> None:
 
 def test_a_walk_of_another_body_is_told(heard, stride, walker_joints, monkeypatch) -> None:
     """Four frames, a third of a second apart: joints nearer than of somebody who stands."""
-    # Nothing comes by way of walls here, and one stride is enough.
+    # Nothing comes by way of walls here, and one stride is enough, with legs bent in two ways.
     monkeypatch.setattr(telling, "ALPHAS", (0.0,))
     monkeypatch.setattr(telling, "STRIDES", 1)
+    monkeypatch.setattr(telling, "BENDS_RAD", (0.0, 0.1))
     time_s = np.arange(4) * 0.3
     phase = np.round(time_s / stride.lasts_s * PHASES).astype(int) % PHASES
     places = np.column_stack([0.9 * time_s - 0.6, 0.1 * time_s, 0.0 * time_s])

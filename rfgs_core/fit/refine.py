@@ -4,17 +4,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 import torch
-from jaxtyping import Float, Int64
+from jaxtyping import Int64
 from torch import Tensor
 
 from rfgs_core.arrays import Shape, load_arrays, save_arrays
-from rfgs_core.device import Device, on_device
+from rfgs_core.device import on_device
 from rfgs_core.encode import MATCHED_FILTER, Encoder
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.fit.density import (
@@ -29,21 +29,16 @@ from rfgs_core.fit.density import (
 )
 from rfgs_core.fit.frame import FrameState
 from rfgs_core.fit.last_finite import LastFinite
-from rfgs_core.fit.losses import SamplePoints, channel_loss, paper_loss
 from rfgs_core.fit.parameters import (
     GAUSSIAN_SHAPES,
     MOMENTS,
     LearningRates,
     TrainableGaussians,
 )
-from rfgs_core.fit.sampling import sample_points
+from rfgs_core.fit.task import Task, batch, loss_of
 from rfgs_core.fit.temporal import Continuity
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.measure.observations import Observations
-from rfgs_core.model.channel import Channel
-from rfgs_core.model.comparison import Comparison, comparison_of
-from rfgs_core.model.first_powers import noise_per_link
-from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import TrainConfig
 
 #: Our rates for the channel loss: positions move by fractions of a wavelength.
@@ -60,83 +55,6 @@ _MEMORY: dict[str, Shape] = {
     "density.gradient_sum": ("gradients",),
     "density.gradient_steps": (),
 }
-
-
-@dataclass(frozen=True)
-class Task:
-    """What one frame's descent compares with."""
-
-    channel: Channel
-    """Visible links and subcarriers."""
-    comparison: Comparison
-    """The terms in which the change is reported."""
-    target: Tensor
-    """Channel change to explain, (link, entry), in those terms."""
-    noise: Float[Tensor, "link"]
-    """Variance per link that need not be explained."""
-    points: SamplePoints | None
-    """Sample points of the paper's losses; None without them."""
-    weighted: bool
-    """Whether eq. 5 weighs its points by ‖φ‖."""
-
-    def on(self, device: Device) -> Task:
-        """The task for Gaussians on a device; links and paths go there when they are used."""
-        return replace(on_device(self, device), channel=self.channel)
-
-    @staticmethod
-    def of(observations: Observations, config: TrainConfig, seed: int, encoder: Encoder) -> Task:
-        """Gathers what the objective needs."""
-        points = None
-        if config.objective != "csi":
-            rng = np.random.default_rng(seed)
-            points = sample_points(
-                observations, config.grid_side, rng, encoder, config.refine_levels
-            )
-        comparison = comparison_of(observations)
-        target = comparison.measured()
-        return Task(
-            Channel.of(observations, observations.links, observations.subcarriers),
-            comparison,
-            target,
-            noise_per_link(observations, target, config.unexplained),
-            points,
-            "rf_weights" not in config.without,
-        )
-
-
-def _batch(task: Task, config: TrainConfig, seed: int, step: int) -> tuple[np.ndarray, Tensor]:
-    """Links and sample points of a step; a function of the step, so that resuming is exact."""
-    rng = np.random.default_rng(sub_seed(seed, "batch", step))
-    count = len(task.channel.links)
-    wanted = max(1, config.batch_entries // task.channel.subcarriers.num_selected)
-    together = task.comparison.together
-    if together is None or not count:
-        links = np.sort(rng.choice(count, min(wanted, count), replace=False))
-    else:
-        # Groups in random order until there are enough links, and one group at least.
-        order = rng.permutation(int(together.max()) + 1)
-        filled = np.cumsum(np.bincount(together)[order]) - 1
-        links = np.flatnonzero(np.isin(together, order[: 1 + np.searchsorted(filled, wanted)]))
-    size = 0 if task.points is None else len(task.points.xyz)
-    points = rng.choice(size, min(config.batch_points, size), replace=False) if size else []
-    return links, torch.as_tensor(np.asarray(points, dtype=np.int64))
-
-
-def _loss(
-    task: Task,
-    state: FrameState,
-    gaussians: Gaussians,
-    links: np.ndarray,
-    points: SamplePoints | None,
-) -> Float[Tensor, ""]:
-    loss = gaussians.means.new_zeros(())
-    if points is not None:
-        loss = loss + paper_loss(gaussians, points, task.weighted)
-    if len(links):
-        part = task.channel.rows(links)
-        predicted = task.comparison.predicted(part.change(state.head, gaussians), links)
-        loss = loss + channel_loss(predicted, task.target[links], task.noise[links])
-    return loss
 
 
 def refine(
@@ -172,10 +90,10 @@ def refine(
     density.resume(memory)
     last_finite, continuity = LastFinite(checkpoint), _continuity(state, config)
     for step in range(first + 1, config.iterations + 1):
-        links, chosen = _batch(task, config, seed, step)
+        links, chosen = batch(task, config, seed, step)
         links = links if config.objective != "paper" else links[:0]
         points = None if task.points is None else task.points.rows(chosen)
-        loss = _loss(task, state, trained.gaussians, links, points)
+        loss = loss_of(task, state, trained.gaussians, links, points)
         if continuity is not None:
             loss = loss + continuity.loss(trained.gaussians, trained.origin)
         if not torch.isfinite(loss):

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from rfgs_core.evaluate.residual import GAUSSIANS_ALONE
+from rfgs_core.evaluate.verdicts import leak
 from rfgs_core.study.ablation import VARIANTS
 from rfgs_core.study.paper_tables import ABLATED, FIELDS, TRAINED
 from rfgs_core.study.table import number
@@ -113,7 +114,7 @@ def method_table(rows: Sequence[MethodRow]) -> str:
         lines += [f"{scene}, `{radio}`:", "", f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
         here = [row for row in rows if (row.scene, row.radio) == (scene, radio)]
         lines += [f"| {' | '.join(_cells(row))} |" for row in sorted(here, key=_order)]
-        lines += ["", *strongest(here)]
+        lines += ["", *strongest(here), *leaks(here)]
     return "\n".join([*lines, _NOTES, ""])
 
 
@@ -138,6 +139,18 @@ def strongest(rows: Sequence[MethodRow]) -> list[str]:
         value, best = max(ranked, key=lambda pair: pair[0])
         parts.append(f"{title} {label(best.method)} {sign * value:{form}} (RF-GS {own:{form}})")
     return [f"Strongest beside RF-GS: {'; '.join(parts)}.", ""] if parts else []
+
+
+def leaks(rows: Sequence[MethodRow]) -> list[str]:
+    """Warnings where the nearest visible entry tells hidden ones; none as it should be.
+
+    Args:
+        rows: Rows of one scene and radio.
+    """
+    nearest = [row.mean for row in rows if row.method == "nearest_element"]
+    columns = (("element_snr_db", "elements"), ("subcarrier_snr_db", "subcarriers"))
+    told = [leak(mean[key], what) for mean in nearest for key, what in columns]
+    return [line for sentence in told if sentence for line in (sentence, "")]
 
 
 def _order(row: MethodRow) -> int:

@@ -68,6 +68,23 @@ def test_what_fails_is_named_and_the_others_are_made(workers: int, tmp_path: Pat
     assert {path.name for path in tmp_path.iterdir()} - {"log"} == {"data", "runs", "cells"}
 
 
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_stopped_study_keeps_what_is_finished(workers: int, tmp_path: Path) -> None:
+    parts = doublings(tmp_path)[:2]
+    outcomes = made(parts, tmp_path, Spread(workers))
+    first, why = next(outcomes)
+    # As Ctrl-C does: nothing else is begun, and no worker or scratch is left.
+    outcomes.close()
+    assert why == "" and not (tmp_path / ".work").exists()
+    done = tmp_path / first.made[-1]
+    before = done.stat().st_mtime_ns
+    rest = [part for part in parts if not (tmp_path / part.made[-1]).exists()]
+    assert first not in rest
+    assert all(why == "" for _, why in made(rest, tmp_path, Spread(workers)))
+    assert [read_json(tmp_path / part.made[-1]) for part in parts] == [8, 8]
+    assert done.stat().st_mtime_ns == before
+
+
 def test_no_link_leads_out_of_what_workers_fill(tmp_path: Path) -> None:
     from rfgs_core.links import filled
 

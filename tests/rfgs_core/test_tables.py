@@ -16,7 +16,7 @@ from rfgs_core.cli import main
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json
 from rfgs_core.study.ablation import VARIANTS
-from rfgs_core.study.cell_rows import method_rows, method_table, strongest
+from rfgs_core.study.cell_rows import leaks, method_rows, method_table, strongest
 from rfgs_core.study.cells import make, settings_of, stored
 from rfgs_core.study.paper_tables import (
     FIELDS,
@@ -75,6 +75,13 @@ def test_the_strongest_of_others_is_named_even_where_it_wins() -> None:
     (line, _) = strongest(rows)
     assert "F10 omp 0.900 (RF-GS 0.800)" in line and "centroid" not in line
     assert strongest([row for row in rows if row.method != "rfgs"]) == []
+
+
+def test_a_table_warns_where_hidden_entries_are_hardly_hidden() -> None:
+    rows = method_rows([result(0, 0.8, nearest_element=0.1)])
+    assert leaks(rows)[0].startswith("Not decided: copying the nearest visible entry explains 3.0")
+    assert leaks(rows)[0] in method_table(rows)
+    assert leaks(method_rows([result(0, 0.8, linear=0.1)])) == []
 
 
 def test_ablations_differ_by_what_they_leave_out() -> None:

@@ -17,6 +17,7 @@ from rfgs_core.evaluate.baselines.spectrum import _like, _likeliest, spectral
 from rfgs_core.evaluate.evidence import Evidence
 from rfgs_core.evaluate.geometry import best_voxels
 from rfgs_core.evaluate.rf import frame_rf, rf_values
+from rfgs_core.evaluate.verdicts import leak
 
 Make = Callable[..., object]
 ONE = np.array([[2.0, 1.7, 1.2]])
@@ -121,6 +122,21 @@ def test_interpolators_keep_visible_entries_and_unmeasured_links(scatterers) -> 
 def ramp(x: np.ndarray) -> np.ndarray:
     """Two waves of neighbouring directions over array columns."""
     return np.exp(0.35j * x) + 0.4 * np.exp(0.25j * x + 1j)
+
+
+def test_a_split_that_leaks_is_told_by_the_nearest_neighbour(scatterers) -> None:
+    """As it is made, a neighbour tells nothing; elements that are shown after all are noticed."""
+    made = scatterers(TWO)
+    hidden = rf_of(made, "nearest_element")
+    assert leak(hidden["element_snr_db"], "elements") == ""
+    assert leak(hidden["subcarrier_snr_db"], "subcarriers") == ""
+    links = made.evidence.layout.measured
+    shown = replace(made.evidence, delta=made.delta, static=made.static, link_visible=links)
+    leaked = BASELINES["nearest_element"](shown).delta
+    assert leaked is not None
+    values = rf_values(frame_rf(made.delta, leaked, made.held_out, shown.layout))
+    line = leak(values["element_snr_db"], "elements")
+    assert line.startswith("Not decided: copying the nearest visible entry explains")
 
 
 def test_kriging_and_lines_beat_the_nearest_value_on_a_phase_ramp() -> None:

@@ -199,7 +199,7 @@ def test_the_last_finite_state_is_kept_when_the_loss_breaks(
     tmp_path: Path, monkeypatch, observations, state, quick_config
 ) -> None:
     """The features break after 14 steps; copies are made of the states after 0, 10, …"""
-    checkpoint, finite = tmp_path / "frame.npz", refine_module._loss
+    checkpoint, finite = tmp_path / "frame.npz", refine_module.loss_of
     calls = []
 
     def breaks(task, state, gaussians, links, points):
@@ -211,7 +211,7 @@ def test_the_last_finite_state_is_kept_when_the_loss_breaks(
 
     config = replace(quick_config, iterations=20)
     good = refine(observations, state, replace(config, iterations=10), 0)
-    monkeypatch.setattr(refine_module, "_loss", breaks)
+    monkeypatch.setattr(refine_module, "loss_of", breaks)
     expected = r"at step 15; features of 1 Gaussians .*after 10 steps is kept in .*frame\.npz"
     with pytest.raises(RfgsError, match=expected):
         refine(observations, state, config, 0, checkpoint)
@@ -219,7 +219,7 @@ def test_the_last_finite_state_is_kept_when_the_loss_breaks(
         assert int(kept["finished_steps"]) == 10
         np.testing.assert_array_equal(kept["means"], good.gaussians.means.numpy())
     # It can be gone on from.
-    monkeypatch.setattr(refine_module, "_loss", finite)
+    monkeypatch.setattr(refine_module, "loss_of", finite)
     again = refine(observations, state, config, 0, checkpoint)
     monkeypatch.undo()
     assert same(again, refine(observations, state, config, 0))

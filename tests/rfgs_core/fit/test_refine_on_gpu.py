@@ -17,7 +17,8 @@ from rfgs_core.fit import refine as refine_module
 from rfgs_core.fit.frame import FrameState, solve_reflectivity
 from rfgs_core.fit.losses import nearest_gaussian
 from rfgs_core.fit.parameters import LearningRates, TrainableGaussians
-from rfgs_core.fit.refine import Task, refine
+from rfgs_core.fit.refine import refine
+from rfgs_core.fit.task import Task
 from rfgs_core.measure.observations import Observations
 from rfgs_core.measure.phase_free import delay_amplitude
 from rfgs_core.propagation import reference
@@ -77,18 +78,18 @@ def test_a_step_meets_no_tensor_of_another_device(
     seen = replace(observations, kind=kind, delay_change=profile)
     config = replace(quick_config, objective="both")
     task = Task.of(seen, config, 0, MATCHED_FILTER)
-    links, chosen = refine_module._batch(task, config, 0, 1)
+    links, chosen = refine_module.batch(task, config, 0, 1)
     there, moved = task.on("meta"), on_device(state, "meta")  # pyright: ignore[reportArgumentType]
     assert there.points is not None
     trained = TrainableGaussians(moved.gaussians, LearningRates())
     points = there.points.rows(chosen)
-    loss = refine_module._loss(there, moved, trained.gaussians, links, points)
+    loss = refine_module.loss_of(there, moved, trained.gaussians, links, points)
     loss.backward()
     ends = [loss, moved.power, moved.head.directions, *(x.grad for x in trained.leaves.values())]
     assert {end.device.type for end in ends if end is not None} == {"meta"}
     # What is forgotten on the way is told: here all that the frame is compared with.
     with pytest.raises(RuntimeError, match=r"not on the expected device|same device"):
-        refine_module._loss(task, moved, moved.gaussians, links, None)
+        refine_module.loss_of(task, moved, moved.gaussians, links, None)
 
 
 needs_gpu = pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a CUDA device")

@@ -16,7 +16,7 @@ from rfgs_core.dataset.csi_store import digest
 from rfgs_core.dataset.names import SequenceFiles
 from rfgs_core.evaluate.metrics import evaluate_run
 from rfgs_core.files import write_json
-from rfgs_core.fit.refine import Task, _batch
+from rfgs_core.fit.task import Task, batch
 from rfgs_core.measure.observations import Observations, observe
 from rfgs_core.measure.phase_free import direct_wave
 from rfgs_core.measure.relative import (
@@ -163,7 +163,7 @@ def test_a_batch_holds_whole_device_pairs(make_observations) -> None:
     assert together is not None
     drawn = set()
     for step in range(8):
-        links, _ = _batch(task, config, 0, step)
+        links, _ = batch(task, config, 0, step)
         chosen = np.unique(together[links])
         assert len(links) == np.isin(together, chosen).sum()
         assert len(links) < len(together)

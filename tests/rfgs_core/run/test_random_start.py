@@ -37,7 +37,7 @@ def random_run(tiny_dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> 
             asked.append(side)
             return sample_points(observations, 24, *more)
 
-        patch.setattr("rfgs_core.fit.refine.sample_points", coarse)
+        patch.setattr("rfgs_core.fit.task.sample_points", coarse)
         assert main([*words.split(), "--no-shader", "--out", str(out)]) == 0
         assert set(asked) == {64}
         yield open_run(out)

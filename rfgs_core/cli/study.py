@@ -99,6 +99,8 @@ def run(args: StudyArgs) -> int:
     with tqdm(total=len(chosen), desc="study", unit="case") as bar:
         for case, failure in _outcomes(chosen, args.out, spread, bar.set_postfix_str):
             bar.update()
+            # Those that are there already come faster than the bar draws itself.
+            bar.refresh()
             if failure:
                 failed[case.run.name] = failure
             else:

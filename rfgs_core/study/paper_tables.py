@@ -52,7 +52,7 @@ class Size:
 
 
 SIZES: dict[SizeName, Size] = {
-    "smoke": Size(("living_room_walk",), 2, "10:40:30", 200, 64, 500, 32, 2),
+    "smoke": Size(("living_room_walk",), 1, "10:40:30", 200, 64, 500, 32, 2),
     "paper-cpu": Size(tuple(SCENES), 3, None, 2000, 128, 10_000, 64, 0),
     "full": Size(tuple(SCENES), 5, None, 10_000, 256, 10_000, 64, 0),
 }

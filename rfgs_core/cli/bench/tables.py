@@ -31,8 +31,8 @@ class PaperTable:
     """Folder of datasets, runs and cells; what is finished is kept, and the same command goes on
     where it stopped."""
     size: SizeName = "smoke"
-    """smoke: one scene, minutes; paper-cpu: the study's four with the paper's steps, hours; full:
-    these with five seeds and larger neural fields, days."""
+    """smoke: one scene and seed, minutes; paper-cpu: the study's four, three seeds and the paper's
+    steps, hours; full: five seeds and larger neural fields, days."""
     seeds: int | None = None
     """Trainings of each method; left out: what the size has."""
     scenes: tuple[str, ...] = ()
@@ -77,6 +77,8 @@ class PaperTable:
         with tqdm(total=len(chosen), desc=self.name, unit="cell") as bar:
             for cell, failure in self._outcomes(chosen, size, spread, bar.set_postfix_str):
                 bar.update()
+                # Those that are there already come faster than the bar draws itself.
+                bar.refresh()
                 if failure:
                     failed[cell.name] = failure
                 else:

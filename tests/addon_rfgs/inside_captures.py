@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-import numpy as np
 import pytest
 
 from addon_rfgs.cli import run
@@ -26,7 +25,7 @@ def test_devices_stand_where_the_layout_says(empty_scene: Any, tmp_path: Path) -
     values = {"layout": str(FOLDER / "radios.yaml"), "dataset": str(out), "sanitize": True}
     assert bpy.ops.rfgs.import_capture(captures=BOTH, **values) == {"FINISHED"}
     assert (out / "dataset.json").is_file()
-    places = {item.name: tuple(np.round(item.location, 5)) for item in empty_scene.objects}
+    places = {item.name: tuple(round(x, 5) for x in item.location) for item in empty_scene.objects}
     assert places == {"tx": (0.0, 0.0, 1.2), "r1": (3.0, 0.0, 1.2), "r2": (0.0, 3.0, 1.2)}
     assert bpy.data.objects["tx"].rfgs.role == "TRANSMITTER"
     assert bpy.data.objects["r1"].rfgs.role == "RECEIVER"

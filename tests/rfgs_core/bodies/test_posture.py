@@ -26,8 +26,9 @@ UPRIGHT = Bodies.standing(AXIS)
 
 @pytest.fixture
 def fewer_entries(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A third of the entries tells postures in these small rooms too, and is faster."""
-    monkeypatch.setattr(posture, "ENTRIES", posture.ENTRIES // 3)
+    """A sixth of the entries and fewer Gaussians tell postures in these small rooms too."""
+    monkeypatch.setattr(posture, "ENTRIES", posture.ENTRIES // 6)
+    monkeypatch.setattr(posture, "GAUSSIANS", 500)
 
 
 @pytest.fixture
@@ -141,16 +142,20 @@ def test_posture_is_told(make_observations: Callable[..., Observations], knees: 
         assert abs(apart) <= np.pi / 8 + 1e-9
 
 
+@pytest.mark.usefixtures("fewer_entries")
+@pytest.mark.parametrize("shifts_m", [(), posture.SHIFTS_M])
 def test_an_error_of_the_place_is_not_taken_for_legs(
     make_observations: Callable[..., Observations],
+    monkeypatch: pytest.MonkeyPatch,
+    shifts_m: tuple[float, ...],
 ) -> None:
     """Without shifts this body sits."""
+    monkeypatch.setattr(posture, "SHIFTS_M", shifts_m)
     empty = make_observations(freq_min_hz=5.4e9, freq_max_hz=6.4e9)
-    seen = echoing(empty, Bodies.standing(AXIS), seed=6)
-    off = AXIS + np.array([0.3, 0.0])
-    assert not tell_postures(
-        seen, pair_maps(seen), Bodies.standing(off), TrainConfig(), 0
-    ).sits.any()
+    seen = echoing(empty, Bodies.standing(AXIS), seed=9)
+    off = Bodies.standing(AXIS + np.array([0.3, 0.0]))
+    told = tell_postures(seen, pair_maps(seen), off, TrainConfig(), 0)
+    assert told.sits.any() == (not shifts_m)
 
 
 @pytest.mark.parametrize("change", ["no phases", "asked to stand"])

@@ -12,6 +12,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from rfgs_core.children import end_with_parent
 from rfgs_core.errors import RfgsError
 from rfgs_core.interrupts import CALLED, STOPPED
 
@@ -29,7 +30,10 @@ def call(*command: str | Path) -> None:
         KeyboardInterrupt: The user stopped it.
     """
     arguments = [sys.executable, "-m", *map(str, command)]
-    with subprocess.Popen(arguments, env={**os.environ, CALLED: "1"}) as program:
+    # Of a caller that is killed, as workers are, nothing goes on.
+    with subprocess.Popen(
+        arguments, env={**os.environ, CALLED: "1"}, preexec_fn=end_with_parent
+    ) as program:
         try:
             code = program.wait()
         except KeyboardInterrupt:

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -50,3 +52,19 @@ def test_a_block_that_fails_ends_the_program(tmp_path: Path) -> None:
         raise ValueError("no more")
     assert time.monotonic() - start_s < 20.0
     assert {child.pid for child in psutil.Process().children()} <= before
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="told to children on Linux alone")
+def test_a_called_program_ends_with_a_caller_that_is_killed() -> None:
+    sleeping = "import time; time.sleep(60)"
+    calling = f"from rfgs_core.cli.calls import call; call('timeit', '-n', '1', {sleeping!r})"
+    with subprocess.Popen([sys.executable, "-c", calling]) as caller:
+        called = []
+        for _ in range(200):
+            called = psutil.Process(caller.pid).children()
+            if called and "timeit" in called[0].cmdline():
+                break
+            time.sleep(0.05)
+        caller.kill()
+    assert len(called) == 1
+    assert psutil.wait_procs(called, timeout=10)[1] == []

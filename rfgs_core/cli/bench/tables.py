@@ -79,10 +79,11 @@ class PaperTable:
                 bar.update()
                 # Those that are there already come faster than the bar draws itself.
                 bar.refresh()
-                if failure:
+                found = None if failure else stored(cell, self.out, size)
+                if found is None:
                     failed[cell.name] = failure
                 else:
-                    results[cell] = stored(cell, self.out, size) or {}
+                    results[cell] = found
                 # In the order of the table, whoever was first.
                 rows = method_rows(results[one] for one in chosen if one in results)
                 self._write(rows, failed, size)

@@ -111,8 +111,8 @@ def _other_geometry(metrics: dict[str, Any]) -> list[str]:
 def _rf(metrics: dict[str, Any], key: str) -> str:
     """Held-out channel entries against the best baseline."""
     own = _value(metrics, "rf", key)
-    rivals = [name for name in metrics["baselines"] if name != GAUSSIANS_ALONE]
-    values = {name: _baseline(metrics, name, "rf", key) for name in rivals}
+    others = [name for name in metrics["baselines"] if name != GAUSSIANS_ALONE]
+    values = {name: _baseline(metrics, name, "rf", key) for name in others}
     known = {name: value for name, value in values.items() if value is not None}
     what = "held-out elements" if key.startswith("element") else "held-out subcarriers"
     if own is None or not known:

@@ -190,8 +190,8 @@ def _section(run: EvaluatedRun, metrics: dict[str, Any]) -> RunSection:
 
 def _drawn(metrics: dict[str, Any]) -> dict[str, tuple[str, str]]:
     """Words and colour of each baseline that is drawn."""
-    rival = strongest(metrics, "geometry", "f10")
-    colours = ({} if rival is None else {rival[0]: STRONGEST}) | DRAWN
+    best = strongest(metrics, "geometry", "f10")
+    colours = ({} if best is None else {best[0]: STRONGEST}) | DRAWN
     return {name: (in_words(name), colour) for name, colour in colours.items()}
 
 

@@ -64,12 +64,12 @@ def headline_cards(metrics: Mapping[str, Any]) -> list[Card]:
 
 
 def _shape(metrics: Mapping[str, Any], key: str, distance_cm: int) -> Card:
-    own, rival = metrics["geometry"][key], strongest(metrics, "geometry", key)
+    own, best = metrics["geometry"][key], strongest(metrics, "geometry", key)
     label = f"match with the true moving surface, within {distance_cm} cm (F{distance_cm})"
     note, verdict = "no baseline could be computed", ""
-    if rival is not None:
-        note = f"strongest baseline: {show(100 * rival[1], 0)} %, {_said(rival[0])}"
-        verdict = "won" if own > rival[1] else "lost"
+    if best is not None:
+        note = f"strongest baseline: {show(100 * best[1], 0)} %, {_said(best[0])}"
+        verdict = "won" if own > best[1] else "lost"
     ceiling = ((metrics["baselines"].get("oracle_init") or {}).get("geometry") or {}).get(key)
     if ceiling is not None:
         note += f"; started on the truth: {show(100 * ceiling, 0)} %"
@@ -87,12 +87,12 @@ def _place(metrics: Mapping[str, Any]) -> Card:
 
 def _unseen(metrics: Mapping[str, Any]) -> list[Card]:
     """Prediction of channels; arrays of two columns have none to hold out."""
-    own, rival = metrics["rf"]["element_snr_db"], strongest(metrics, "rf", "element_snr_db")
-    if own is None or rival is None:
+    own, best = metrics["rf"]["element_snr_db"], strongest(metrics, "rf", "element_snr_db")
+    if own is None or best is None:
         return []
-    note = f"strongest baseline: {show(rival[1], 1)} dB, {_said(rival[0])}"
+    note = f"strongest baseline: {show(best[1], 1)} dB, {_said(best[0])}"
     label = "SNR of the signal predicted at antennas it never heard"
-    return [Card(f"{show(own, 1)} dB", label, note, "won" if own > rival[1] else "lost")]
+    return [Card(f"{show(own, 1)} dB", label, note, "won" if own > best[1] else "lost")]
 
 
 def in_words(sentence: str) -> str:

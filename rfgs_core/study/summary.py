@@ -13,8 +13,8 @@ from rfgs_core.evaluate.residual import GAUSSIANS_ALONE
 from rfgs_core.study.cases import Case
 
 #: Baselines whose best F10 the method's is held against.
-RIVALS = ("matched_filter", "clean", "omp")
-#: Share of the best rival's error 1 − F10 that is to be cut, or of its gap to the ceiling closed.
+IMAGES = ("matched_filter", "clean", "omp")
+#: Share of the best image's error 1 − F10 that is to be cut, or of its gap to the ceiling closed.
 CUT_TARGET = {"wifi": 0.5, "mmwave": 0.4, "uwb": 0.4}
 #: Largest distance between a person's true centroid and that of the body found [m].
 CENTROID_TARGET_M = {"wifi": 0.25, "mmwave": 0.10, "uwb": 0.10}
@@ -44,8 +44,8 @@ class Row:
     """Means by name; None where no seed has a value."""
     spread_f10: float
     """Largest less smallest F10 over the seeds."""
-    best_rival: str
-    """Which of `RIVALS` has the best F10."""
+    best_image: str
+    """Which of `IMAGES` has the best F10."""
     best_gain: str
     """Which baseline has the least error of an unseen device pair's level; empty for none."""
     best_profile: str
@@ -79,15 +79,15 @@ def _row(scene: str, condition: str, radio: str, rows: list[Mapping[str, Any]]) 
     values = {key: _mean(row["geometry"].get(key) for row in rows) for key in _OWN}
     for key in _PEOPLE:
         values[key] = _mean((row.get("people") or {}).get(key) for row in rows)
-    rivals = {name: _baseline(rows, name, "geometry", "f10") for name in RIVALS}
-    best_rival = max(RIVALS, key=lambda name: rivals[name] or 0.0)
-    values["rival_f10"] = rivals[best_rival]
+    of_images = {name: _baseline(rows, name, "geometry", "f10") for name in IMAGES}
+    best_image = max(IMAGES, key=lambda name: of_images[name] or 0.0)
+    values["image_f10"] = of_images[best_image]
     values["oracle_f10"] = _baseline(rows, "oracle_init", "geometry", "f10")
     for key in ("f05", "f10"):
         values[f"template_{key}"] = _baseline(rows, "template", "geometry", key)
     values["prior_f10"] = _baseline(rows, "body_prior", "geometry", "f10")
-    values["cut"] = _share(values["f10"], values["rival_f10"], 1.0)
-    values["gap"] = _share(values["f10"], values["rival_f10"], values["oracle_f10"])
+    values["cut"] = _share(values["f10"], values["image_f10"], 1.0)
+    values["gap"] = _share(values["f10"], values["image_f10"], values["oracle_f10"])
     values["element_snr_db"] = _mean(row["rf"].get("element_snr_db") for row in rows)
     for name in INTERPOLATORS:
         values[f"{name}_snr_db"] = _baseline(rows, name, "rf", "element_snr_db")
@@ -108,7 +108,7 @@ def _row(scene: str, condition: str, radio: str, rows: list[Mapping[str, Any]]) 
         seeds=len(rows),
         values=values,
         spread_f10=spread,
-        best_rival=best_rival,
+        best_image=best_image,
         best_gain=best_gain,
         best_profile=best_corr,
         targets=_targets(radio, values),
@@ -126,11 +126,11 @@ def _best_channel(
     return name, known.get(name)
 
 
-def _share(own: float | None, rival: float | None, ceiling: float | None) -> float | None:
-    """How far from the rival's score to the ceiling; None without room between the two."""
-    if own is None or rival is None or ceiling is None or ceiling <= rival:
+def _share(own: float | None, image: float | None, ceiling: float | None) -> float | None:
+    """How far from the image's score to the ceiling; None without room between the two."""
+    if own is None or image is None or ceiling is None or ceiling <= image:
         return None
-    return (own - rival) / (ceiling - rival)
+    return (own - image) / (ceiling - image)
 
 
 def _targets(radio: str, values: Mapping[str, float | None]) -> dict[str, bool | None]:

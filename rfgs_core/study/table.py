@@ -16,7 +16,7 @@ _HEAD = (
     "F5",
     "F10",
     "± seeds",
-    "best rival F10",
+    "best baseline F10",
     "error cut",
     "gap closed",
     "template F5/F10",
@@ -33,9 +33,9 @@ _HEAD = (
 )
 
 _NOTES = """\
-F5, F10: F-score at 5 and 10 cm, mean over frames and seeds. Best rival: the best of matched filter,
-CLEAN and OMP. Error cut: share of the rival's 1 − F10 that is removed, or by how much the error is
-larger; gap closed: share of the way from the rival to `oracle_init`, the same fit started on the
+F5, F10: F-score at 5 and 10 cm, mean over frames and seeds. Best baseline: the best of matched
+filter, CLEAN and OMP. Error cut: share of that one's 1 − F10 that is removed, or by how much the
+error is larger; gap closed: share of the way from it to `oracle_init`, the same fit started on the
 true surface, or by how much the gap is wider. Prior: what the start of
 the fit assumes of bodies, at the places and in the postures found. Centroid: of each person against
 the body found; found: share of people with it within half a metre; identity: share of bodies that
@@ -65,7 +65,7 @@ def _cells(row: Row) -> list[str]:
     return [
         *(row.scene, row.radio, row.condition, str(row.seeds)),
         *(number(v["f05"]), number(v["f10"]), f"{row.spread_f10:.3f}"),
-        f"{number(v['rival_f10'])} ({row.best_rival})",
+        f"{number(v['image_f10'])} ({row.best_image})",
         *(_percent(v["cut"], "larger"), _percent(v["gap"], "wider")),
         f"{number(v['template_f05'])} / {number(v['template_f10'])}",
         *(number(v["prior_f10"]), number(v["oracle_f10"]), number(v["centroid_m"])),

@@ -80,7 +80,7 @@ def test_unknown_names_and_empty_choices_are_refused() -> None:
 def test_targets_follow_from_means_over_seeds() -> None:
     wifi = [Case("living_room_walk", "clean", "wifi", seed) for seed in range(2)]
     (row,) = summarise([(wifi[0], metrics(0.80)), (wifi[1], metrics(0.84))])
-    assert row.seeds == 2 and row.best_rival == "clean"
+    assert row.seeds == 2 and row.best_image == "clean"
     assert row.values["f10"] == pytest.approx(0.82)
     assert row.spread_f10 == pytest.approx(0.04)
     # From CLEAN's 0.6: 0.22 of 0.4 cut, 0.22 of 0.3 to the ceiling closed.

@@ -19,6 +19,7 @@ from rfgs_core.dataset.names import SequenceFiles
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.files import read_json, write_json
 from rfgs_core.fit import refine as refine_module
+from rfgs_core.fit import task as task_module
 from rfgs_core.gaussians.ply import read_ply
 from rfgs_core.measure.observations import observe
 from rfgs_core.render.shader import ShaderConfig
@@ -156,7 +157,7 @@ def test_a_stopped_run_ends_where_an_undisturbed_one_does(
             patch.setattr(Run, "observations", stop)
         else:
             patch.setattr(refine_module, "CHECKPOINT_EVERY", 2)
-            real_loss, calls = refine_module.channel_loss, []
+            real_loss, calls = task_module.channel_loss, []
 
             def stop_loss(*arguments):
                 calls.append(1)
@@ -164,7 +165,7 @@ def test_a_stopped_run_ends_where_an_undisturbed_one_does(
                     raise KeyboardInterrupt
                 return real_loss(*arguments)
 
-            patch.setattr(refine_module, "channel_loss", stop_loss)
+            patch.setattr(task_module, "channel_loss", stop_loss)
         with pytest.raises(KeyboardInterrupt):
             train(tiny_dataset, out, quick_config)
     assert (out / "gaussians/000001.ply").exists()

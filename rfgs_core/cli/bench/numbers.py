@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import sys
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +14,7 @@ from rfgs_core.errors import RfgsError
 
 
 @dataclass(frozen=True, kw_only=True)
-class Part:
+class Part(ABC):
     """A part whose numbers are printed, one per line."""
 
     json: Path | None = None
@@ -32,9 +33,9 @@ class Part:
             write_json(self.json, result)
         return 0
 
+    @abstractmethod
     def numbers(self) -> Mapping[str, Any]:
         """Measures."""
-        raise NotImplementedError
 
 
 def note(line: str) -> None:

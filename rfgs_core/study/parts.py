@@ -180,7 +180,8 @@ def _make(
         part.make(out)
         archive = packed(out, without=part.dataset.parts[0])
     except RfgsError as error:
-        failure = str(error)
+        # The worker's own folder is gone when this is read; below it names are the study's.
+        failure = str(error).replace(f"{out}{os.sep}", "")
     finally:
         for rest in out.iterdir():
             if rest.name != part.dataset.parts[0]:

@@ -38,7 +38,7 @@ class Doubling:
         write_json(run / "half.json", os.getpid())
         number = read_json(out / self.dataset / "number.json")
         if number == 13:
-            raise RfgsError("unlucky")
+            raise RfgsError(f"{out / self.dataset}: unlucky")
         write_json(done, 2 * number)
 
 
@@ -57,7 +57,8 @@ def test_what_fails_is_named_and_the_others_are_made(workers: int, tmp_path: Pat
     outcomes = {part.name: why for part, why in made(parts, tmp_path, Spread(workers))}
     assert outcomes.pop("a0") == outcomes.pop("a1") == ""
     assert sorted(outcomes) == ["b0", "b1"]
-    assert all(why.startswith("unlucky") for why in outcomes.values())
+    place = "data/b" if workers > 1 else str(tmp_path / "data/b")
+    assert all(why.startswith(f"{place}: unlucky") for why in outcomes.values())
     files = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.json")}
     assert {"cells/a0.json", "cells/a1.json", "runs/a0/half.json", "runs/a1/half.json"} <= files
     assert not {"cells/b0.json", "cells/b1.json", "runs/a1/begun.json"} & files

@@ -3,14 +3,20 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
 
 from rfgs_core.links import refuse_link
 from rfgs_core.report.tables import Table
+
+#: Frames of the gallery that are farther apart follow each other this fast [s].
+MOST_S = 0.8
 
 
 @dataclass(frozen=True)
@@ -125,6 +131,45 @@ class Page:
     """Gaussians imported into Blender."""
 
 
+@dataclass(frozen=True)
+class Panel:
+    """One of the three pictures of a tile, over all frames."""
+
+    title: str
+    """What it shows."""
+    alt: str
+    """The same for who does not see it; why there is none where there is none."""
+    pictures: list[str]
+    """Data URI of each frame; empty where there is nothing to show."""
+    score: str = ""
+    """Its F-scores."""
+
+
+@dataclass(frozen=True)
+class Tile:
+    """One scene."""
+
+    anchor: str
+    """Fragment of its section."""
+    title: str
+    """Name of the scene."""
+    about: str
+    """Who moves, by which radio it is heard, how it was traced."""
+    panels: list[Panel]
+    """Truth, ours, strongest baseline; none where nothing that moves can be drawn."""
+    frames: list[int]
+    """Blender frame numbers; empty without pictures."""
+    time_s: list[float]
+    """Their times [s]."""
+    verdict: Verdict
+    """Who is ahead, or why nobody is."""
+
+    @property
+    def tracks(self) -> list[list[str]]:
+        """Pictures of those panels that have some."""
+        return [panel.pictures for panel in self.panels if panel.pictures]
+
+
 def _environment() -> Environment:
     return Environment(
         loader=PackageLoader("rfgs_core.report", "."),
@@ -144,6 +189,38 @@ def comparison_page(rows: list[list[str]], notes: list[str]) -> str:
     """A comparison of two runs as HTML."""
     template = _environment().get_template("compare.html.j2")
     return template.render(head=rows[0], rows=rows[1:], notes=notes)
+
+
+def gallery_page(
+    tiles: list[Tile], lead: str, legend: tuple[str, str], provenance: list[tuple[str, str]]
+) -> str:
+    """The gallery as HTML, which may load and run nothing but what stands in it.
+
+    Args:
+        tiles: One per scene.
+        lead: What they say together.
+        legend: Data URI of all colours, and what the last one means.
+        provenance: Names and values.
+    """
+    environment = _environment()
+    inline = {
+        name: environment.get_template(f"{file}.j2").render()
+        for name, file in (("style", "style.css"), ("script", "player.js"))
+    }
+    digests = {
+        f"{name}_sha256": base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+        for name, text in inline.items()
+    }
+    marked = {name: Markup(text) for name, text in inline.items()}
+    return environment.get_template("gallery.html.j2").render(
+        tiles=tiles,
+        lead=lead,
+        legend=legend,
+        most_s=MOST_S,
+        provenance=provenance,
+        **marked,
+        **digests,
+    )
 
 
 def pairs(values: dict[str, Any]) -> list[tuple[str, str]]:

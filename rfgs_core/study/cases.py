@@ -14,12 +14,14 @@ from rfgs_core.radio import preset
 
 @dataclass(frozen=True)
 class StudyScene:
-    """One scene of ours and the part of it that the study looks at."""
+    """One scene of ours and the part of it that is looked at."""
 
     frames: str
-    """Four evenly spaced frames A:B:STEP."""
+    """Evenly spaced frames A:B:STEP."""
     least_depth: int = 1
     """Bounces without which people would not be heard at all."""
+    radio: str = "mmwave"
+    """Radio of the gallery."""
 
 
 @dataclass(frozen=True)
@@ -37,9 +39,23 @@ class Condition:
 SCENES: dict[str, StudyScene] = {
     "living_room_walk": StudyScene("10:55:15"),
     "two_crossing": StudyScene("10:64:18"),
-    # Nothing is heard of people behind a wall unless waves pass it on both ways.
-    "through_wall": StudyScene("10:70:20", least_depth=3),
+    # Nothing is heard of people behind a wall unless waves pass it on both ways, and 60 GHz do not.
+    "through_wall": StudyScene("10:70:20", least_depth=3, radio="wifi"),
     "office_sit_stand": StudyScene("10:85:25"),
+}
+
+#: All scenes of ours: the study's four, and those that the gallery shows beside them.
+EVERY_SCENE: dict[str, StudyScene] = SCENES | {
+    "corridor": StudyScene("5:55:10"),
+    "crowd_of_four": StudyScene("5:75:14"),
+    # One frame of each of the six gestures.
+    "gestures": StudyScene("15:175:32"),
+    "bedroom_fall": StudyScene("10:65:11"),
+    "stairs": StudyScene("10:75:13"),
+    # Paths are longer here than what `mmwave` tells apart.
+    "parking_lot": StudyScene("6:66:12", radio="wifi"),
+    "street": StudyScene("8:68:12", radio="wifi"),
+    "warehouse": StudyScene("10:75:13", radio="wifi"),
 }
 
 CONDITIONS: dict[str, Condition] = {

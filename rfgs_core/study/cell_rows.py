@@ -119,6 +119,11 @@ def method_table(rows: Sequence[MethodRow]) -> str:
     return "\n".join([*lines, _NOTES, ""])
 
 
+def is_rival(method: str) -> bool:
+    """Whether a method is none of ours, nor a part of one."""
+    return method.partition(", ")[0] not in (*TRAINED, GAUSSIANS_ALONE)
+
+
 def strongest(rows: Sequence[MethodRow]) -> list[str]:
     """RF-GS beside the best of whatever is not ours, per column; nothing where either is missing.
 
@@ -128,8 +133,7 @@ def strongest(rows: Sequence[MethodRow]) -> list[str]:
     ours = next((row for row in rows if row.method == "rfgs"), None)
     if ours is None:
         return []
-    own_names = (*TRAINED, GAUSSIANS_ALONE)
-    others = [row for row in rows if row.method.partition(", ")[0] not in own_names]
+    others = [row for row in rows if is_rival(row.method)]
     parts = []
     for _, key, title, form in COLUMNS:
         sign = -1.0 if key == "centroid_m" else 1.0

@@ -12,12 +12,13 @@ from msgspec import Struct
 
 from rfgs_core.dataset import Dataset, open_dataset
 from rfgs_core.device import Device
-from rfgs_core.errors import RfgsFormatError
+from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.evaluate.field_run import Given, fit_fields
 from rfgs_core.evaluate.metrics import METHOD, evaluate_method, evaluate_run
 from rfgs_core.evaluate.provenance import hardware, now, versions
 from rfgs_core.evaluate.residual import GAUSSIANS_ALONE
 from rfgs_core.evaluate.scene import EvaluatedRun
+from rfgs_core.frames import parse_frames
 from rfgs_core.links import refuse_link
 from rfgs_core.measure.observations import observe
 from rfgs_core.neural.settings import FieldSettings
@@ -28,7 +29,7 @@ from rfgs_core.run.training import train_sequence
 from rfgs_core.seals import read_sealed_json, write_sealed_json
 from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import TrainConfig
-from rfgs_core.study.cases import SCENES
+from rfgs_core.study.cases import EVERY_SCENE
 from rfgs_core.study.paper_tables import ABLATED, FIELDS, TRAINED, Cell, Size
 from rfgs_core.threads import one_torch_thread
 
@@ -87,7 +88,7 @@ def settings_of(cell: Cell, size: Size) -> dict[str, Any]:
     # Which device a cell was made on is no setting of it.
     del config["device"]
     own: dict[str, Any] = {"train": {**config, "without": list(config["without"])}}
-    own["frames"] = size.frames or SCENES[cell.scene].frames
+    own["frames"] = size.frames or EVERY_SCENE[cell.scene].frames
     if cell.method in FIELDS:
         own["field"] = asdict(field_settings(cell, size))
     return own
@@ -145,9 +146,17 @@ def make(cell: Cell, out: Path, size: Size, device: Device = "cpu") -> dict[str,
     """Trains and evaluates a cell, and writes its file.
 
     Raises:
-        RfgsError: Nobody is heard, or the dataset is missing.
+        RfgsError: Nobody is heard, or the dataset is missing or has other frames.
     """
     dataset = open_dataset(out / cell.dataset)
+    settings = settings_of(cell, size)
+    # A cell of another size may have left it.
+    held, wanted = dataset.sequence().frames, list(parse_frames(settings["frames"]))
+    if held != wanted:
+        raise RfgsError(
+            f"{dataset.path}: expected frames {wanted}, found {held}; delete it or choose "
+            "another --out"
+        )
     maker = _field if cell.method in FIELDS else _trained
     config = replace(train_config(cell, size), device=device)
     # Otherwise a field's sums, and so its figures, would follow from how many cores there are.
@@ -155,7 +164,7 @@ def make(cell: Cell, out: Path, size: Size, device: Device = "cpu") -> dict[str,
         run, groups = maker(cell, dataset, out, config, size)
     result = {
         **asdict(cell),
-        "settings": settings_of(cell, size),
+        "settings": settings,
         "dataset": dataset.fingerprint,
         "trace_depth": dataset.sequence().trace_depth(cell.radio),
         "methods": groups,

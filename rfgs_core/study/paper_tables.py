@@ -13,7 +13,7 @@ from rfgs_core.neural.settings import FieldSettings
 from rfgs_core.radio import preset
 from rfgs_core.settings import TrainOptions
 from rfgs_core.study.ablation import VARIANTS
-from rfgs_core.study.cases import SCENES
+from rfgs_core.study.cases import EVERY_SCENE, SCENES
 
 SizeName = Literal["smoke", "paper-cpu", "full"]
 TableName = Literal["table1", "table2", "table3"]
@@ -127,7 +127,7 @@ class Cell:
         The fast tracer's antennas stand still, and Sionna RT traces those that move. Where a radio
         is not traced over walls, people are heard directly.
         """
-        scene, radio = SCENES[self.scene], preset(self.radio)
+        scene, radio = EVERY_SCENE[self.scene], preset(self.radio)
         depth = min(max(2, scene.least_depth), radio.deepest)
         tracer = "sionna" if radio.antennas_move else "fast"
         return (
@@ -147,7 +147,7 @@ def cells(table: Table, size: Size, seeds: int) -> list[Cell]:
         for seed in range(seeds)
         for scene in size.scenes
         for radio in table.radios
-        if SCENES[scene].least_depth <= preset(radio).deepest
+        if EVERY_SCENE[scene].least_depth <= preset(radio).deepest
         for method in table.methods
     ]
 

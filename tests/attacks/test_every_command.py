@@ -39,6 +39,7 @@ _GENERATE = "rfgs-factory generate living_room_walk --radio wifi"
 FOLDERS = {
     "rfgs study OUT --scenes living_room_walk --conditions clean --radios wifi --seeds 1": "runs",
     "rfgs bench table1 --size smoke --seeds 1 --out OUT": "cells",
+    "rfgs bench gallery --scenes living_room_walk --out OUT": "cells",
     "rfgs demo --out OUT": "settings.json",
     "rfgs demo --frames 10:20:10 --out OUT": "dataset",
     "rfgs addon build --out OUT": "addon_rfgs-0.1.0.zip",
@@ -51,7 +52,7 @@ FOLDERS = {
     "rfgs-factory worlds --radio wifi --count 1 --frames 1 --out OUT": "worlds.json",
 }
 #: Commands of many parts: a dataset is there, and each part is refused.
-MANY = ("study", "table1")
+MANY = ("study", "table1", "gallery")
 #: Files that a command writes; a link of that name goes, and what it leads to stays.
 FILES = [
     "rfgs export RUN --out OUT.ply",

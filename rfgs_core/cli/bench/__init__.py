@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from tyro.conf import subcommand
 
+from rfgs_core.cli.bench.gallery import Gallery
 from rfgs_core.cli.bench.judges import Fields, Limbs, Live, People, Real, Tracers
 from rfgs_core.cli.bench.speed import (
     Blender,
@@ -39,6 +40,7 @@ BenchArgs = (
     | Annotated[Table1, subcommand("table1")]
     | Annotated[Table2, subcommand("table2")]
     | Annotated[Table3, subcommand("table3")]
+    | Annotated[Gallery, subcommand("gallery")]
 )
 
 

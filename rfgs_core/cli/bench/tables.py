@@ -75,7 +75,9 @@ class PaperTable:
         failed: dict[str, str] = {}
         rows = []
         with tqdm(total=len(chosen), desc=self.name, unit="cell") as bar:
-            for cell, failure in self._outcomes(chosen, size, spread, bar.set_postfix_str):
+            for cell, failure in outcomes(
+                chosen, self.out, size, self.device, spread, bar.set_postfix_str
+            ):
                 bar.update()
                 # Those that are there already come faster than the bar draws itself.
                 bar.refresh()
@@ -92,35 +94,6 @@ class PaperTable:
             sys.stdout.write(f"failed, and in no row: {cell_name}: {why}\n")
         return 1 if failed else 0
 
-    def _outcomes(
-        self, chosen: Sequence[Cell], size: Size, spread: Spread, tell: Callable[[str], None]
-    ) -> Iterator[tuple[Cell, str]]:
-        """Cells as they are there, and why they are not; first what is finished, then datasets."""
-        from rfgs_core.cli.calls import call
-        from rfgs_core.errors import RfgsError
-        from rfgs_core.study.cells import CellPart, stored
-        from rfgs_core.study.parts import datasets_missing, made
-
-        left: list[Cell] = []
-        for cell in chosen:
-            try:
-                finished = stored(cell, self.out, size) is not None
-            except RfgsError as error:
-                yield cell, str(error)
-                continue
-            if finished:
-                yield cell, ""
-            else:
-                left.append(cell)
-        missing = datasets_missing(
-            left, self.out, lambda cell: call(*cell.generate(self.out, size)), tell
-        )
-        yield from ((cell, missing[cell.dataset]) for cell in left if cell.dataset in missing)
-        parts = [CellPart(cell, size, self.device) for cell in left if cell.dataset not in missing]
-        for part, failure in made(parts, self.out, spread):
-            tell(str(part))
-            yield part.cell, failure
-
     def _write(self, rows: Sequence[MethodRow], failed: dict[str, str], size: Size) -> None:
         """Writes the table so far."""
         from dataclasses import asdict
@@ -135,6 +108,39 @@ class PaperTable:
             found = {"rows": [asdict(row) for row in rows], "failed": failed}
             about = {"size": self.size, **asdict(size)}
             write_json(self.json, {**about, **found, **hardware(), "date": now()})
+
+
+def outcomes(
+    chosen: Sequence[Cell],
+    out: Path,
+    size: Size,
+    device: Device,
+    spread: Spread,
+    tell: Callable[[str], None],
+) -> Iterator[tuple[Cell, str]]:
+    """Cells as they are there, and why they are not; first what is finished, then datasets."""
+    from rfgs_core.cli.calls import call
+    from rfgs_core.errors import RfgsError
+    from rfgs_core.study.cells import CellPart, stored
+    from rfgs_core.study.parts import datasets_missing, made
+
+    left: list[Cell] = []
+    for cell in chosen:
+        try:
+            finished = stored(cell, out, size) is not None
+        except RfgsError as error:
+            yield cell, str(error)
+            continue
+        if finished:
+            yield cell, ""
+        else:
+            left.append(cell)
+    missing = datasets_missing(left, out, lambda cell: call(*cell.generate(out, size)), tell)
+    yield from ((cell, missing[cell.dataset]) for cell in left if cell.dataset in missing)
+    parts = [CellPart(cell, size, device) for cell in left if cell.dataset not in missing]
+    for part, failure in made(parts, out, spread):
+        tell(str(part))
+        yield part.cell, failure
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -148,10 +148,10 @@ def test_the_player_holds_every_frame_true_and_fitted(evaluated_run) -> None:
     html = write_run_report(evaluated_run).read_text("utf-8")
     data = json.loads(unescape(re.search(r"data-player='([^']*)'", html)[1]))
     assert data["frames"] == evaluated_run.frames
-    for name in ("true", "fitted"):
-        assert len(data[name]) == len(evaluated_run.frames) == len(set(data[name]))
+    for track in data["tracks"]:
+        assert len(track) == len(evaluated_run.frames) == len(set(track))
     camera = re.search(r"<p class=\"quiet\">(cam\d+), ", html)[1]
-    picture = base64.b64decode(data["true"][1].removeprefix("data:image/jpeg;base64,"))
+    picture = base64.b64decode(data["tracks"][0][1].removeprefix("data:image/jpeg;base64,"))
     shown = np.asarray(Image.open(io.BytesIO(picture)).convert("RGB")).astype(int)
     true = evaluated_run.sequence.image(camera, evaluated_run.frames[1])[..., :3]
     assert np.abs(shown - true).mean() < 8

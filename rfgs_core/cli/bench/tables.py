@@ -36,7 +36,7 @@ class PaperTable:
     seeds: int | None = None
     """Trainings of each method; left out: what the size has."""
     scenes: tuple[str, ...] = ()
-    """Which scenes; left out: those of the size."""
+    """Which of the twelve scenes; left out: those of the size."""
     radios: tuple[str, ...] = ()
     """Which radios; left out: those of the table."""
     methods: tuple[str, ...] = ()

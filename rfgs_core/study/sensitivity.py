@@ -61,7 +61,7 @@ class Setup:
     @property
     def dataset(self) -> Path:
         """Folder of the dataset within the bench's; seeds share it."""
-        noise = "" if self.power_dbm is None else f"-{self.power_dbm:g}dbm"
+        noise = "" if self.power_dbm is None else f"-at{self.power_dbm:g}dbm"
         fewer = f"-less{len(self.without)}" if self.without else ""
         return Path("data") / f"{self.scene}-{self.heard_by}-depth{self.depth}{fewer}{noise}"
 

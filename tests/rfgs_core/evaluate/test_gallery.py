@@ -108,7 +108,9 @@ def test_a_tile_says_as_plainly_that_ours_loses(
     assert text in tile.verdict.text
     _, ours, theirs = tile.panels
     assert "a standing figure at our own place (template)" in theirs.title
-    assert ours.score == "F10 0.80, F5 0.40" and theirs.score.startswith(f"F10 {f10:.2f}")
+    # A phone breaks no number off its name.
+    assert ours.score == "F10\u00a00.80, F5\u00a00.40"
+    assert theirs.score.startswith(f"F10\u00a0{f10:.2f}")
     assert tile.frames == evaluated_run.frames and len(tile.tracks) == 3
     assert all(len(set(track)) == len(tile.frames) for track in tile.tracks)
     assert tile.about.startswith("One person. 2 frames, ") and "to depth" in tile.about
@@ -252,6 +254,9 @@ def test_the_command_keeps_what_is_finished_and_shows_what_failed(
     made = cell.stat().st_mtime_ns
     assert main([*command, "living_room_walk"]) == 0
     assert cell.stat().st_mtime_ns == made
+    assert "<td>rfgs bench gallery --scenes living_room_walk</td>" in (
+        tiny_scenes / "gallery.html"
+    ).read_text("utf-8")
     # The strongest is that of the cell's own file.
     rival = strongest_rival(json.loads(cell.read_text())["methods"])
     assert f"({rival})" in (tiny_scenes / "gallery.html").read_text("utf-8")

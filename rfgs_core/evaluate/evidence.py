@@ -18,7 +18,8 @@ from rfgs_core.evaluate.grid import Grid
 from rfgs_core.radio import Layout
 
 
-@dataclass(frozen=True)
+# Two frames are never compared; one is a key of what was derived of it.
+@dataclass(frozen=True, eq=False)
 class Evidence:
     """One frame as training sees it; hidden entries are NaN, so that reading one shows."""
 

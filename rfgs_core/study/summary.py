@@ -13,7 +13,7 @@ from rfgs_core.evaluate.residual import GAUSSIANS_ALONE
 from rfgs_core.study.cases import Case
 
 #: Baselines whose best F10 the method's is held against.
-IMAGES = ("matched_filter", "clean", "omp")
+IMAGES = ("matched_filter", "clean", "omp", "fista", "nnls", "music")
 #: Share of the best image's error 1 − F10 that is to be cut, or of its gap to the ceiling closed.
 CUT_TARGET = {"wifi": 0.5, "mmwave": 0.4, "uwb": 0.4}
 #: Largest distance between a person's true centroid and that of the body found [m].

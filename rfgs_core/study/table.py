@@ -34,10 +34,10 @@ _HEAD = (
 
 _NOTES = """\
 F5, F10: F-score at 5 and 10 cm, mean over frames and seeds. Best baseline: the best of matched
-filter, CLEAN and OMP. Error cut: share of that one's 1 − F10 that is removed, or by how much the
-error is larger; gap closed: share of the way from it to `oracle_init`, the same fit started on the
-true surface, or by how much the gap is wider. Prior: what the start of
-the fit assumes of bodies, at the places and in the postures found. Centroid: of each person against
+filter, CLEAN, OMP, FISTA, NNLS and MUSIC. Error cut: share of that one's 1 − F10 that is removed,
+or by how much the error is larger; gap closed: share of the way from it to `oracle_init`, the same
+fit started on the true surface, or by how much the gap is wider. Prior: what the start of the
+fit assumes of bodies, at the places and in the postures found. Centroid: of each person against
 the body found; found: share of people with it within half a metre; identity: share of bodies that
 stay with the person they were with at first. Elements: complex SNR on
 unseen array columns of csi − csi_static, beside three ways to interpolate. Pair level: error of an

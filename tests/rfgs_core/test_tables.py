@@ -65,15 +65,15 @@ def test_rows_are_means_over_seeds_beside_the_claim() -> None:
     assert clean.mean["train_s"] is None and clean.claimed_psnr_db is None
     assert ours.mean["centroid_m"] is None
     text = method_table(rows)
-    assert "| RF-GS | 0.425 ± 0.035 | 0.850 ± 0.071 |" in text and "| clean |" in text
-    assert "F10 clean 0.400 (RF-GS 0.850)" in text
+    assert "| RF-GS | 0.425 ± 0.035 | 0.850 ± 0.071 |" in text and "| CLEAN |" in text
+    assert "F10 CLEAN 0.400 (RF-GS 0.850)" in text
 
 
 def test_the_strongest_of_others_is_named_even_where_it_wins() -> None:
     # Its own Gaussians without their residual are no rival.
     rows = method_rows([result(0, 0.8, clean=0.4, omp=0.9, gaussians_alone=0.95)])
     (line, _) = strongest(rows)
-    assert "F10 omp 0.900 (RF-GS 0.800)" in line and "centroid" not in line
+    assert "F10 OMP 0.900 (RF-GS 0.800)" in line and "centroid" not in line
     assert strongest([row for row in rows if row.method != "rfgs"]) == []
 
 

@@ -10,7 +10,7 @@ from rfgs_core.settings import Observe
 _CHANNEL_ONLY = ("nearest_element", "linear", "gaussian_process", "spectrum")
 #: Baselines that add up waves; a hologram of powers per subcarrier still has some, delays have
 # none.
-_COHERENT = ("clean", "omp")
+_COHERENT = ("clean", "omp", "fista", "nnls", "music")
 #: Predict that nothing changed or arrives, whatever is reported.
 _SILENT = ("zero", "empty_room")
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Point scatterers, coherent within a device pair: the model behind CLEAN and OMP.
+"""Point scatterers, coherent within a device pair: the model behind CLEAN, OMP, FISTA and MUSIC.
 
 ΔH[t, r, f] = Σ_i a_i(pair) exp(−j 2π f (|p_i − x_t| + |p_i − x_r|) / c)
 """
@@ -7,11 +7,11 @@
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Complex, Float
+from jaxtyping import Complex, Complex64, Float, Float32, Int64
 
 from rfgs_core.encode.matched_filter import matched_filter
 from rfgs_core.evaluate.evidence import BaselineResult, Evidence
-from rfgs_core.evaluate.grid import splat_gaussians
+from rfgs_core.evaluate.grid import Grid, splat_gaussians
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
 #: Standard deviation of the round beam each point is shown with [m].
@@ -41,6 +41,22 @@ class PointModel:
         tx, rx = self.links[pair]
         return self._phasor(point, tx, rx)[:, self.subcarriers]
 
+    def phasors(
+        self,
+        points: Float[np.ndarray, "N 3"],
+        pair: int,
+        subcarriers: Int64[np.ndarray, "chosen"] | None = None,
+    ) -> Complex64[np.ndarray, "link chosen N"]:
+        """Unit phasors of many points on a pair's links, at its visible subcarriers by default."""
+        tx, rx = self.links[pair]
+        chosen = self.subcarriers if subcarriers is None else subcarriers
+        length = np.linalg.norm(self.layout.tx_xyz[tx][:, None] - points, axis=2)
+        length = length + np.linalg.norm(self.layout.rx_xyz[rx][:, None] - points, axis=2)
+        # In double precision to here: a phase is thousands of radians at 60 GHz.
+        turns = length[:, None] * (self.wavenumber[chosen] / (2.0 * np.pi))[:, None]
+        phase = (-2.0 * np.pi * (turns - np.rint(turns))).astype(np.float32)
+        return np.exp(1j * phase)
+
     def _phasor(
         self, point: Float[np.ndarray, "3"], tx: np.ndarray, rx: np.ndarray
     ) -> Complex[np.ndarray, "link subcarrier"]:
@@ -67,21 +83,19 @@ class PointModel:
         return np.linalg.norm(points - tx, axis=1) * np.linalg.norm(points - rx, axis=1)
 
     def result(
-        self, points: Float[np.ndarray, "N 3"], amplitude: Complex[np.ndarray, "pair N"]
+        self,
+        points: Float[np.ndarray, "N 3"],
+        amplitude: Complex[np.ndarray, "pair N"],
+        power: Float[np.ndarray, "N"] | None = None,
     ) -> BaselineResult:
-        """Score and channel of a set of points.
+        """Score and channel of a set of points; `power` is what the score shows.
 
-        A pair of devices that was never seen gets the mean reflectivity of the seen ones and
-        an arbitrary phase of zero.
+        By default that is their mean reflectivity. A pair of devices that was never seen gets the
+        mean reflectivity of the seen ones and an arbitrary phase of zero.
         """
         spread = np.stack([self.spreading(points, a, b) for a, b in self.pairs])
         reflectivity = np.sqrt(np.mean(np.abs(amplitude * spread) ** 2, axis=0))
-        score = splat_gaussians(
-            self.evidence.grid,
-            points,
-            np.repeat(BEAM_M**2 * np.eye(3)[None], len(points), axis=0),
-            reflectivity**2,
-        )
+        score = shown(self.evidence.grid, points, reflectivity**2 if power is None else power)
         layout = self.layout
         delta = np.zeros(self.evidence.delta.shape, dtype=np.complex64)
         for a, b in layout.device_pairs:
@@ -93,3 +107,11 @@ class PointModel:
             for point, value in zip(points, gain, strict=True):
                 delta[tx, rx] += value * self._phasor(point, tx, rx)
         return BaselineResult(score=score, delta=delta)
+
+
+def shown(
+    grid: Grid, points: Float[np.ndarray, "N 3"], power: Float[np.ndarray, "N"]
+) -> Float32[np.ndarray, "x y z"]:
+    """Score of points [m] and their powers, each with a round beam."""
+    beams = np.repeat(BEAM_M**2 * np.eye(3)[None], len(points), axis=0)
+    return splat_gaussians(grid, points, beams, power)

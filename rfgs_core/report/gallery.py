@@ -31,6 +31,7 @@ from rfgs_core.report.cards import in_words
 from rfgs_core.report.page import Panel, Tile, Verdict, gallery_page, pairs
 from rfgs_core.report.tables import show
 from rfgs_core.seeds import sub_seed
+from rfgs_core.study.gallery import rivals
 
 #: Quality of the pictures and of their edges. More effort saves a twentieth in a hundred times the
 #: time.
@@ -82,24 +83,25 @@ class _Stage(NamedTuple):
         return Panel("true surface", "the true surface of what moves", pictures)
 
 
-def tile_of(run: EvaluatedRun, methods: Mapping[str, Any], rival: str | None) -> Tile:
+def tile_of(run: EvaluatedRun, methods: Mapping[str, Any]) -> Tile:
     """The tile of a run.
 
     Args:
         run: The run of our Gaussians.
         methods: Groups of metrics of `rfgs` and of every baseline.
-        rival: The strongest baseline; None where none says where anything is.
     """
     sequence, stage = run.sequence, _staged(run.sequence)
+    others = rivals(methods)
+    rival = next(iter(others), None)
     ours = Panel(
         "RF-GS",
         "our Gaussians, fitted to radio alone",
         [stage.picture(moving_gaussians(run, frame), frame) for frame in run.frames],
         _scores(methods["rfgs"]),
     )
-    theirs = Panel("no baseline", "no baseline says where anything is", [])
+    theirs = Panel("no baseline", "no baseline finds any of it", [])
     if rival is not None:
-        title = f"strongest baseline: {in_words(rival)}"
+        title = f"strongest of {len(others)} baselines: {in_words(rival)}"
         theirs = Panel(title, title, _voxels(run, rival, stage), _scores(methods[rival]))
     return Tile(
         anchor=sequence.info.scene,
@@ -191,7 +193,7 @@ def _scores(groups: Mapping[str, Any]) -> str:
 def _verdict(methods: Mapping[str, Any], rival: str | None) -> Verdict:
     """Whether ours is ahead, told by the numbers as they are shown."""
     if rival is None:
-        return Verdict("open", "Not decided", "no baseline says where anything is.")
+        return Verdict("open", "Not decided", "no baseline finds any of it.")
     ahead = {
         key: round(methods["rfgs"]["geometry"][key], 2) - round(methods[rival]["geometry"][key], 2)
         for key in ("f10", "f05")

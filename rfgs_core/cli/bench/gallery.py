@@ -86,10 +86,9 @@ class Gallery:
         from rfgs_core.report.gallery import tile_of, tile_without_run
         from rfgs_core.run import open_run
         from rfgs_core.study.cells import stored
-        from rfgs_core.study.gallery import SIZE, strongest_rival
+        from rfgs_core.study.gallery import SIZE
 
         found = None if failure else stored(cell, self.out, SIZE)
         if found is None:
             return tile_without_run(cell.scene, cell.radio, self.out / cell.dataset, failure)
-        run = open_run(self.out / "runs" / cell.name)
-        return tile_of(run, found["methods"], strongest_rival(found["methods"]))
+        return tile_of(open_run(self.out / "runs" / cell.name), found["methods"])

@@ -48,7 +48,7 @@ SCENES: dict[str, StudyScene] = {
 EVERY_SCENE: dict[str, StudyScene] = SCENES | {
     "corridor": StudyScene("5:55:10"),
     # A frame of four people takes minutes.
-    "crowd_of_four": StudyScene("10:70:30"),
+    "crowd_of_four": StudyScene("25:55:30"),
     # One frame of each of the six gestures.
     "gestures": StudyScene("15:175:32"),
     "bedroom_fall": StudyScene("10:65:11"),

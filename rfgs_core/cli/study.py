@@ -118,22 +118,16 @@ def _outcomes(
 ) -> Iterator[tuple[Case, str]]:
     """Cases as they are there, and why they are not; first what is finished, then datasets."""
     from rfgs_core.cli.calls import call
-    from rfgs_core.study.parts import datasets_missing, made
+    from rfgs_core.study.parts import outcomes
     from rfgs_core.study.price import timed_work
 
-    def generate(case: Case) -> None:
-        with timed_work("generate", case, out):
-            call(*case.generate(out))
+    def generate(part: CasePart) -> None:
+        with timed_work("generate", part.case, out):
+            call(*part.case.generate(out))
 
-    left = []
-    for case in chosen:
-        if (out / case.run / "metrics.json").exists():
-            yield case, ""
-        else:
-            left.append(case)
-    missing = datasets_missing(left, out, generate, tell)
-    yield from ((case, missing[case.dataset]) for case in left if case.dataset in missing)
-    parts = [CasePart(case) for case in left if case.dataset not in missing]
-    for part, failure in made(parts, out, spread):
-        tell(str(part))
+    def finished(part: CasePart) -> bool:
+        return (out / part.case.run / "metrics.json").exists()
+
+    cases = [CasePart(case) for case in chosen]
+    for part, failure in outcomes(cases, out, spread, finished, generate, tell):
         yield part.case, failure

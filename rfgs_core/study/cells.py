@@ -190,12 +190,21 @@ def _trained(
     cell: Cell, dataset: Dataset, out: Path, config: TrainConfig, size: Size
 ) -> tuple[EvaluatedRun, dict[str, Any]]:
     """Gaussians; with `rfgs` all baselines that are looked at the same frames."""
-    sequence = dataset.sequence()
-    (out / "runs").mkdir(parents=True, exist_ok=True)
-    place = out / "runs" / cell.name
-    run = train_sequence(dataset, sequence, cell.radio, sequence.frames, config, place)
+    run = trained(dataset, cell.radio, config, out / "runs" / cell.name)
     if cell.method != "rfgs":
         return run, _named(cell.method, evaluate_method(run))
+    return run, beside_baselines(run)
+
+
+def trained(dataset: Dataset, radio: str, config: TrainConfig, place: Path) -> Run:
+    """A run of all frames of a dataset, in a folder of its own."""
+    sequence = dataset.sequence()
+    place.parent.mkdir(parents=True, exist_ok=True)
+    return train_sequence(dataset, sequence, radio, sequence.frames, config, place)
+
+
+def beside_baselines(run: Run) -> dict[str, Any]:
+    """Geometry and channel of a run of ours and of every baseline that has any, by name."""
     metrics = evaluate_run(run, oracle=False)
     own = {group: metrics[group] for group in ("geometry", "rf")}
     others = {
@@ -203,7 +212,7 @@ def _trained(
         for name, values in metrics["baselines"].items()
         if any(value is not None for group in own for value in values[group].values())
     }
-    return run, {"rfgs": own, **others}
+    return {"rfgs": own, **others}
 
 
 def _field(

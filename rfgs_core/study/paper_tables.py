@@ -159,14 +159,14 @@ def narrowed(
     radios: Sequence[str] = (),
     methods: Sequence[str] = (),
 ) -> tuple[Table, Size]:
-    """A table and its size with some of their scenes, radios and methods; empty takes all.
+    """A table of any scenes, and of some of its radios and methods; empty takes what it has.
 
     Raises:
-        RfgsError: The table has no such scene, radio or method, or any scene is unknown.
+        RfgsError: A scene is unknown, or the table has no such radio or method.
     """
     table = TABLES[name]
     for kind, asked, known in (
-        ("scenes", scenes, tuple(SCENES)),
+        ("scenes", scenes, tuple(EVERY_SCENE)),
         ("radios", radios, table.radios),
         ("methods", methods, table.methods),
     ):

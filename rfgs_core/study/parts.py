@@ -52,24 +52,18 @@ class Part(Protocol):
         ...
 
 
-class _OfDataset(Protocol):
-    @property
-    def dataset(self) -> Path: ...
-
-
-D = TypeVar("D", bound=_OfDataset)
 P = TypeVar("P", bound=Part)
 
 
 def datasets_missing(
-    wanted: Sequence[D], out: Path, generate: Callable[[D], None], tell: Callable[[str], None]
+    wanted: Sequence[P], out: Path, generate: Callable[[P], None], tell: Callable[[str], None]
 ) -> dict[Path, str]:
     """Generates datasets that are not there, each once.
 
     Args:
-        wanted: Cells or cases that ask for them.
+        wanted: Parts that ask for them.
         out: Folder of the study or table.
-        generate: Generates the dataset of a cell or case.
+        generate: Generates the dataset of a part.
         tell: Is told what is being generated.
 
     Returns:
@@ -85,6 +79,48 @@ def datasets_missing(
         except RfgsError as error:
             missing[one.dataset] = str(error)
     return missing
+
+
+def outcomes(
+    parts: Sequence[P],
+    out: Path,
+    spread: Spread,
+    finished: Callable[[P], bool],
+    generate: Callable[[P], None],
+    tell: Callable[[str], None],
+) -> Iterator[tuple[P, str]]:
+    """Parts as they are there; first what is finished, then those without a dataset.
+
+    Args:
+        parts: All of them.
+        out: Folder of the study or table.
+        spread: Who makes them.
+        finished: Whether a part was made before; an `RfgsError` says why it can be made in no way.
+        generate: Generates the dataset of a part.
+        tell: Is told what is under way.
+
+    Yields:
+        Each part, and why it is not there; empty if it is.
+
+    Raises:
+        RfgsError: There are no workers, or they are gone.
+    """
+    left: list[P] = []
+    for part in parts:
+        try:
+            there = finished(part)
+        except RfgsError as error:
+            yield part, str(error)
+            continue
+        if there:
+            yield part, ""
+        else:
+            left.append(part)
+    missing = datasets_missing(left, out, generate, tell)
+    yield from ((part, missing[part.dataset]) for part in left if part.dataset in missing)
+    for part, failure in made([one for one in left if one.dataset not in missing], out, spread):
+        tell(str(part))
+        yield part, failure
 
 
 def made(parts: Sequence[P], out: Path, spread: Spread) -> Iterator[tuple[P, str]]:

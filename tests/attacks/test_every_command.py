@@ -40,6 +40,7 @@ FOLDERS = {
     "rfgs study OUT --scenes living_room_walk --conditions clean --radios wifi --seeds 1": "runs",
     "rfgs bench table1 --size smoke --seeds 1 --out OUT": "cells",
     "rfgs bench gallery --scenes living_room_walk --out OUT": "cells",
+    "rfgs bench sensitivity --sweeps devices --out OUT": "setups",
     "rfgs demo --out OUT": "settings.json",
     "rfgs demo --frames 10:20:10 --out OUT": "dataset",
     "rfgs addon build --out OUT": "addon_rfgs-0.1.0.zip",

@@ -9,6 +9,7 @@ from tyro.conf import subcommand
 
 from rfgs_core.cli.bench.gallery import Gallery
 from rfgs_core.cli.bench.judges import Fields, Limbs, Live, People, Real, Tracers
+from rfgs_core.cli.bench.sensitivity import Sensitivity
 from rfgs_core.cli.bench.speed import (
     Blender,
     Performance,
@@ -41,6 +42,7 @@ BenchArgs = (
     | Annotated[Table2, subcommand("table2")]
     | Annotated[Table3, subcommand("table3")]
     | Annotated[Gallery, subcommand("gallery")]
+    | Annotated[Sensitivity, subcommand("sensitivity")]
 )
 
 

@@ -36,7 +36,7 @@ class PaperTable:
     seeds: int | None = None
     """Trainings of each method; left out: what the size has."""
     scenes: tuple[str, ...] = ()
-    """Which scenes; left out: those of the size."""
+    """Which of the twelve scenes; left out: those of the size."""
     radios: tuple[str, ...] = ()
     """Which radios; left out: those of the table."""
     methods: tuple[str, ...] = ()
@@ -120,26 +120,17 @@ def outcomes(
 ) -> Iterator[tuple[Cell, str]]:
     """Cells as they are there, and why they are not; first what is finished, then datasets."""
     from rfgs_core.cli.calls import call
-    from rfgs_core.errors import RfgsError
+    from rfgs_core.study import parts
     from rfgs_core.study.cells import CellPart, stored
-    from rfgs_core.study.parts import datasets_missing, made
 
-    left: list[Cell] = []
-    for cell in chosen:
-        try:
-            finished = stored(cell, out, size) is not None
-        except RfgsError as error:
-            yield cell, str(error)
-            continue
-        if finished:
-            yield cell, ""
-        else:
-            left.append(cell)
-    missing = datasets_missing(left, out, lambda cell: call(*cell.generate(out, size)), tell)
-    yield from ((cell, missing[cell.dataset]) for cell in left if cell.dataset in missing)
-    parts = [CellPart(cell, size, device) for cell in left if cell.dataset not in missing]
-    for part, failure in made(parts, out, spread):
-        tell(str(part))
+    def generate(part: CellPart) -> None:
+        call(*part.cell.generate(out, size))
+
+    def finished(part: CellPart) -> bool:
+        return stored(part.cell, out, size) is not None
+
+    cells = [CellPart(cell, size, device) for cell in chosen]
+    for part, failure in parts.outcomes(cells, out, spread, finished, generate, tell):
         yield part.cell, failure
 
 

@@ -47,9 +47,9 @@ SCENES: dict[str, StudyScene] = {
 #: All scenes of ours: the study's four, and those that the gallery shows beside them.
 EVERY_SCENE: dict[str, StudyScene] = SCENES | {
     "corridor": StudyScene("5:55:10"),
-    # A frame of four people takes minutes.
+    # Four people take minutes a frame.
     "crowd_of_four": StudyScene("25:55:30"),
-    # One frame of each of the six gestures.
+    # One frame of each of its six gestures.
     "gestures": StudyScene("15:175:32"),
     "bedroom_fall": StudyScene("10:65:11"),
     "stairs": StudyScene("10:75:13"),

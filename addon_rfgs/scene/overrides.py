@@ -64,7 +64,7 @@ class Overrides:
     bounds_m: tuple[tuple[float, ...], ...] | None = None
     """Lower and upper corner of what radio sees [m]."""
     drop: tuple[str, ...] = ()
-    """Objects that are left out, of radio and of pictures."""
+    """Objects and devices that are left out, of radio and of pictures."""
     people: tuple[str, ...] = ()
     vehicles: tuple[str, ...] = ()
     moving: tuple[str, ...] = ()
@@ -107,6 +107,7 @@ def apply(overrides: Overrides, keeper: Keeper, scene: bpy.types.Scene) -> None:
             keeper.set(item.rfgs, "object_class", value)
             if value == "IGNORE":
                 keeper.set(item, "hide_render", True)
+                keeper.set(item.rfgs, "role", "NONE")
     for key in ("moving", "object_materials"):
         matching_objects(getattr(overrides, key), f"{overrides.label}: {key}")
     for pattern in overrides.materials:

@@ -41,7 +41,7 @@ class SceneOptions:
     bounds: tuple[float, float, float, float, float, float] | None = None
     """Box X0 Y0 Z0 X1 Y1 Z1 that radio sees [m]; what is static is cut there."""
     drop: _Names = ()
-    """Object NAME to leave out, of radio and of pictures."""
+    """Object or device NAME to leave out, of radio and of pictures."""
     people: _Names = ()
     """Object NAME that is a person."""
     vehicles: _Names = ()

@@ -39,7 +39,8 @@ def place_devices(radio: Radio, bounds_m: Float64[np.ndarray, "2 3"]) -> list[De
         One pose per device; of a device that moves, one per sample of a frame.
 
     Raises:
-        RfgsError: The arrays are longer than the walls, or there is no room for a circle.
+        RfgsError: The arrays are longer than the walls, there is no room for a circle, or a room
+            has fewer corners than there are devices.
     """
     rule = {"corners": _corners, "walls": _walls, "circle": _circle}[radio.placement]
     spots = rule(radio, bounds_m)
@@ -58,7 +59,13 @@ def _corners(radio: Radio, bounds_m: np.ndarray) -> list[tuple[float, float, flo
     low, high = bounds_m[0] + radio.inset_m, bounds_m[1] - radio.inset_m
     corners = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])]
     centre = bounds_m.mean(axis=0)
-    chosen = [corners[index % 4] for index in range(radio.num_places)]
+    if radio.num_places > len(corners):
+        raise RfgsError(
+            f"radio {radio.name!r}: {radio.num_places} devices in four corners would stand in each "
+            "other; give the radio placement: walls or circle, or place devices in the scene "
+            "(Empties with the role access point)"
+        )
+    chosen = corners[: radio.num_places]
     return [(x, y, float(np.arctan2(centre[1] - y, centre[0] - x))) for x, y in chosen]
 
 

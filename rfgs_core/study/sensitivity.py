@@ -24,6 +24,8 @@ from rfgs_core.study.cases import EVERY_SCENE
 from rfgs_core.study.cells import beside_baselines, trained
 from rfgs_core.threads import one_torch_thread
 
+#: Devices of our scenes.
+DEVICES = tuple(f"access_point_{index}" for index in range(4))
 #: Fewest subcarriers of a narrow band: fewer hide none from training.
 FEWEST_SUBCARRIERS = 8
 
@@ -42,6 +44,8 @@ class Setup:
     """Fields of the radio, and their values."""
     label: str = ""
     """What the changes are called in names of files."""
+    without: tuple[str, ...] = ()
+    """Devices of the scene that are left out."""
     depth: int = 2
     """Bounces of the paths that meet people."""
     power_dbm: float | None = None
@@ -58,7 +62,8 @@ class Setup:
     def dataset(self) -> Path:
         """Folder of the dataset within the bench's; seeds share it."""
         noise = "" if self.power_dbm is None else f"-{self.power_dbm:g}dbm"
-        return Path("data") / f"{self.scene}-{self.heard_by}-depth{self.depth}{noise}"
+        fewer = f"-less{len(self.without)}" if self.without else ""
+        return Path("data") / f"{self.scene}-{self.heard_by}-depth{self.depth}{fewer}{noise}"
 
     @property
     def name(self) -> str:
@@ -81,6 +86,7 @@ class Setup:
         return (
             *("dataset_factory", "generate", self.scene, "--radio", radio),
             *("--frames", self.frames, "--no-images", "--tracer", "fast"),
+            *(word for name in self.without for word in ("--drop", name)),
             *("--depth", str(self.depth), *noise, "--out", str(out / self.dataset)),
         )
 
@@ -123,7 +129,7 @@ def sweeps(radio: str, scene: str = "living_room_walk", seed: int = 0) -> dict[s
             if share * base.bandwidth_hz < 2.0 * base.centre_hz
         ],
         "elements": [_elements(plain, base, share) for share in (1 / 4, 1 / 2, 1)],
-        "devices": [_devices(plain, base, count) for count in (2, 3, 4)],
+        "devices": [_devices(plain, count) for count in (2, 3, 4)],
         "depth": [
             (f"{depth}", replace(plain, depth=depth)) for depth in range(1, base.deepest + 1)
         ],
@@ -159,12 +165,9 @@ def _elements(plain: Setup, base: Radio, share: float) -> tuple[str, Setup]:
     return name, replace(plain, changes=tuple(fewer.items()), label=label)
 
 
-def _devices(plain: Setup, base: Radio, count: int) -> tuple[str, Setup]:
-    """The first few of the devices."""
-    if count == base.num_devices:
-        return f"{count}", plain
-    changes = (("num_devices", count),)
-    return f"{count}", replace(plain, changes=changes, label=f"{count}devices")
+def _devices(plain: Setup, count: int) -> tuple[str, Setup]:
+    """The first few of a scene's devices."""
+    return f"{count}", replace(plain, without=DEVICES[count:])
 
 
 def _noise(plain: Setup, base: Radio, less_db: float | None) -> tuple[str, Setup]:
@@ -258,7 +261,8 @@ def _file(setup: Setup) -> Path:
 
 def _plain(setup: Setup) -> dict[str, Any]:
     """A setup as JSON holds it."""
-    return {**asdict(setup), "changes": [list(change) for change in setup.changes]}
+    changes = [list(change) for change in setup.changes]
+    return {**asdict(setup), "changes": changes, "without": list(setup.without)}
 
 
 def every_setup(chosen: Mapping[str, Sweep]) -> list[Setup]:

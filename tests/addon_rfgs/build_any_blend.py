@@ -20,6 +20,7 @@ from build_scenes import box, person
 
 import addon_rfgs
 from addon_rfgs.cli import open_blend
+from addon_rfgs.devices.empties import add_device
 from addon_rfgs.errors import AddonError
 from addon_rfgs.export.bundle import export_bundle
 from addon_rfgs.scene.check import check_scene
@@ -47,6 +48,7 @@ SAID: dict[str, dict[str, Any]] = {
         "devices": [{"name": "ap", "position_m": [0, -2, 1.5], "look_at_m": [0, 0, 1.5]}],
     },
     "missing_library+dropped": {"drop": ["guest"]},
+    "heard+fewer": {"drop": ["ap2"]},
 }
 
 
@@ -361,6 +363,15 @@ def missing_library() -> None:
     bpy.data.libraries[0].filepath = str(FOLDER / "gone.blend")
 
 
+def heard() -> None:
+    """Three access points around the person."""
+    stage()
+    for index in range(3):
+        pose = np.eye(4)
+        pose[:3, 3] = index - 1.0, 2.0, 1.5
+        add_device(bpy.context.scene, f"ap{index}", "ACCESS_POINT", "any", pose, {})
+
+
 def scripted() -> None:
     """Code wherever a file can hold some; each would write the file `canary`."""
     stage()
@@ -392,7 +403,7 @@ def scripted() -> None:
 SCENES: tuple[Callable[[], None], ...] = (
     alone, modifiers, geometry_nodes, duplicates, visibility, kinds, people_sharing, beast,
     constrained, metres, tiny, tower_moves, far, thin_wall, timing, comes_late, pictures,
-    widgets, library, linked, missing_library, scripted,
+    widgets, library, linked, missing_library, heard, scripted,
 )  # fmt: skip
 
 #: Scenes that are also exported, to see that the check promises nothing else.

@@ -213,6 +213,11 @@ def test_frames_units_and_cameras_on_request(reports: Reports) -> None:
     assert reports["timing"]["scene"]["fps"] == pytest.approx(30 / 1.001)
 
 
+def test_devices_are_dropped_as_objects_are(reports: Reports) -> None:
+    assert [row["name"] for row in reports["heard"]["devices"]] == ["ap0", "ap1", "ap2"]
+    assert [row["name"] for row in reports["heard+fewer"]["devices"]] == ["ap0", "ap1"]
+
+
 def test_names_that_match_nothing_get_near_ones(reports: Reports) -> None:
     error = reports["far+typo"]["error"]
     assert error == "said.yaml: drop: no object matches 'towr'; did you mean 'tower'?"

@@ -29,13 +29,17 @@ from rfgs_core.study.sensitivity_rows import sweep_rows, sweep_table
 def test_each_sweep_holds_the_preset_and_changes_one_thing(radio: str, tmp_path: Path) -> None:
     base = preset(radio)
     found = sweeps(radio)
-    plain = next(setup for _, setup in found["devices"] if not setup.changes)
+    _, plain = found["devices"][-1]
+    assert not plain.changes and not plain.without
     for name, points in found.items():
         setups = [setup for _, setup in points]
         assert plain in setups and len(set(setups)) == len(points)
         assert len({label for label, _ in points}) == len(points)
         for setup in setups:
             words = setup.generate(tmp_path)
+            assert [words[at + 1] for at, word in enumerate(words) if word == "--drop"] == list(
+                setup.without
+            )
             if not setup.changes:
                 assert words[words.index("--radio") + 1] == radio
                 continue
@@ -77,7 +81,7 @@ def test_radios_are_not_written_where_a_link_leads(tmp_path: Path) -> None:
     out.mkdir()
     (out / "radios").symlink_to(elsewhere)
     with filled(out), pytest.raises(RfgsError, match="a symbolic link"):
-        sweeps("wifi")["devices"][0][1].generate(out)
+        sweeps("wifi")["bandwidth"][0][1].generate(out)
     assert not list(elsewhere.iterdir())
 
 

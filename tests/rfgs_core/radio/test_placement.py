@@ -15,11 +15,12 @@ from rfgs_core.radio.layout import rotation
 BOUNDS_M = np.array([[-1.0, 0.5, 0.25], [5.0, 4.5, 2.95]])
 
 
-@pytest.mark.parametrize("count", [1, 4, 6])
+@pytest.mark.parametrize("count", [1, 3, 4])
 def test_placed_devices_stand_inside_and_face_the_centre(count: int) -> None:
     radio = replace(preset("wifi"), num_devices=count)
     devices = place_devices(radio, BOUNDS_M)
     assert len({device.name for device in devices}) == len(devices) == count
+    assert len({device.position_m[:2] for device in devices}) == count
     centre = BOUNDS_M.mean(axis=0)
     for index, device in enumerate(devices):
         position = np.array(device.position_m)
@@ -31,6 +32,15 @@ def test_placed_devices_stand_inside_and_face_the_centre(count: int) -> None:
         towards = (centre - position)[:2]
         np.testing.assert_allclose(boresight[:2], towards / np.linalg.norm(towards), atol=1e-12)
         np.testing.assert_allclose(up, [0, 0, 1], atol=1e-12)
+
+
+def test_more_devices_than_corners_do_not_stand_in_each_other() -> None:
+    """They did, in silence, so that two devices heard each other over 0.3 m."""
+    radio = replace(preset("wifi"), num_devices=6)
+    with pytest.raises(RfgsError, match=r"6 devices in four corners .* walls or circle"):
+        place_devices(radio, BOUNDS_M)
+    walls = place_devices(replace(radio, placement="walls"), BOUNDS_M)
+    assert len({device.position_m[:2] for device in walls}) == 6
 
 
 def test_four_devices_go_round_counter_clockwise() -> None:

@@ -31,12 +31,17 @@ from rfgs_core.report.cards import in_words
 from rfgs_core.report.page import Panel, Tile, Verdict, gallery_page, pairs
 from rfgs_core.report.tables import show
 from rfgs_core.seeds import sub_seed
+from rfgs_core.study.gallery import rivals
 
 #: Quality of the pictures and of their edges. More effort saves a twentieth in a hundred times the
 #: time.
 _ENCODING = {"quality": 70, "alpha_quality": 60, "method": 4}
+#: Points of a drawn surface per square metre, and at most.
+_POINTS_PER_M2, _MOST_POINTS = 12_000, 150_000
 #: Of what moves, every so many points tell where the camera stands.
 _THINNED = 20
+#: F-scores below a picture.
+_SHOWN = (("F10", "f10"), ("F5", "f05"))
 #: Instances by class: one, several.
 _WORDS = {"person": ("one person", "people"), "vehicle": ("one vehicle", "vehicles")}
 
@@ -44,47 +49,59 @@ _WORDS = {"person": ("one person", "people"), "vehicle": ("one vehicle", "vehicl
 class _Stage(NamedTuple):
     """What all pictures of a scene share."""
 
+    sequence: Sequence
     surfaces: dict[int, Float64[np.ndarray, "n 3"]]
-    """Points of the true surface of each frame [m]."""
-    spacing_m: dict[int, float]
-    """How far apart these are."""
+    """Points of the true surface of each frame, those that scores are told from [m]."""
     camera: Camera
     floor: Image.Image
 
-    def picture(self, gaussians: Gaussians, frame: int) -> str:
-        """One frame of a panel."""
+    def picture(
+        self,
+        gaussians: Gaussians,
+        frame: int,
+        surface: Float64[np.ndarray, "n 3"] | None = None,
+    ) -> str:
+        """One frame of a panel, coloured by the distance to the frame's surface or to another."""
         stream = io.BytesIO()
-        drawn = draw(gaussians, self.surfaces[frame], self.camera, self.floor)
+        near = self.surfaces[frame] if surface is None else surface
+        drawn = draw(gaussians, near, self.camera, self.floor)
         drawn.save(stream, format="WEBP", **_ENCODING)
         return bytes_uri(stream.getvalue(), "webp")
 
     def truth(self) -> Panel:
         """The true surface."""
-        pictures = [
-            self.picture(as_gaussians(points, self.spacing_m[frame]), frame)
-            for frame, points in self.surfaces.items()
-        ]
+        pictures = []
+        for frame, surface in self.surfaces.items():
+            vertices, faces, _ = self.sequence.moving_mesh(frame)
+            area_m2 = 0.5 * float(spanned(vertices, faces)[2].sum())
+            # Vehicles take more points than scores do, until they look as smooth as people.
+            count = min(max(len(surface), round(_POINTS_PER_M2 * area_m2)), _MOST_POINTS)
+            points = reference_points(vertices, faces, count)
+            # Points at random have gaps, which twice the even spacing closes.
+            spacing_m = 2.0 * math.sqrt(area_m2 / count)
+            pictures.append(self.picture(as_gaussians(points, spacing_m), frame, points))
         return Panel("true surface", "the true surface of what moves", pictures)
 
 
-def tile_of(run: EvaluatedRun, methods: Mapping[str, Any], rival: str | None) -> Tile:
+def tile_of(run: EvaluatedRun, methods: Mapping[str, Any]) -> Tile:
     """The tile of a run.
 
     Args:
         run: The run of our Gaussians.
         methods: Groups of metrics of `rfgs` and of every baseline.
-        rival: The strongest baseline; None where none says where anything is.
     """
     sequence, stage = run.sequence, _staged(run.sequence)
+    others = rivals(methods)
+    rival = next(iter(others), None)
     ours = Panel(
         "RF-GS",
         "our Gaussians, fitted to radio alone",
         [stage.picture(moving_gaussians(run, frame), frame) for frame in run.frames],
         _scores(methods["rfgs"]),
     )
-    theirs = Panel("no baseline", "no baseline says where anything is", [])
+    theirs = Panel("no baseline", "no baseline finds any of it", [])
     if rival is not None:
-        title = f"strongest baseline: {in_words(rival)}"
+        title = f"strongest of {len(others)} baselines: {in_words(rival)}"
         theirs = Panel(title, title, _voxels(run, rival, stage), _scores(methods[rival]))
     return Tile(
         anchor=sequence.info.scene,
@@ -147,15 +164,13 @@ def _staged(sequence: Sequence) -> _Stage:
     Raises:
         RfgsError: Nothing that moves has a surface.
     """
-    surfaces, spacing_m = {}, {}
+    surfaces = {}
     for frame in sequence.frames:
         vertices, faces, _ = sequence.moving_mesh(frame)
-        points = reference_points(vertices, faces, seed=sub_seed(0, "reference", frame))
-        area_m2 = 0.5 * float(spanned(vertices, faces)[2].sum())
-        # Points at random have gaps, which twice the even spacing closes.
-        surfaces[frame], spacing_m[frame] = points, 2.0 * math.sqrt(area_m2 / len(points))
+        seed = sub_seed(0, "reference", frame)
+        surfaces[frame] = reference_points(vertices, faces, seed=seed)
     camera = camera_on(np.concatenate([points[::_THINNED] for points in surfaces.values()]))
-    return _Stage(surfaces, spacing_m, camera, floor_of(sequence.bounds_m, camera))
+    return _Stage(sequence, surfaces, camera, floor_of(sequence.bounds_m, camera))
 
 
 def _voxels(run: EvaluatedRun, rival: str, stage: _Stage) -> list[str]:
@@ -171,13 +186,14 @@ def _voxels(run: EvaluatedRun, rival: str, stage: _Stage) -> list[str]:
 
 def _scores(groups: Mapping[str, Any]) -> str:
     geometry = groups["geometry"]
-    return f"F10 {show(geometry['f10'], 2)}, F5 {show(geometry['f05'], 2)}"
+    shown = [f"{name}\N{NO-BREAK SPACE}{show(geometry[key], 2)}" for name, key in _SHOWN]
+    return ", ".join(shown)
 
 
 def _verdict(methods: Mapping[str, Any], rival: str | None) -> Verdict:
     """Whether ours is ahead, told by the numbers as they are shown."""
     if rival is None:
-        return Verdict("open", "Not decided", "no baseline says where anything is.")
+        return Verdict("open", "Not decided", "no baseline finds any of it.")
     ahead = {
         key: round(methods["rfgs"]["geometry"][key], 2) - round(methods[rival]["geometry"][key], 2)
         for key in ("f10", "f05")

@@ -38,7 +38,12 @@ from rfgs_core.run.calibration import (
     read_calibration,
     write_calibration,
 )
-from rfgs_core.run.checkpoint import finished_frame, partial_path, store_frame
+from rfgs_core.run.checkpoint import (
+    checkpoint_path,
+    finished_frame,
+    partial_path,
+    store_frame,
+)
 from rfgs_core.run.config import CONFIG_FILE, RunConfig, relative_dataset
 from rfgs_core.run.costs import CostBar, cost_bar, pose_stage, price_line
 from rfgs_core.run.encoders import (
@@ -183,7 +188,9 @@ def _fit_frames(run: Run, config: TrainConfig, log: bool) -> float:
     before: FrameState | None = None
     begin = time.perf_counter()
     trained = limbs_network(run) if limbs_wanted(run, config) else None
-    looks = looks_at(run) if trained or _evidence(run, config) else 0
+    # What is told of limbs is not kept where it is of no use, and a finished run needs none of it.
+    left = [frame for frame in run.frames if not checkpoint_path(run.path, frame).exists()]
+    looks = looks_at(run) if left and (trained or _evidence(run, config)) else 0
     can = resolving(run.sequence, run.config.radio, config.num_gaussians, config.observe)
     sys.stderr.write("".join(f"{line}\n" for line in [*can.lines(), price_line(run, looks)]))
     limbs = _limbs(run, config, trained, looks) if looks else None

@@ -38,15 +38,12 @@ def gallery_cells(scenes: Sequence[str], radio: str | None) -> list[Cell]:
     ]
 
 
-def strongest_rival(methods: Mapping[str, Any]) -> str | None:
-    """Who of all that is not ours has the highest mean F10; None where nobody has any.
+def rivals(methods: Mapping[str, Any]) -> dict[str, float]:
+    """Mean F10 of all that is not ours and finds any of the surface, the strongest first.
 
     Args:
         methods: Groups of metrics by name, as a cell's file holds them.
     """
-    scores = {
-        name: groups["geometry"]["f10"]
-        for name, groups in methods.items()
-        if is_rival(name) and groups["geometry"].get("f10") is not None
-    }
-    return max(scores, key=lambda name: scores[name], default=None)
+    scores = {name: groups["geometry"].get("f10") for name, groups in methods.items()}
+    found = {name: f10 for name, f10 in scores.items() if f10 and is_rival(name)}
+    return dict(sorted(found.items(), key=lambda row: -row[1]))

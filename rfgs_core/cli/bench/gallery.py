@@ -69,20 +69,26 @@ class Gallery:
         with tqdm(chosen, desc="pictures", unit="scene") as bar:
             tiles = [self._tile(cell, failed.get(cell, "")) for cell in bar]
         page = self.out / "gallery.html"
-        write_gallery(page, tiles, "rfgs bench gallery")
+        write_gallery(page, tiles, self._command())
         sys.stdout.write(f"{page} written, {page.stat().st_size / 1e6:.1f} MB\n")
         for cell, why in failed.items():
             sys.stdout.write(f"failed, and without an answer: {cell.name}: {why}\n")
         return 1 if failed else 0
 
+    def _command(self) -> str:
+        """What was asked for, apart from places."""
+        words = ["rfgs bench gallery"]
+        words += ["--scenes", *self.scenes] if self.scenes else []
+        words += ["--radio", self.radio] if self.radio else []
+        return " ".join(words)
+
     def _tile(self, cell: Cell, failure: str) -> Tile:
         from rfgs_core.report.gallery import tile_of, tile_without_run
         from rfgs_core.run import open_run
         from rfgs_core.study.cells import stored
-        from rfgs_core.study.gallery import SIZE, strongest_rival
+        from rfgs_core.study.gallery import SIZE
 
         found = None if failure else stored(cell, self.out, SIZE)
         if found is None:
             return tile_without_run(cell.scene, cell.radio, self.out / cell.dataset, failure)
-        run = open_run(self.out / "runs" / cell.name)
-        return tile_of(run, found["methods"], strongest_rival(found["methods"]))
+        return tile_of(open_run(self.out / "runs" / cell.name), found["methods"])

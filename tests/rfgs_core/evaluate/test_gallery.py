@@ -29,7 +29,7 @@ from rfgs_core.report.gallery import tile_of, tile_without_run, write_gallery
 from rfgs_core.report.page import Tile, Verdict
 from rfgs_core.study.cases import EVERY_SCENE, StudyScene
 from rfgs_core.study.cells import make
-from rfgs_core.study.gallery import SIZE, gallery_cells, strongest_rival
+from rfgs_core.study.gallery import SIZE, gallery_cells, rivals
 from rfgs_core.study.paper_tables import Cell
 from rfgs_core.view.browser import find_chromium, open_page
 
@@ -84,10 +84,11 @@ def test_a_page_does_not_replace_a_file(tmp_path: Path, capsys: Any) -> None:
 
 
 def test_the_strongest_of_others_is_shown_whether_it_wins_or_not() -> None:
-    others = {"clean": f_scores(0.4), "linear": f_scores(None), "gaussians_alone": f_scores(0.95)}
-    assert strongest_rival({"rfgs": f_scores(0.8), **others}) == "clean"
-    assert strongest_rival({"rfgs": f_scores(0.8), **others, "omp": f_scores(0.9)}) == "omp"
-    assert strongest_rival({"rfgs": f_scores(0.8), "linear": f_scores(None)}) is None
+    silent = {"linear": f_scores(None), "zero": f_scores(0.0)}
+    others = {"clean": f_scores(0.4), "gaussians_alone": f_scores(0.95), **silent}
+    assert rivals({"rfgs": f_scores(0.8), **others}) == {"clean": 0.4}
+    assert list(rivals({"rfgs": f_scores(0.8), **others, "omp": f_scores(0.9)})) == ["omp", "clean"]
+    assert rivals({"rfgs": f_scores(0.8), **silent}) == {}
 
 
 @pytest.mark.parametrize(
@@ -101,14 +102,19 @@ def test_the_strongest_of_others_is_shown_whether_it_wins_or_not() -> None:
 def test_a_tile_says_as_plainly_that_ours_loses(
     evaluated_run, f10: float, word: str, text: str
 ) -> None:
-    tile = tile_of(evaluated_run, methods_of(evaluated_run, rfgs=0.8, template=f10), "template")
+    methods = methods_of(evaluated_run, rfgs=0.8, template=f10)
+    few = {name: methods[name] for name in ("rfgs", "template", "zero")} | {"omp": f_scores(0.1)}
+    tile = tile_of(evaluated_run, few)
     assert (tile.verdict.word, tile.verdict.subcarrier) == (
         word, {"Won": "won", "Lost": "lost", "Level": "open"}[word]
     )  # fmt: skip
     assert text in tile.verdict.text
     _, ours, theirs = tile.panels
-    assert "a standing figure at our own place (template)" in theirs.title
-    assert ours.score == "F10 0.80, F5 0.40" and theirs.score.startswith(f"F10 {f10:.2f}")
+    said = "strongest of 2 baselines: a standing figure at our own place (template)"
+    assert theirs.title == said
+    # A phone breaks no number off its name.
+    assert ours.score == "F10\u00a00.80, F5\u00a00.40"
+    assert theirs.score.startswith(f"F10\u00a0{f10:.2f}")
     assert tile.frames == evaluated_run.frames and len(tile.tracks) == 3
     assert all(len(set(track)) == len(tile.frames) for track in tile.tracks)
     assert tile.about.startswith("One person. 2 frames, ") and "to depth" in tile.about
@@ -123,7 +129,7 @@ def test_pictures_of_a_tile_have_one_camera_and_one_scale_of_colours(surface_run
     evaluate = replace(surface_run, shift_m=np.array([0.15, 0.0, 0.0]))
     evaluate.path.joinpath("config.json").write_text("{}")
     evaluate_run(evaluate, oracle=False)
-    tile = tile_of(evaluate, methods_of(evaluate), "template")
+    tile = tile_of(evaluate, methods_of(evaluate))
     truth, ours, theirs = (opened(panel.pictures[0]) for panel in tile.panels)
     assert truth.shape == ours.shape == theirs.shape
     solid = [picture[picture[..., 3] > 220] for picture in (truth, ours)]
@@ -166,7 +172,7 @@ def policy_of(html: str) -> dict[str, str]:
 
 
 def test_the_page_is_whole_and_may_load_and_run_nothing_else(evaluated_run, tmp_path: Path) -> None:
-    tile = tile_of(evaluated_run, methods_of(evaluated_run), "template")
+    tile = tile_of(evaluated_run, methods_of(evaluated_run))
     write_gallery(tmp_path / "gallery.html", [tile], "rfgs bench gallery")
     html = (tmp_path / "gallery.html").read_text("utf-8")
     policy = policy_of(html)
@@ -252,8 +258,11 @@ def test_the_command_keeps_what_is_finished_and_shows_what_failed(
     made = cell.stat().st_mtime_ns
     assert main([*command, "living_room_walk"]) == 0
     assert cell.stat().st_mtime_ns == made
+    assert "<td>rfgs bench gallery --scenes living_room_walk</td>" in (
+        tiny_scenes / "gallery.html"
+    ).read_text("utf-8")
     # The strongest is that of the cell's own file.
-    rival = strongest_rival(json.loads(cell.read_text())["methods"])
+    rival = next(iter(rivals(json.loads(cell.read_text())["methods"])))
     assert f"({rival})" in (tiny_scenes / "gallery.html").read_text("utf-8")
 
 
@@ -263,7 +272,7 @@ def test_the_page_plays_pauses_and_fits_a_phone(evaluated_run, tmp_path: Path) -
         find_chromium()
     except MissingToolError as error:
         pytest.skip(str(error))
-    tile = tile_of(evaluated_run, methods_of(evaluated_run), "template")
+    tile = tile_of(evaluated_run, methods_of(evaluated_run))
     write_gallery(tmp_path / "gallery.html", [tile], "rfgs bench gallery")
     shown = "[...document.querySelectorAll('.player img')].map(one => one.src.slice(-60))"
     with open_page((tmp_path / "gallery.html").as_uri(), 420, 900) as page:

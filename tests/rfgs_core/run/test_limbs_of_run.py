@@ -128,6 +128,10 @@ def test_without_a_network_evidence_tells_who_walks(
     limbs = read_limbs(train(tiny_dataset, tmp_path / "run", CONFIG).path)
     assert asked and asked[0] >= 2
     assert (limbs is not None) == told
+    # What came of it is in the frames: nobody is asked again about a run that is finished.
+    asked.clear()
+    train(tiny_dataset, tmp_path / "run", CONFIG)
+    assert not asked
     if limbs is not None:
         pelvis = limbs.people.joints17()[:, 0, 0, :2]
         found = np.array([track.axes_xy[0] for track in limbs.tracks])

@@ -8,7 +8,7 @@ A path says at a point p how well p agrees with its delay and with its direction
 with σ_d half the band's range cell c/B, the angles θ between the path's ends and the lines to p,
 and each pair in units of its own power. Only delays, angles and amplitudes of visible device pairs
 enter, never where a path's corners are. The tracer tells which paths meet somebody, which no radio
-does: this is a bound for encoders of channels, not a rival.
+does: this is a bound for encoders of channels, not a baseline.
 """
 
 from __future__ import annotations

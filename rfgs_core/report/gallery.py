@@ -31,7 +31,7 @@ from rfgs_core.report.cards import in_words
 from rfgs_core.report.page import Panel, Tile, Verdict, gallery_page, pairs
 from rfgs_core.report.tables import show
 from rfgs_core.seeds import sub_seed
-from rfgs_core.study.gallery import rivals
+from rfgs_core.study.gallery import ranked_baselines
 
 #: Quality of the pictures and of their edges. More effort saves a twentieth in a hundred times the
 #: time.
@@ -91,8 +91,8 @@ def tile_of(run: EvaluatedRun, methods: Mapping[str, Any]) -> Tile:
         methods: Groups of metrics of `rfgs` and of every baseline.
     """
     sequence, stage = run.sequence, _staged(run.sequence)
-    others = rivals(methods)
-    rival = next(iter(others), None)
+    others = ranked_baselines(methods)
+    baseline = next(iter(others), None)
     ours = Panel(
         "RF-GS",
         "our Gaussians, fitted to radio alone",
@@ -100,9 +100,9 @@ def tile_of(run: EvaluatedRun, methods: Mapping[str, Any]) -> Tile:
         _scores(methods["rfgs"]),
     )
     theirs = Panel("no baseline", "no baseline finds any of it", [])
-    if rival is not None:
-        title = f"strongest of {len(others)} baselines: {in_words(rival)}"
-        theirs = Panel(title, title, _voxels(run, rival, stage), _scores(methods[rival]))
+    if baseline is not None:
+        title = f"strongest of {len(others)} baselines: {in_words(baseline)}"
+        theirs = Panel(title, title, _voxels(run, baseline, stage), _scores(methods[baseline]))
     return Tile(
         anchor=sequence.info.scene,
         title=_titled(sequence.info.scene),
@@ -110,7 +110,7 @@ def tile_of(run: EvaluatedRun, methods: Mapping[str, Any]) -> Tile:
         panels=[stage.truth(), ours, theirs],
         frames=run.frames,
         time_s=[sequence.time_s(frame) for frame in run.frames],
-        verdict=_verdict(methods, rival),
+        verdict=_verdict(methods, baseline),
     )
 
 
@@ -173,12 +173,12 @@ def _staged(sequence: Sequence) -> _Stage:
     return _Stage(sequence, surfaces, camera, floor_of(sequence.bounds_m, camera))
 
 
-def _voxels(run: EvaluatedRun, rival: str, stage: _Stage) -> list[str]:
+def _voxels(run: EvaluatedRun, baseline: str, stage: _Stage) -> list[str]:
     """The voxels that a baseline is scored by, frame by frame."""
     scene, pictures = Scene.of(run), []
     for frame in run.frames:
         evidence = scene.evidence(frame, scene.score(frame))
-        score = phase_free.answer(rival, BASELINES[rival], evidence, scene.observe).score
+        score = phase_free.answer(baseline, BASELINES[baseline], evidence, scene.observe).score
         points = np.zeros((0, 3)) if score is None else scene.predicted(score)
         pictures.append(stage.picture(as_gaussians(points, scene.grid.voxel_m), frame))
     return pictures
@@ -190,12 +190,13 @@ def _scores(groups: Mapping[str, Any]) -> str:
     return ", ".join(shown)
 
 
-def _verdict(methods: Mapping[str, Any], rival: str | None) -> Verdict:
+def _verdict(methods: Mapping[str, Any], baseline: str | None) -> Verdict:
     """Whether ours is ahead, told by the numbers as they are shown."""
-    if rival is None:
+    if baseline is None:
         return Verdict("open", "Not decided", "no baseline finds any of it.")
     ahead = {
-        key: round(methods["rfgs"]["geometry"][key], 2) - round(methods[rival]["geometry"][key], 2)
+        key: round(methods["rfgs"]["geometry"][key], 2)
+        - round(methods[baseline]["geometry"][key], 2)
         for key in ("f10", "f05")
     }
     finer = _than(ahead["f05"])

@@ -124,7 +124,7 @@ def method_table(rows: Sequence[MethodRow]) -> str:
     return "\n".join([*lines, _NOTES, ""])
 
 
-def is_rival(method: str) -> bool:
+def is_baseline(method: str) -> bool:
     """Whether a method is none of ours, nor a part of one."""
     return method.partition(", ")[0] not in (*TRAINED, GAUSSIANS_ALONE)
 
@@ -138,7 +138,7 @@ def strongest(rows: Sequence[MethodRow]) -> list[str]:
     ours = next((row for row in rows if row.method == "rfgs"), None)
     if ours is None:
         return []
-    others = [row for row in rows if is_rival(row.method)]
+    others = [row for row in rows if is_baseline(row.method)]
     parts = []
     for _, key, title, form in COLUMNS:
         sign = -1.0 if key == "centroid_m" else 1.0

@@ -9,7 +9,7 @@ from typing import Any
 from rfgs_core.errors import RfgsError
 from rfgs_core.radio import preset
 from rfgs_core.study.cases import EVERY_SCENE
-from rfgs_core.study.cell_rows import is_rival
+from rfgs_core.study.cell_rows import is_baseline
 from rfgs_core.study.paper_tables import SIZES, Cell
 
 #: Size of its cells: those of the study's scenes are cells of `rfgs bench table1 --size paper-cpu`.
@@ -38,12 +38,12 @@ def gallery_cells(scenes: Sequence[str], radio: str | None) -> list[Cell]:
     ]
 
 
-def rivals(methods: Mapping[str, Any]) -> dict[str, float]:
+def ranked_baselines(methods: Mapping[str, Any]) -> dict[str, float]:
     """Mean F10 of all that is not ours and finds any of the surface, the strongest first.
 
     Args:
         methods: Groups of metrics by name, as a cell's file holds them.
     """
     scores = {name: groups["geometry"].get("f10") for name, groups in methods.items()}
-    found = {name: f10 for name, f10 in scores.items() if f10 and is_rival(name)}
+    found = {name: f10 for name, f10 in scores.items() if f10 and is_baseline(name)}
     return dict(sorted(found.items(), key=lambda row: -row[1]))

@@ -42,7 +42,7 @@ def metrics(f10: float, **changes: float) -> dict[str, Any]:
         "linear": baseline(None, 2.0, device_gain_mae_db=5.0, delay_profile_corr=0.6),
         "gaussian_process": baseline(None, 9.5, device_gain_mae_db=4.0, delay_profile_corr=0.8),
         "spectrum": baseline(None, 9.7),
-        # Neither the method's own parts nor its ceiling are rivals.
+        # Neither the method's own parts nor its ceiling are baselines.
         "gaussians_alone": baseline(None, 1.0, device_gain_mae_db=0.5, delay_profile_corr=0.9),
     }
     return {"geometry": geometry, "people": people, "rf": rf, "baselines": baselines}

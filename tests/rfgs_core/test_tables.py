@@ -70,7 +70,7 @@ def test_rows_are_means_over_seeds_beside_the_claim() -> None:
 
 
 def test_the_strongest_of_others_is_named_even_where_it_wins() -> None:
-    # Its own Gaussians without their residual are no rival.
+    # Its own Gaussians without their residual are no baseline.
     rows = method_rows([result(0, 0.8, clean=0.4, omp=0.9, gaussians_alone=0.95)])
     (line, _) = strongest(rows)
     assert "F10 OMP 0.900 (RF-GS 0.800)" in line and "centroid" not in line

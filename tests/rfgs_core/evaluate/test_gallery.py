@@ -29,7 +29,7 @@ from rfgs_core.report.gallery import tile_of, tile_without_run, write_gallery
 from rfgs_core.report.page import Tile, Verdict
 from rfgs_core.study.cases import EVERY_SCENE, StudyScene
 from rfgs_core.study.cells import make
-from rfgs_core.study.gallery import SIZE, gallery_cells, rivals
+from rfgs_core.study.gallery import SIZE, gallery_cells, ranked_baselines
 from rfgs_core.study.paper_tables import Cell
 from rfgs_core.view.browser import find_chromium, open_page
 
@@ -86,9 +86,12 @@ def test_a_page_does_not_replace_a_file(tmp_path: Path, capsys: Any) -> None:
 def test_the_strongest_of_others_is_shown_whether_it_wins_or_not() -> None:
     silent = {"linear": f_scores(None), "zero": f_scores(0.0)}
     others = {"clean": f_scores(0.4), "gaussians_alone": f_scores(0.95), **silent}
-    assert rivals({"rfgs": f_scores(0.8), **others}) == {"clean": 0.4}
-    assert list(rivals({"rfgs": f_scores(0.8), **others, "omp": f_scores(0.9)})) == ["omp", "clean"]
-    assert rivals({"rfgs": f_scores(0.8), **silent}) == {}
+    assert ranked_baselines({"rfgs": f_scores(0.8), **others}) == {"clean": 0.4}
+    assert list(ranked_baselines({"rfgs": f_scores(0.8), **others, "omp": f_scores(0.9)})) == [
+        "omp",
+        "clean",
+    ]
+    assert ranked_baselines({"rfgs": f_scores(0.8), **silent}) == {}
 
 
 @pytest.mark.parametrize(
@@ -262,8 +265,8 @@ def test_the_command_keeps_what_is_finished_and_shows_what_failed(
         tiny_scenes / "gallery.html"
     ).read_text("utf-8")
     # The strongest is that of the cell's own file.
-    rival = next(iter(rivals(json.loads(cell.read_text())["methods"])))
-    assert f"({rival})" in (tiny_scenes / "gallery.html").read_text("utf-8")
+    baseline = next(iter(ranked_baselines(json.loads(cell.read_text())["methods"])))
+    assert f"({baseline})" in (tiny_scenes / "gallery.html").read_text("utf-8")
 
 
 @pytest.mark.slow

@@ -11,12 +11,13 @@ Antennas Propag. 34, 1986), log-mean over pairs.
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Complex64, Float, Int64
+from jaxtyping import Complex64, Float, Float64, Int64
 
 from rfgs_core.evaluate.baselines.matched_filter import default_score
 from rfgs_core.evaluate.baselines.scatterers import PointModel
 from rfgs_core.evaluate.evidence import BaselineResult, Evidence
 from rfgs_core.evaluate.geometry import best_voxels
+from rfgs_core.evaluate.grid import Grid
 
 #: Points are looked for in this many times K voxels of the matched filter, as those of CLEAN are.
 SEARCH_FACTOR = 3
@@ -29,6 +30,8 @@ SOURCES = 12
 LEAST_OUTSIDE = 1e-6
 #: Points whose echoes are made at once.
 CHUNK = 1024
+#: A search of more voxels looks at blocks of them: vehicles have tens of thousands.
+MOST_POINTS = 10_000
 
 
 def baseline(evidence: Evidence) -> BaselineResult:
@@ -41,15 +44,29 @@ def baseline(evidence: Evidence) -> BaselineResult:
     if len(window) < 2:
         return BaselineResult(reason="no four neighbouring subcarriers are visible, so no shifts")
     search = best_voxels(default_score(evidence), SEARCH_FACTOR * evidence.voxels)
-    points = evidence.grid.centres(search)
+    points, block = blocks_of(evidence.grid, search)
     total = np.zeros(len(points))
     for pair, measured in heard.items():
         total += pseudo_spectrum(model, pair, measured, window, points)
     score = np.zeros(evidence.grid.size, dtype=np.float32)
     # The faintest point still is before everything that was not looked at.
-    score[search] = total - total.min() + LEAST_OUTSIDE
+    score[search] = (total - total.min() + LEAST_OUTSIDE)[block]
     score = score.reshape(evidence.grid.shape)
     return BaselineResult(score=score, reason="a pseudo-spectrum; it predicts no channel")
+
+
+def blocks_of(
+    grid: Grid, search: Int64[np.ndarray, "V"], most: int = MOST_POINTS
+) -> tuple[Float64[np.ndarray, "N 3"], Int64[np.ndarray, "V"]]:
+    """Centres [m] of the smallest cubic blocks that are few enough, and the block of each voxel."""
+    cells = np.stack(np.unravel_index(search, grid.shape), axis=1)
+    edge = 1
+    while True:
+        blocks, block = np.unique(cells // edge, axis=0, return_inverse=True)
+        if len(blocks) <= most:
+            break
+        edge += 1
+    return grid.origin_m + (blocks + 0.5) * edge * grid.voxel_m, block.ravel()
 
 
 def runs_of(subcarriers: Int64[np.ndarray, "visible"]) -> list[Int64[np.ndarray, "run"]]:

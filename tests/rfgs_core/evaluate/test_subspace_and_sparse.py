@@ -11,10 +11,11 @@ import pytest
 from rfgs_core.evaluate.baselines import BASELINES
 from rfgs_core.evaluate.baselines.fista import PENALTY, few_points
 from rfgs_core.evaluate.baselines.lattice import Lattice, lattice_of
-from rfgs_core.evaluate.baselines.music import pseudo_spectrum, runs_of, window_of
+from rfgs_core.evaluate.baselines.music import blocks_of, pseudo_spectrum, runs_of, window_of
 from rfgs_core.evaluate.baselines.nonnegative import powers
 from rfgs_core.evaluate.baselines.scatterers import PointModel
 from rfgs_core.evaluate.geometry import best_voxels
+from rfgs_core.evaluate.grid import Grid
 
 ONE = np.array([[2.0, 1.7, 1.2]])
 TWO = np.array([[1.4, 1.3, 1.0], [2.6, 2.2, 1.4]])
@@ -145,6 +146,17 @@ def test_windows_stay_within_runs_of_visible_subcarriers() -> None:
     assert [run.tolist() for run in runs_of(visible)] == [[*range(6)], [8, 9, 10], [20]]
     assert window_of(visible).tolist() == [0, 2]
     assert len(window_of(np.array([0, 2, 4]))) < 2
+
+
+def test_many_voxels_are_looked_at_in_blocks() -> None:
+    grid = Grid((1.0, 2.0, 0.0), (6, 4, 5))
+    search = np.arange(grid.size)[::-1].copy()
+    points, block = blocks_of(grid, search)
+    np.testing.assert_allclose(points[block], grid.centres(search))
+    points, block = blocks_of(grid, search, most=20)
+    # Blocks of 2 x 2 x 2 voxels are 18.
+    assert len(points) == 18 and np.bincount(block).max() == 8
+    assert np.abs(points[block] - grid.centres(search)).max() == pytest.approx(grid.voxel_m / 2)
 
 
 def test_without_neighbouring_subcarriers_music_says_so(scatterers) -> None:

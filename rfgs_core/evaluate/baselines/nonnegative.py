@@ -15,7 +15,6 @@ from jaxtyping import Float
 from scipy.optimize import nnls
 
 from rfgs_core.evaluate.baselines.lattice import Lattice, lattice_of
-from rfgs_core.evaluate.baselines.matched_filter import combine
 from rfgs_core.evaluate.baselines.scatterers import shown
 from rfgs_core.evaluate.evidence import BaselineResult, Evidence
 
@@ -31,11 +30,12 @@ def baseline(evidence: Evidence) -> BaselineResult:
     lattice = lattice_of(evidence)
     if lattice is None:
         return BaselineResult(reason="the frame holds no energy")
-    images = [
-        shown(evidence.grid, lattice.points, powers(lattice, pair)) + np.float32(FLOOR)
-        for pair in lattice.heard
-    ]
-    score = combine(np.stack(images), np.ones(len(images), dtype=bool), log_mean=True)
+    score = np.zeros(evidence.grid.shape, dtype=np.float32)
+    for pair in lattice.heard:
+        image = shown(evidence.grid, lattice.points, powers(lattice, pair))
+        # The logarithm of the floored power, less that of the floor alone, which most voxels have.
+        some = image > 0.0
+        score[some] += np.log1p(image[some] / FLOOR)
     return BaselineResult(score=score, reason="powers without phases; they predict no channel")
 
 

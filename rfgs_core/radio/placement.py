@@ -14,6 +14,8 @@ from rfgs_core.radio.presets import Radio
 NEARER = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8)
 #: It keeps this far from what it came around [m].
 NOT_AT_WALL_M = 0.15
+#: Devices that a room has corners for.
+CORNERS = 4
 #: Bounds that reach this far below the floor under the people hold something that fell [m].
 SUNK_M = 0.3
 
@@ -59,7 +61,7 @@ def _corners(radio: Radio, bounds_m: np.ndarray) -> list[tuple[float, float, flo
     low, high = bounds_m[0] + radio.inset_m, bounds_m[1] - radio.inset_m
     corners = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])]
     centre = bounds_m.mean(axis=0)
-    if radio.num_places > len(corners):
+    if radio.num_places > CORNERS:
         raise RfgsError(
             f"radio {radio.name!r}: {radio.num_places} devices in four corners would stand in each "
             "other; give the radio placement: walls or circle, or place devices in the scene "

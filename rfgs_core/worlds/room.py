@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float64
 
 from rfgs_core.radio import Layout, Radio
 from rfgs_core.radio.layout import DevicePose, layout
-from rfgs_core.radio.placement import place_devices
+from rfgs_core.radio.placement import CORNERS, place_devices
 
 #: Share of worlds without walls, of those with a shortened array, a gap in the band, furniture
 #: before a device, and of devices in corners rather than anywhere.
@@ -70,8 +70,9 @@ class Sight:
         kind = replace(radio, num_devices=count, inset_m=float(rng.uniform(0.1, 0.4)))
         heights = np.resize([1.2, 2.2], count) + rng.uniform(-0.25, 0.25, count)
         kind = replace(kind, heights_m=tuple(heights))
-        devices = place_devices(kind, room.bounds_m)
-        if count > 4 or rng.random() > IN_CORNERS:
+        if count <= CORNERS and rng.random() <= IN_CORNERS:
+            devices = place_devices(kind, room.bounds_m)
+        else:
             devices = anywhere(rng, room.bounds_m, person[None], count)
         if not devices:
             return None

@@ -23,7 +23,7 @@ from rfgs_core.radio import Radio
 from rfgs_core.radio.check import too_far
 from rfgs_core.radio.layout import DevicePose
 from rfgs_core.radio.materials import MATERIALS
-from rfgs_core.radio.placement import place_devices
+from rfgs_core.radio.placement import CORNERS, place_devices
 from rfgs_core.seeds import sub_seed
 from rfgs_core.simulate.geometry.room import SlabMaterial
 from rfgs_core.simulate.surface.edges import UNSAID
@@ -230,7 +230,7 @@ def _devices(
     if radio.placement != "corners":
         kind = replace(kind, num_devices=radio.num_devices)
         return kind, place_devices(kind, setting.bounds_m)
-    if count <= 4 and rng.random() < IN_CORNERS:
+    if count <= CORNERS and rng.random() < IN_CORNERS:
         return kind, place_devices(kind, setting.bounds_m)
     times = np.linspace(0.0, settings.lasts_s, 5)
     joints = [actor.body.joints17(actor.pose(time_s)) for actor in actors for time_s in times]

@@ -38,12 +38,7 @@ from rfgs_core.run.calibration import (
     read_calibration,
     write_calibration,
 )
-from rfgs_core.run.checkpoint import (
-    checkpoint_path,
-    finished_frame,
-    partial_path,
-    store_frame,
-)
+from rfgs_core.run.checkpoint import checkpoint_path, finished_frame, partial_path, store_frame
 from rfgs_core.run.config import CONFIG_FILE, RunConfig, relative_dataset
 from rfgs_core.run.costs import CostBar, cost_bar, pose_stage, price_line
 from rfgs_core.run.encoders import (

@@ -148,6 +148,7 @@ def test_the_player_holds_every_frame_true_and_fitted(evaluated_run) -> None:
     html = write_run_report(evaluated_run).read_text("utf-8")
     data = json.loads(unescape(re.search(r"data-player='([^']*)'", html)[1]))
     assert data["frames"] == evaluated_run.frames
+    assert len(data["tracks"]) == 2
     for track in data["tracks"]:
         assert len(track) == len(evaluated_run.frames) == len(set(track))
     camera = re.search(r"<p class=\"quiet\">(cam\d+), ", html)[1]

@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Options of commands whose work may be spread."""
+"""What commands whose work may be spread have in common."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+T = TypeVar("T")
 
 if TYPE_CHECKING:
     from rfgs_core.schedule.spread import Spread
@@ -41,3 +45,36 @@ class Spreading:
 
             count_workers(self.scheduler)
         return spread
+
+
+def need_folder(out: Path) -> None:
+    """Refuses a place for many parts that is a file.
+
+    Raises:
+        RfgsError: It is.
+    """
+    from rfgs_core.errors import RfgsError
+
+    if out.exists() and not out.is_dir():
+        raise RfgsError(f"{out} is a file; expected a folder, choose another")
+
+
+def watched(
+    walk: Callable[[Callable[[str], None]], Iterator[T]], total: int, what: str, unit: str
+) -> Iterator[T]:
+    """Parts as they come, beside a progress bar.
+
+    Args:
+        walk: Yields the parts; is told where to say what is under way.
+        total: How many there are.
+        what: What the bar is called.
+        unit: What a part is called.
+    """
+    from tqdm import tqdm
+
+    with tqdm(total=total, desc=what, unit=unit) as bar:
+        for one in walk(bar.set_postfix_str):
+            bar.update()
+            # Those that are there already come faster than the bar draws itself.
+            bar.refresh()
+            yield one

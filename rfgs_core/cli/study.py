@@ -6,12 +6,13 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from rfgs_core.cli.spreading import Spreading
+from rfgs_core.cli.spreading import Spreading, need_folder, watched
 from rfgs_core.study.cases import CONDITIONS, RADIOS, SCENES, Case
 
 if TYPE_CHECKING:
@@ -78,9 +79,6 @@ def run(args: StudyArgs) -> int:
     """Works through the cases; exit code 0 when the table holds all of them, else 1."""
     from dataclasses import asdict
 
-    from tqdm import tqdm
-
-    from rfgs_core.errors import RfgsError
     from rfgs_core.files import write_json, write_text
     from rfgs_core.report.metrics_file import read_metrics
     from rfgs_core.study.cases import cases
@@ -89,25 +87,21 @@ def run(args: StudyArgs) -> int:
     from rfgs_core.study.table import study_table
 
     chosen = cases(args.scenes, args.conditions, args.radios, args.seeds)
-    if args.out.exists() and not args.out.is_dir():
-        raise RfgsError(f"{args.out} is a file; expected a folder, choose another")
+    need_folder(args.out)
     spread = args.spread.checked()
     sys.stderr.write(f"{price_line(chosen, args.out)}\n")
     results: dict[Case, Any] = {}
     failed: dict[str, str] = {}
     rows = []
-    with tqdm(total=len(chosen), desc="study", unit="case") as bar:
-        for case, failure in _outcomes(chosen, args.out, spread, bar.set_postfix_str):
-            bar.update()
-            # Those that are there already come faster than the bar draws itself.
-            bar.refresh()
-            if failure:
-                failed[case.run.name] = failure
-            else:
-                results[case] = read_metrics(args.out / case.run)
-            rows = summarise([(one, results[one]) for one in chosen if one in results])
-            write_json(args.out / "study.json", [asdict(row) for row in rows])
-            write_text(args.out / "study.md", study_table(rows, failed))
+    walk = partial(_outcomes, chosen, args.out, spread)
+    for case, failure in watched(walk, len(chosen), "study", "case"):
+        if failure:
+            failed[case.run.name] = failure
+        else:
+            results[case] = read_metrics(args.out / case.run)
+        rows = summarise([(one, results[one]) for one in chosen if one in results])
+        write_json(args.out / "study.json", [asdict(row) for row in rows])
+        write_text(args.out / "study.md", study_table(rows, failed))
     sys.stdout.write(study_table(rows, failed))
     sys.stdout.write(f"\n{args.out / 'study.md'} written\n")
     return 1 if failed else 0

@@ -6,13 +6,14 @@ from __future__ import annotations
 import os
 import sys
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
 from rfgs_core.cli.bench.tables import outcomes
-from rfgs_core.cli.spreading import Spreading
+from rfgs_core.cli.spreading import Spreading, need_folder, watched
 from rfgs_core.device import Device
 
 if TYPE_CHECKING:
@@ -47,25 +48,18 @@ class Gallery:
         from tqdm import tqdm
 
         from rfgs_core.device import need_device
-        from rfgs_core.errors import RfgsError
         from rfgs_core.report.gallery import write_gallery
         from rfgs_core.study.gallery import SIZE, gallery_cells
 
         need_device(self.device)
-        if self.out.exists() and not self.out.is_dir():
-            raise RfgsError(f"{self.out} is a file; expected a folder, choose another --out")
+        need_folder(self.out)
         spread = self.spread.checked()
         chosen = gallery_cells(self.scenes, self.radio)
         failed: dict[Cell, str] = {}
-        with tqdm(total=len(chosen), desc="gallery", unit="scene") as bar:
-            for cell, failure in outcomes(
-                chosen, self.out, SIZE, self.device, spread, bar.set_postfix_str
-            ):
-                bar.update()
-                # Those that are there already come faster than the bar draws itself.
-                bar.refresh()
-                if failure:
-                    failed[cell] = failure.replace(f"{self.out}{os.sep}", "")
+        walk = partial(outcomes, chosen, self.out, SIZE, self.device, spread)
+        for cell, failure in watched(walk, len(chosen), "gallery", "scene"):
+            if failure:
+                failed[cell] = failure.replace(f"{self.out}{os.sep}", "")
         with tqdm(chosen, desc="pictures", unit="scene") as bar:
             tiles = [self._tile(cell, failed.get(cell, "")) for cell in bar]
         page = self.out / "gallery.html"

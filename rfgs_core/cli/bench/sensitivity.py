@@ -4,14 +4,15 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from rfgs_core.cli.spreading import Spreading
+from rfgs_core.cli.spreading import Spreading, need_folder, watched
 from rfgs_core.device import Device
 
 if TYPE_CHECKING:
@@ -51,40 +52,33 @@ class Sensitivity:
         Raises:
             RfgsError: An option is out of range, or there are no workers.
         """
-        from tqdm import tqdm
-
         from rfgs_core.device import need_device
-        from rfgs_core.errors import RfgsError
         from rfgs_core.study.sensitivity import SetupPart, every_setup, stored, sweeps
         from rfgs_core.study.sensitivity_rows import sweep_rows, sweep_table
 
         need_device(self.device)
-        if self.out.exists() and not self.out.is_dir():
-            raise RfgsError(f"{self.out} is a file; expected a folder, choose another --out")
+        need_folder(self.out)
         spread = self.spread.checked()
         every = sweeps(self.radio, self.scene, self.seed)
         chosen = {name: every[name] for name in self.sweeps or every}
         parts = [SetupPart(setup, self.device) for setup in every_setup(chosen)]
         results: dict[Setup, Mapping[str, Any]] = {}
         failed: dict[str, str] = {}
-        with tqdm(total=len(parts), desc="sensitivity", unit="setting") as bar:
-            for part, failure in self._outcomes(parts, spread, bar):
-                bar.update()
-                # Those that are there already come faster than the bar draws itself.
-                bar.refresh()
-                found = None if failure else stored(part.setup, self.out)
-                if found is None:
-                    failed[str(part)] = failure
-                else:
-                    results[part.setup] = found
-                self._write(chosen, results, failed)
+        walk = partial(self._outcomes, parts, spread)
+        for part, failure in watched(walk, len(parts), "sensitivity", "setting"):
+            found = None if failure else stored(part.setup, self.out)
+            if found is None:
+                failed[str(part)] = failure
+            else:
+                results[part.setup] = found
+            self._write(chosen, results, failed)
         sys.stdout.write(sweep_table(sweep_rows(chosen, results)))
         for name, why in failed.items():
             sys.stdout.write(f"failed, and without figures: {name}: {why}\n")
         return 1 if failed else 0
 
     def _outcomes(
-        self, parts: Sequence[SetupPart], spread: Spread, bar: Any
+        self, parts: Sequence[SetupPart], spread: Spread, tell: Callable[[str], None]
     ) -> Iterator[tuple[SetupPart, str]]:
         from rfgs_core.cli.calls import call
         from rfgs_core.study.parts import outcomes
@@ -96,7 +90,7 @@ class Sensitivity:
         def finished(part: SetupPart) -> bool:
             return stored(part.setup, self.out) is not None
 
-        return outcomes(parts, self.out, spread, finished, generate, bar.set_postfix_str)
+        return outcomes(parts, self.out, spread, finished, generate, tell)
 
     def _write(
         self,

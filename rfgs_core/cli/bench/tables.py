@@ -6,13 +6,14 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import tyro
 
 from rfgs_core.cli.bench.numbers import need_at_least_one
-from rfgs_core.cli.spreading import Spreading
+from rfgs_core.cli.spreading import Spreading, need_folder, watched
 from rfgs_core.device import Device
 from rfgs_core.study.paper_tables import Cell, Size, SizeName, TableName
 
@@ -56,39 +57,30 @@ class PaperTable:
         Raises:
             RfgsError: An option is out of range, or there are no workers.
         """
-        from tqdm import tqdm
-
         from rfgs_core.device import need_device
-        from rfgs_core.errors import RfgsError
         from rfgs_core.study.cell_rows import method_rows, method_table
         from rfgs_core.study.cells import stored
         from rfgs_core.study.paper_tables import SIZES, cells, narrowed
 
         need_at_least_one(seeds=self.seeds)
         need_device(self.device)
-        if self.out.exists() and not self.out.is_dir():
-            raise RfgsError(f"{self.out} is a file; expected a folder, choose another --out")
+        need_folder(self.out)
         spread = self.spread.checked()
         table, size = narrowed(self.name, SIZES[self.size], self.scenes, self.radios, self.methods)
         chosen = cells(table, size, self.seeds or size.seeds)
         results: dict[Cell, dict[str, Any]] = {}
         failed: dict[str, str] = {}
         rows = []
-        with tqdm(total=len(chosen), desc=self.name, unit="cell") as bar:
-            for cell, failure in outcomes(
-                chosen, self.out, size, self.device, spread, bar.set_postfix_str
-            ):
-                bar.update()
-                # Those that are there already come faster than the bar draws itself.
-                bar.refresh()
-                found = None if failure else stored(cell, self.out, size)
-                if found is None:
-                    failed[cell.name] = failure
-                else:
-                    results[cell] = found
-                # In the order of the table, whoever was first.
-                rows = method_rows(results[one] for one in chosen if one in results)
-                self._write(rows, failed, size)
+        walk = partial(outcomes, chosen, self.out, size, self.device, spread)
+        for cell, failure in watched(walk, len(chosen), self.name, "cell"):
+            found = None if failure else stored(cell, self.out, size)
+            if found is None:
+                failed[cell.name] = failure
+            else:
+                results[cell] = found
+            # In the order of the table, whoever was first.
+            rows = method_rows(results[one] for one in chosen if one in results)
+            self._write(rows, failed, size)
         sys.stdout.write(method_table(rows))
         for cell_name, why in failed.items():
             sys.stdout.write(f"failed, and in no row: {cell_name}: {why}\n")

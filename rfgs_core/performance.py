@@ -168,7 +168,7 @@ def _pictures(found: Performance) -> str:
         (
             f"{each.num_gaussians:,}",
             f"{each.size_px} × {each.size_px}",
-            *_times(each),
+            *_times(each, found.device),
         )
         for each in found.pictures
     ]
@@ -180,7 +180,7 @@ def _pictures(found: Performance) -> str:
             "GiB at most.\n"
         )
     else:
-        columns.append("drawn again")
+        columns += ["drawn again", "with gradients of everything"]
         said = (
             "*Drawn again* is another picture of Gaussians that stay where they are, as in the fit "
             f"of colours.\nThe process has held {found.memory_gib:.1f} GiB at most after these "
@@ -196,9 +196,10 @@ def _pictures(found: Performance) -> str:
     )
 
 
-def _times(picture: Picture) -> tuple[str, ...]:
-    if picture.gradients_s is None:
-        return f"{picture.first_s:.2f} s", f"{picture.again_s:.3f} s"
+def _times(picture: Picture, device: Device) -> tuple[str, ...]:
+    if device == "cpu":
+        times_s = picture.first_s, picture.again_s, picture.gradients_s
+        return tuple(f"{time_s:.2g} s" for time_s in times_s)
     return (
         f"{1e3 * picture.first_s:.2f} ms",
         f"{1.0 / picture.first_s:.0f}",

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, replace
 from typing import TypeVar
 
@@ -17,9 +17,9 @@ from rfgs_core.gaussians.model import FEATURE_DIM, Gaussians
 from rfgs_core.propagation import Backend, Subcarriers, propagate
 from rfgs_core.render.bench import random_cloud
 from rfgs_core.render.cameras import Camera
-from rfgs_core.render.gpu import splat_on_gpu
 from rfgs_core.render.rasterizer import splat
 from rfgs_core.render.reference import splat_plain
+from rfgs_core.render.splat import Splatted
 
 #: Gaussians, links and subcarriers: single ones, and none that fills a block.
 SIZES = ((1, 1, 1), (2, 3, 5), (129, 2, 33), (1000, 65, 61))
@@ -30,12 +30,11 @@ SPEED: dict[Device, tuple[int, int, int]] = {
     "cpu": (20_000, 64, 64),
     "cuda": (200_000, 256, 64),
 }
-#: Largest errors: of channels and gradients in float32 against double, relative; of pictures in
-#: shares of full brightness.
-CHANNEL, GRADIENT, PICTURE = 1e-4, 1e-4, 1e-4
-#: Relative error of pictures on a GPU, and of their gradients: drawn in float32, a contribution at
-#: the least that counts falls to either side of it, and gsplat stops earlier (`render.gpu`).
-PICTURE_ON_GPU = 1e-3
+#: Largest relative errors of channels and gradients in float32 against double.
+CHANNEL, GRADIENT = 1e-4, 1e-4
+#: The same of pictures and their gradients. On a GPU, drawn in float32, a contribution at the
+#: least that counts falls to either side of it, and gsplat stops earlier (`render.gpu`).
+PICTURE: dict[Device, float] = {"cpu": 1e-4, "cuda": 1e-3}
 #: Additions and multiplications of one Gaussian, link and subcarrier: one step of the recurrence
 #: (`propagation.kernels_scatter`) and two sums; on a GPU, where neighbours do not wait for each
 #: other, sine, cosine and exponential of each (`propagation.kernels_triton`).
@@ -90,7 +89,7 @@ def checks(device: Device) -> Iterator[Check]:
         yield from _propagation(f"{size[0]} x {size[1]} x {size[2]}", _scene(*size), device)
     yield from _propagation("60 GHz at 50 m", _far(), device)
     for size in PICTURES:
-        yield from _pictures_on_gpu(*size) if device == "cuda" else [_picture(*size)]
+        yield from _pictures(*size, device)
 
 
 def _scene(gaussians: int, links: int, subcarriers: int) -> CloudAndLinks:
@@ -155,44 +154,35 @@ def _relative(found: Tensor, true: Tensor) -> float:
     return float((found.cpu().to(true.dtype) - true).norm()) / (size if size > 0.0 else 1.0)
 
 
-def _picture(gaussians: int, edge_px: int) -> Check:
-    """The tiled rasteriser beside the one that visits every Gaussian at every pixel."""
-    cloud, rgb, camera = random_cloud(gaussians, edge_px, seed=gaussians)
-    tiled, plain = splat(cloud, rgb, camera), splat_plain(cloud, rgb, camera, (0, edge_px))
-    both = ((tiled.rgb, plain.rgb), (tiled.alpha, plain.alpha))
-    worst = max(float((a - b).abs().max()) for a, b in both)
-    return Check(f"picture, {gaussians} at {edge_px} px", worst, PICTURE)
-
-
-def _pictures_on_gpu(gaussians: int, edge_px: int) -> Iterator[Check]:
-    """Colours, features and all gradients of gsplat, beside the plain twin in double."""
+def _pictures(gaussians: int, edge_px: int, device: Device) -> Iterator[Check]:
+    """Colours, features and all gradients, beside the plain twin in double."""
     cloud, rgb, camera = random_cloud(gaussians, edge_px, seed=gaussians)
     features = torch.randn(gaussians, FEATURE_DIM, generator=torch.Generator().manual_seed(1))
     for what, values in (("3 colours", rgb), ("32 features", features)):
-        found, exact = (_drawn(cloud, values, camera, device) for device in ("cuda", "cpu"))
+        found = _drawn(splat, on_device(cloud, device), values.to(device), camera)
+        exact = _drawn(splat_plain, cloud, values, camera)
         for part, kind in enumerate(("picture", "gradients")):
             pairs = zip(found[part], exact[part], strict=True)
             worst = max(_relative(one, other) for one, other in pairs)
-            yield Check(f"{kind} of {what}, {gaussians} at {edge_px} px", worst, PICTURE_ON_GPU)
+            yield Check(f"{kind} of {what}, {gaussians} at {edge_px} px", worst, PICTURE[device])
 
 
 def _drawn(
-    cloud: Gaussians, values: Tensor, camera: Camera, device: Device
+    draw: Callable[[Gaussians, Tensor, Camera], Splatted],
+    cloud: Gaussians,
+    values: Tensor,
+    camera: Camera,
 ) -> tuple[list[Tensor], list[Tensor]]:
     """Picture and coverage, and the gradients of everything that they depend on."""
     parts = {**dict(cloud.items()), "values": values}
-    leaves = {name: part.detach().to(device).requires_grad_(True) for name, part in parts.items()}
+    leaves = {name: part.detach().requires_grad_(True) for name, part in parts.items()}
     there = Gaussians(**{name: leaves[name] for name, _ in cloud.items()})
-    if device == "cuda":
-        picture, alpha, _ = splat_on_gpu(there, leaves["values"], camera)
-    else:
-        plain = splat_plain(there, leaves["values"], camera)
-        picture, alpha = plain.rgb, plain.alpha
+    picture = draw(there, leaves["values"], camera)
     # Some direction that no symmetry of a picture hides.
-    ramp = torch.linspace(0.5, 1.5, picture.numel(), device=device, dtype=picture.dtype)
-    (picture * ramp.reshape(picture.shape)).sum().backward()
+    ramp = torch.linspace(0.5, 1.5, picture.rgb.numel()).to(picture.rgb)
+    (picture.rgb * ramp.reshape(picture.rgb.shape)).sum().backward()
     slopes = [torch.as_tensor(leaves[name].grad) for name in (*_DRAWN, "values")]
-    return [picture.detach(), alpha.detach()], slopes
+    return [picture.rgb.detach(), picture.alpha.detach()], slopes
 
 
 def throughput(device: Device, repeats: int = 5) -> Throughput:

@@ -12,7 +12,6 @@ from rfgs_core.bench import fastest
 from rfgs_core.device import Device, on_device
 from rfgs_core.gaussians.model import FEATURE_DIM, Gaussians
 from rfgs_core.render.cameras import Camera
-from rfgs_core.render.gpu import splat_on_gpu
 from rfgs_core.render.rasterizer import plan_splats, splat
 from rfgs_core.render.reference import splat_plain
 
@@ -69,9 +68,8 @@ class Picture:
     """Projected, sorted and drawn [s]."""
     again_s: float
     """Drawn again with other colours [s]."""
-    gradients_s: float | None
-    """Drawn, and gradients of Gaussians and colours [s]; None on the CPU, where Gaussians in a
-    picture are constants."""
+    gradients_s: float
+    """Drawn, and gradients of Gaussians and colours [s]."""
 
 
 def time_picture(
@@ -83,16 +81,14 @@ def time_picture(
     plan.draw(rgb)
     first_s, _ = fastest(lambda: splat(gaussians, rgb, camera), repeats)
     again_s, _ = fastest(lambda: plan.draw(rgb), repeats)
-    gradients_s = None
-    if device == "cuda":
-        gradients_s, _ = fastest(lambda: _with_gradients(gaussians, rgb, camera), repeats + 1)
+    gradients_s, _ = fastest(lambda: _with_gradients(gaussians, rgb, camera), repeats + 1)
     return Picture(num_gaussians, size_px, first_s, again_s, gradients_s)
 
 
 def _with_gradients(gaussians: Gaussians, rgb: torch.Tensor, camera: Camera) -> torch.Tensor:
-    """A picture on a GPU, its brightness sent back to everything."""
+    """A picture, its brightness sent back to everything."""
     leaves = {name: value.detach().requires_grad_(True) for name, value in gaussians.items()}
-    picture, _, _ = splat_on_gpu(Gaussians(**leaves), rgb.detach().requires_grad_(True), camera)
+    picture = splat(Gaussians(**leaves), rgb.detach().requires_grad_(True), camera).rgb
     picture.sum().backward()
     return picture
 

@@ -25,7 +25,7 @@ def measured() -> Performance:
         propagation={**ratios, **tuned, **times, **sizes},
         share=Throughput(0.02, 5e10, 2e11),
         raster={"raster_s": 0.03, "twin_s": 6.0, "raster_ratio": 200.0, "max_abs_error": 1e-5},
-        pictures=(Picture(100_000, 512, 0.41, 0.052, None),),
+        pictures=(Picture(100_000, 512, 0.41, 0.052, 0.31),),
         memory_gib=1.25,
         growths=(Growth("law", SIZES, (0.1, 0.9, 8.1)), Growth("flat", SIZES, (0.1, 0.1, 0.1))),
         device="cpu",
@@ -40,7 +40,7 @@ def test_every_number_stands_on_the_page() -> None:
     assert "| forward | 25.0 ms | 90× | 55× |" in text
     assert "| with gradients | 78.0 ms | 61× | 57× |" in text
     assert "25% of the 200 billion" in text
-    assert "| 100,000 | 512 × 512 | 0.41 s | 0.052 s |" in text
+    assert "| 100,000 | 512 × 512 | 0.41 s | 0.052 s | 0.31 s |" in text
     assert re.search(r"\| law \| 100 to 10,000 \| 0.1 s to 8.1 s \| 0.95 \|", text)
     assert "1.2 GiB" in text and "Nothing grows more than linearly" in text
 

@@ -173,11 +173,11 @@ def test_gradcheck_of_colours(camera, gaussians) -> None:
     assert torch.autograd.gradcheck(lambda colors: plan.draw(colors).rgb, (rgb,))
 
 
-def test_geometry_gets_no_gradient(camera, gaussians) -> None:
+def test_frozen_geometry_gets_no_gradient(camera, gaussians) -> None:
     cloud = gaussians([[0.0, 0.0, -1.0]])
     cloud.means.requires_grad_()
     rgb = torch.ones(1, 3, requires_grad=True)
-    splat(cloud, rgb, camera()).rgb.sum().backward()
+    plan_splats(cloud, camera()).draw(rgb).rgb.sum().backward()
     assert rgb.grad is not None
     assert cloud.means.grad is None
 

@@ -29,7 +29,7 @@ Values = dict[str, float | None]
 def true_picture(run: EvaluatedRun, camera: str, frame: int) -> Picture:
     """The picture of the dataset, cut with its instance mask."""
     return Picture.cut(
-        _rgb(run.sequence.image(camera, frame)), run.sequence.mask(camera, frame) > 0
+        rgb_of(run.sequence.image(camera, frame)), run.sequence.mask(camera, frame) > 0
     )
 
 
@@ -66,7 +66,7 @@ def picture_metrics(
         true = true_picture(run, camera, frame)
         shown = {"method": rendered_picture(run, camera, frame)}
         if run.sequence.files.image_empty(camera).is_file():
-            empty = _rgb(run.sequence.image_empty(camera))
+            empty = rgb_of(run.sequence.image_empty(camera))
             shown["empty_room"] = empty_picture(empty)
             shown["silhouette"] = silhouette_picture(empty, true.person, colour)
         for name, picture in shown.items():
@@ -91,5 +91,6 @@ def mean_of(rows: list[Values], keys: tuple[str, ...]) -> Values:
     return result
 
 
-def _rgb(picture: np.ndarray) -> Float[np.ndarray, "h w 3"]:
+def rgb_of(picture: np.ndarray) -> Float[np.ndarray, "h w 3"]:
+    """Colours of a stored picture, sRGB in [0, 1]."""
     return picture[..., :3].astype(np.float32) / np.float32(255.0)

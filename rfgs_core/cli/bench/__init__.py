@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from tyro.conf import subcommand
 
 from rfgs_core.cli.bench.gallery import Gallery
-from rfgs_core.cli.bench.judges import Fields, Limbs, Live, People, Real, Tracers
+from rfgs_core.cli.bench.judges import Fields, Limbs, Live, People, Pictures, Real, Tracers
 from rfgs_core.cli.bench.sensitivity import Sensitivity
 from rfgs_core.cli.bench.speed import (
     Blender,
@@ -35,6 +35,7 @@ BenchArgs = (
     | Annotated[Tracers, subcommand("tracers")]
     | Annotated[Limbs, subcommand("limbs")]
     | Annotated[People, subcommand("people")]
+    | Annotated[Pictures, subcommand("pictures")]
     | Annotated[Live, subcommand("live")]
     | Annotated[Real, subcommand("real")]
     | Annotated[Fields, subcommand("fields")]

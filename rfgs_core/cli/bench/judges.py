@@ -3,11 +3,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+import tyro
 
 from rfgs_core.cli.bench.numbers import Part, need_at_least_one, note
+
+
+def _flat(table: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """Rows of a table as one dictionary, without what a row does not have."""
+    return {
+        f"{row}: {name}": value
+        for row, values in table.items()
+        for name, value in values.items()
+        if value is not None
+    }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,12 +69,7 @@ class Limbs(Part):
                 sequence, self.radio, network, sequence.frames,
                 everything=not self.hold_out, on_frame=bar.update,
             )  # fmt: skip
-        flat = {
-            f"{row}: {name}": value
-            for row, values in table.items()
-            for name, value in values.items()
-        }
-        return {**flat, "frames": len(sequence.frames), **hardware()}
+        return {**_flat(table), "frames": len(sequence.frames), **hardware()}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,6 +138,33 @@ class People(Part):
         with tqdm(total=MOST_FRAMES, desc="people") as bar, one_torch_thread():
             table = judge_people(folder, trained.network, bar.update)
         return {**table, **hardware()}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pictures(Part):
+    """A run beside Gaussians fitted to the pictures themselves, what cameras alone would tell.
+
+    Judged by test cameras and the true surface. The run's colours are those of `rfgs train`.
+    """
+
+    run_folder: Annotated[Path, tyro.conf.arg(name="run")]
+    """The run, see `rfgs train`; its dataset holds pictures."""
+    steps: int = 200
+    """Adam steps on the pictures of each frame."""
+
+    def numbers(self) -> dict[str, Any]:
+        """Fits pictures of every frame, and compares."""
+        from tqdm import tqdm
+
+        from rfgs_core.bench import hardware
+        from rfgs_core.evaluate.picture_bound import picture_table
+        from rfgs_core.run import open_run
+
+        need_at_least_one(steps=self.steps)
+        run = open_run(self.run_folder)
+        with tqdm(total=len(run.frames) * self.steps, desc="pictures", unit="step") as bar:
+            table = picture_table(run, self.steps, bar.update)
+        return {**_flat(table), "frames": len(run.frames), **hardware()}
 
 
 @dataclass(frozen=True, kw_only=True)

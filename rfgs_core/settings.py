@@ -123,6 +123,7 @@ _LIMITS: dict[str, tuple[float, float]] = {
     "num_gaussians": (1, 10**7),
     "iterations": (0, 10**9),
     "bodies": (1, 10**4),
+    "excess_m": (0.0, 20.0),
     "solver_steps": (0, 10**6),
     "batch_entries": (1, 2**31),
     "batch_points": (1, 2**31),
@@ -146,6 +147,9 @@ class TrainConfig(TrainOptions):
     """Moving Gaussians at the start of the first frame."""
     bodies: int = 1
     """Moving bodies in the scene; taken from the dataset's instances."""
+    excess_m: float = 0.0
+    """What paths over moving bodies are longer than straight lines [m]; taken off before the fit
+    and put on again in what is predicted."""
     solver_steps: int = 8
     """Conjugate-gradient steps for the reflectivities."""
     iterations: int = 80

@@ -12,6 +12,7 @@ badly, looks like a body at another place to every pair.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -93,13 +94,49 @@ def count_bodies(observations: Observations, config: TrainConfig, seed: int) -> 
     Returns:
         One row per body, in the order in which they were found; none where nobody is.
     """
+    return _added(observations, config, seed, MOST, one_more_counts)
+
+
+def place_bodies(
+    observations: Observations, count: int, config: TrainConfig, seed: int
+) -> Float64[np.ndarray, "body 2"] | None:
+    """Where so many people are likeliest, each beside all others.
+
+    Args:
+        observations: The frame.
+        count: How many there are.
+        config: How echoes are taken out before one more is looked for.
+        seed: Seed of the Gaussians that stand for these echoes.
+
+    Returns:
+        Places on the ground [m], in the order in which they were found; None where the evidence
+        is of fewer, or there are too few device pairs.
+    """
+    found = _added(observations, config, seed, count, lambda _: True)
+    return _bodies(found).axes_xy if len(found) == count else None
+
+
+def loudest_gain(observations: Observations, config: TrainConfig, seed: int) -> float:
+    """Evidence of the body that explains most of a frame [nat]; zero where there is none."""
+    found = _added(observations, config, seed, 1, lambda _: True)
+    return found[0].nat if found else 0.0
+
+
+def _added(
+    observations: Observations,
+    config: TrainConfig,
+    seed: int,
+    most: int,
+    counts: Callable[[list[Gain]], bool],
+) -> list[Gain]:
+    """Bodies one after the other, as long as the last one counts."""
     found: list[Gain] = []
     if not observations.changed or len(observations.pairs[1]) < FEWEST_PAIRS:
         return found
     maps = pair_maps(observations)
-    while len(found) < MOST:
+    while len(found) < most:
         more = _one_more(observations, maps, found, config, seed)
-        if more is None or not one_more_counts(more):
+        if more is None or not counts(more):
             break
         found = more
     return found

@@ -204,7 +204,12 @@ def locate_bodies(
         ground = ground[(distance_m <= within).any(axis=1)]
     score = _visible_side_score(maps, ground, float(bounds_m[0, 2]))
     found = _means_around(ground, score, _separate_peaks(ground, score, count))
-    if near is None:
-        return found
+    return found if near is None else in_order_of(near, found)
+
+
+def in_order_of(
+    near: Float[np.ndarray, "body 2"], found: Float64[np.ndarray, "body 2"]
+) -> Float64[np.ndarray, "body 2"]:
+    """Places in the order of those expected, by the least sum of squared distances."""
     body, place = linear_sum_assignment(np.sum((near[:, None] - found) ** 2, axis=2))
     return found[place[np.argsort(body)]]

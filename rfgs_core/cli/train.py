@@ -41,6 +41,9 @@ class TrainArgs:
     people: Literal["auto", "sensed", "told"] | int = "auto"
     """How many people there are: sensed, counted by the radio alone; told, by the dataset's
     instances; a number, so many; or auto, sensed where the radio allows it, else told."""
+    excess_path: Literal["auto"] | float = "auto"
+    """What waves travel further to people and back than straight lines, as through a wall [m]:
+    auto looks for it where people can be sensed; 0 leaves it."""
     packets: Packets | None = None
     """Of several packets (chirps) per frame: all, which tells the channel's change from noise by
     delay, direction and Doppler; or first, the one at the frame's own time. Left out: all, but
@@ -93,7 +96,7 @@ def run(args: TrainArgs) -> int:
     with watched(args.out) if args.view else contextlib.nullcontext():
         trained = train_sequence(
             dataset, sequence, args.radio, frames, config, args.out, encoder_file,
-            people=args.people, log=args.log,
+            people=args.people, excess=args.excess_path, log=args.log,
         )  # fmt: skip
     if (heads := HeadCount.read(args.out)) is not None:
         sys.stdout.write(f"people: {heads}\n")

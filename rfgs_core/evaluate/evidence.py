@@ -15,6 +15,7 @@ from rfgs_core.dataset.splits import HeldOut
 from rfgs_core.encode.matched_filter import matched_filter_map
 from rfgs_core.evaluate.backprojection import PowerMap, ThinnedMaps, thinned_maps
 from rfgs_core.evaluate.grid import Grid
+from rfgs_core.measure.observations import excess_turn
 from rfgs_core.radio import Layout
 
 
@@ -77,6 +78,13 @@ class Evidence:
     ) -> Evidence:
         """The same evidence with the evaluated method's own centroid [m] and bodies."""
         return replace(self, method_centroid_m=centroid_m, method_bodies=bodies)
+
+    def lengthened(self, path_m: float) -> Evidence:
+        """As if waves had travelled so much further to what changed and back [m]."""
+        if path_m == 0.0:
+            return self
+        delta = self.delta * excess_turn(self.freq_hz, path_m)
+        return replace(self, delta=delta.astype(np.complex64))
 
     @cached_property
     def maps(self) -> ThinnedMaps:

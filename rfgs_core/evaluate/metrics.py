@@ -27,7 +27,7 @@ from rfgs_core.evaluate.residual import GAUSSIANS_ALONE, Answer, with_residual
 from rfgs_core.evaluate.rf import RF_KEYS, frame_rf, pool_rf, rf_values
 from rfgs_core.evaluate.scene import EvaluatedRun, Scene
 from rfgs_core.evaluate.verdicts import verdicts
-from rfgs_core.measure.observations import Kept
+from rfgs_core.measure.observations import Kept, excess_turn
 from rfgs_core.past import timed
 from rfgs_core.render.view import pictures_of
 from rfgs_core.seals import write_sealed_json
@@ -207,8 +207,14 @@ def _evaluate_frame(
     )
     _add(scene, table, GAUSSIANS_ALONE, frame, model, reference, csi)
     on_step()
+    excess_m = scene.run.config.settings.excess_m
+    spared = evidence.lengthened(-excess_m)
     for name, baseline in baselines.items():
-        result = phase_free.answer(name, baseline, evidence, scene.observe)
+        # Baselines are spared the wall that the method found.
+        result = phase_free.answer(name, baseline, spared, scene.observe)
+        if result.delta is not None and excess_m:
+            turn = excess_turn(scene.radio.freq_hz, excess_m)
+            result = replace(result, delta=result.delta * turn)
         _add(scene, table, name, frame, result, reference, csi)
         on_step()
 

@@ -12,7 +12,8 @@ from jaxtyping import Bool, Complex, Complex64, Float, Float64, Int64
 from torch import Tensor
 
 from rfgs_core.bodies.body_prior import outward_normals
-from rfgs_core.bodies.localise import PairMaps, locate_bodies, pair_maps
+from rfgs_core.bodies.count import place_bodies
+from rfgs_core.bodies.localise import PairMaps, in_order_of, locate_bodies, pair_maps
 from rfgs_core.bodies.lying import with_lying
 from rfgs_core.bodies.motion_density import novelty, speeds_m_s, wanted_counts
 from rfgs_core.bodies.posture import tell_postures
@@ -254,13 +255,20 @@ def _followed(
 ) -> Tracks:
     """Finds the bodies, anywhere in a first frame, where they are expected in a later one."""
     bounds_m, time_s = observations.bounds_m, observations.time_s
+    several = config.bodies > 1 and observations.kind == "complex"
+    axes_xy = place_bodies(observations, config.bodies, config, seed) if several else None
     if before is None:
-        axes_xy = locate_bodies(maps, bounds_m, config.bodies)
-        tracks = Tracks.begun(separated(observations, maps, axes_xy, config, seed), time_s)
+        if axes_xy is None:
+            axes_xy = locate_bodies(maps, bounds_m, config.bodies)
+            axes_xy = separated(observations, maps, axes_xy, config, seed)
+        tracks = Tracks.begun(axes_xy, time_s)
     else:
         near, reach_m = before.expected(time_s)
-        axes_xy = locate_bodies(maps, bounds_m, config.bodies, near, reach_m)
-        axes_xy = separated(observations, maps, axes_xy, config, seed, near, reach_m)
+        if axes_xy is None:
+            axes_xy = locate_bodies(maps, bounds_m, config.bodies, near, reach_m)
+            axes_xy = separated(observations, maps, axes_xy, config, seed, near, reach_m)
+        else:
+            axes_xy = in_order_of(near, axes_xy)
         tracks = before.moved(axes_xy, time_s)
     lay = None if before is None else before.bodies
     return tracks.laid(with_lying(observations, maps, axes_xy, config, seed, lay))

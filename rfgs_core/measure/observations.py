@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from jaxtyping import Bool, Complex, Complex64, Float32, Float64, Int64
+from jaxtyping import Bool, Complex, Complex64, Complex128, Float32, Float64, Int64
 
 from rfgs_core.dataset.aperture import whole_layout, whole_packets, whole_static
 from rfgs_core.dataset.observed import Observed
@@ -16,6 +16,7 @@ from rfgs_core.dataset.splits import HeldOut
 from rfgs_core.errors import RfgsError
 from rfgs_core.measure.kinds import KINDS, Reported, Visible
 from rfgs_core.radio import Layout
+from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.settings import Observe, Packets, TrainConfig
 
 if TYPE_CHECKING:
@@ -81,12 +82,27 @@ class Observations:
         """The same observations with another channel change, for example a residual."""
         return replace(self, delta=delta.astype(np.complex64), packets=None, packet_interval_s=0.0)
 
+    def lengthened(self, path_m: float) -> Observations:
+        """As if waves had travelled so much further to what changed and back [m]; of phases."""
+        if path_m == 0.0:
+            return self
+        turn = excess_turn(self.freq_hz, path_m)
+        packets = None if self.packets is None else (self.packets * turn).astype(np.complex64)
+        return replace(self, delta=(self.delta * turn).astype(np.complex64), packets=packets)
+
     def with_entries(self, entries: Complex[np.ndarray, "link subcarrier"]) -> Observations:
         """The same observations with other visible entries of the change, zero where hidden."""
         delta = np.zeros_like(self.delta)
         tx, rx = np.nonzero(self.links)
         delta[tx[:, None], rx[:, None], np.flatnonzero(self.subcarriers)] = entries
         return self.with_delta(delta)
+
+
+def excess_turn(
+    freq_hz: Float64[np.ndarray, "subcarrier"], path_m: float
+) -> Complex128[np.ndarray, "subcarrier"]:
+    """Factor of modulus one by which a longer path turns every subcarrier, e^{−j2πf Δ/c}."""
+    return np.exp(-2j * np.pi * freq_hz * path_m / SPEED_OF_LIGHT)
 
 
 def packets_to_read(

@@ -82,8 +82,7 @@ class RunConfig:
                 f"{path}: expected schema {SCHEMA}, found {stored.get('schema')}; "
                 "use the version of rfgs that made it, or train again"
             )
-        # Runs without a word of it started from the prior.
-        stored.setdefault("start", "prior")
+        stored = {**_UNSAID, **stored}
         _need_entries(path, stored)
         own = {name: stored[name] for name in (*_OWN, "train_s") if name in stored}
         try:
@@ -106,6 +105,8 @@ def relative_dataset(run: Path, dataset: Path) -> str:
     return Path(os.path.relpath(dataset.resolve(), run.resolve())).as_posix()
 
 
+#: What held of runs without a word of it: they started from the prior, and saw no wall.
+_UNSAID = {"start": "prior", "excess_m": 0.0}
 _REMEDY = "train again"
 _OWN = tuple(field.name for field in fields(RunConfig) if field.name not in ("settings", "train_s"))
 _SETTINGS = tuple(field.name for field in fields(TrainConfig) if field.name not in _NOT_KEPT)

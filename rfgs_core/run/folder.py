@@ -17,7 +17,7 @@ from rfgs_core.dataset.observed import Observed
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.gaussians import FEATURE_DIM, Gaussians
 from rfgs_core.gaussians.ply import count_ply, read_ply
-from rfgs_core.measure.observations import Kept, Observations, Reported, observe
+from rfgs_core.measure.observations import Kept, Observations, Reported, excess_turn, observe
 from rfgs_core.model.channel import Channel
 from rfgs_core.model.head import HEAD_SHAPES, HEAD_TYPES, RadioHead
 from rfgs_core.model.reflectivity import fitted_reflectivities
@@ -97,8 +97,8 @@ class Run:
         return self.config.settings.calibrate != "none"
 
     def observations(self, frame: int, kept: Kept | None = None) -> Observations:
-        """What the fit sees of a frame: as reported, without the offsets of a calibrated run."""
-        reported = self.as_reported(frame, kept)
+        """What the fit sees of a frame: as reported, without excess path and device offsets."""
+        reported = self.as_reported(frame, kept).lengthened(-self.config.settings.excess_m)
         if not self.calibrated:
             return reported
         return read_calibration(self.path, frame).undone(reported)
@@ -294,7 +294,9 @@ class Run:
         observations: Observations,
         csi: Complex64[np.ndarray, "tx rx subcarrier"],
     ) -> Complex64[np.ndarray, "tx rx subcarrier"]:
-        """With the offsets that devices had when the empty room was captured."""
+        """With excess path, and offsets that devices had when the empty room was captured."""
+        if excess_m := self.config.settings.excess_m:
+            csi = (csi * excess_turn(observations.freq_hz, excess_m)).astype(np.complex64)
         if not self.calibrated:
             return csi
         offsets = read_calibration(self.path, frame).capture

@@ -222,7 +222,7 @@ def head_count(
     for frame in _middle_and_ends_first(spread_frames(frames, votes_of(frames))):
         seen = observe(
             sequence, radio, frame, config.channel, config.observe, empty, config.packets
-        )
+        ).lengthened(-config.excess_m)
         seed = sub_seed(config.seed, sequence.name, radio, frame, "people")
         votes[str(frame)] = len(count_bodies(seen, config, seed))
         on_frame(len(votes))

@@ -47,6 +47,7 @@ from rfgs_core.run.encoders import (
     refuse_other_radios,
     run_encoder,
 )
+from rfgs_core.run.excess import ExcessPath, excess_of_run
 from rfgs_core.run.folder import (
     BACKGROUND_FILE,
     Run,
@@ -84,6 +85,7 @@ def train_sequence(
     encoder_file: Path | None = None,
     *,
     people: People = "told",
+    excess: ExcessPath = 0.0,
     log: bool = False,
 ) -> Run:
     """Fits every frame, each starting from the one before; finished frames are kept.
@@ -97,6 +99,7 @@ def train_sequence(
         out: Folder of the run.
         encoder_file: Learned encoder of the settings, copied into the run.
         people: How it is known how many people there are; a run keeps what it began with.
+        excess: How it is known what paths over people are longer than straight lines [m].
         log: Write curves for TensorBoard into `out`/log.
 
     Raises:
@@ -115,6 +118,8 @@ def train_sequence(
         sweep(out, ".tmp-*")
         _refuse_other_files(out)
         begin = time.perf_counter()
+        excess_m = excess_of_run(out, sequence, radio, frames, config, excess)
+        config = replace(config, excess_m=excess_m)
         heads = counted(out, sequence, radio, frames, config, people)
         asked = RunConfig(
             dataset=relative_dataset(out, dataset.path),

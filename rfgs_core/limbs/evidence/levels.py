@@ -60,7 +60,8 @@ class Levels(NamedTuple):
         for _ in range(STEPS):
             inverse = _inverse(np.tensordot(level, whole, 1))
             white = inverse @ change
-            power = np.einsum("n,kn->k", white.conj(), whole @ white).real
+            # What a part has of the change rounds to less than nothing where it has no share.
+            power = np.maximum(np.einsum("n,kn->k", white.conj(), whole @ white).real, 0.0)
             trace = np.einsum("knm,mn->k", whole, inverse).real
             level = level * np.sqrt(power / np.maximum(trace, 1e-300))
             level[0] = max(level[0], LEAST_NOISE)

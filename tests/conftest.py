@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import subprocess
 import sys
@@ -42,6 +43,17 @@ def pytest_configure(config: pytest.Config) -> None:
 
         torch.set_num_threads(1)
         numba.set_num_threads(1)
+
+
+def pytest_collection_finish() -> None:
+    """Spares the garbage collector what was loaded until here, which stays to the end.
+
+    And sets it as programs do (`rfgs_core.interrupts`). Blender as a module hangs at the end of a
+    process in which it was set aside.
+    """
+    gc.set_threshold(10_000)
+    if "bpy" not in sys.modules:
+        gc.freeze()
 
 
 @pytest.fixture(scope="session")

@@ -31,6 +31,8 @@ CALLED = "RFGS_CALLED"
 #: New objects after which Python looks for unused cycles. Of modules, which are most of what a
 #: short command makes, none is: with Python's own 700 that search takes a tenth of such a command.
 _NEW_OBJECTS = 10_000
+#: Libraries that hang, or complain, where some of their objects are left at the end.
+_TIDY = ("bpy", "drjit", "triton")
 
 _message = MESSAGE
 
@@ -64,8 +66,9 @@ def run_program(module: str) -> NoReturn:
         except KeyboardInterrupt:
             # Between two instructions of the watch itself; its loop above ends at once.
             watch.module_ended = True
-    # The process ends: to look through all its objects once more takes half a second.
-    gc.freeze()
+    if not any(name in sys.modules for name in _TIDY):
+        # To look through all objects once more as the process ends takes up to a second.
+        gc.freeze()
     sys.exit(code)
 
 

@@ -48,12 +48,16 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_finish() -> None:
     """Spares the garbage collector what was loaded until here, which stays to the end.
 
-    And sets it as programs do (`rfgs_core.interrupts`). Blender as a module hangs at the end of a
-    process in which it was set aside.
+    And sets it as programs do (`rfgs_core.interrupts`).
     """
     gc.set_threshold(10_000)
-    if "bpy" not in sys.modules:
-        gc.freeze()
+    gc.freeze()
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_unconfigure() -> None:
+    """Gives back what was set aside: libraries complain of what is still there at the end."""
+    gc.unfreeze()
 
 
 @pytest.fixture(scope="session")

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Adam for a few tensors, without the start of torch's compiler."""
+"""Adam without the start of torch's compiler."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import torch
 from torch import Tensor
@@ -11,17 +11,35 @@ from torch.optim.adam import adam
 
 
 class Adam:
-    """`torch.optim.Adam` at its defaults, each tensor with a rate of its own.
+    """`torch.optim.Adam`, or `AdamW` where weights decay, each tensor with a rate of its own.
 
-    Steps are those of the function below torch's class, to the bit. The class itself imports
-    `torch._dynamo` when it is first made, which takes a process a second of processor time.
+    Steps are those of the function below torch's classes, to the bit. The classes themselves import
+    `torch._dynamo` when one is first made, which takes a process two seconds of processor time.
     """
 
-    def __init__(self, rates: Mapping[Tensor, float]) -> None:
-        """`rates` is the learning rate of each leaf tensor."""
+    def __init__(
+        self, rates: Mapping[Tensor, float], *, eps: float = 1e-8, decay: float = 0.0
+    ) -> None:
+        """Remembers nothing yet.
+
+        Args:
+            rates: Learning rate of each leaf tensor.
+            eps: What is added to the root of the second moment.
+            decay: Share of the rate by which weights shrink in each step, as in `AdamW`.
+        """
         self.rates = dict(rates)
+        self.eps, self.decay = eps, decay
         #: What it remembers of each tensor that has stepped: `step`, `exp_avg` and `exp_avg_sq`.
         self.state: dict[Tensor, dict[str, Tensor]] = {}
+
+    @staticmethod
+    def of(leaves: Iterable[Tensor], rate: float, *, eps: float = 1e-8, decay: float = 0.0) -> Adam:
+        """All tensors at one rate."""
+        return Adam(dict.fromkeys(leaves, rate), eps=eps, decay=decay)
+
+    def set_rate(self, rate: float) -> None:
+        """Gives all tensors one rate from here on."""
+        self.rates = dict.fromkeys(self.rates, rate)
 
     def zero_grad(self) -> None:
         """Drops the gradients."""
@@ -50,7 +68,8 @@ class Adam:
                 beta1=0.9,
                 beta2=0.999,
                 lr=rate,
-                weight_decay=0.0,
-                eps=1e-8,
+                weight_decay=self.decay,
+                decoupled_weight_decay=True,
+                eps=self.eps,
                 maximize=False,
             )

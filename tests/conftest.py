@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import subprocess
 import sys
@@ -42,6 +43,21 @@ def pytest_configure(config: pytest.Config) -> None:
 
         torch.set_num_threads(1)
         numba.set_num_threads(1)
+
+
+def pytest_collection_finish() -> None:
+    """Spares the garbage collector what was loaded until here, which stays to the end.
+
+    And sets it as programs do (`rfgs_core.interrupts`).
+    """
+    gc.set_threshold(10_000)
+    gc.freeze()
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_unconfigure() -> None:
+    """Gives back what was set aside: libraries complain of what is still there at the end."""
+    gc.unfreeze()
 
 
 @pytest.fixture(scope="session")

@@ -123,22 +123,33 @@ def best_voxels(score: Float[np.ndarray, "x y z"], count: int) -> Int64[np.ndarr
     return candidates[order]
 
 
+@numba.njit(cache=True)
+def _within(at, reach, count):
+    """Range of the `count` voxel centres that lie within a reach of a place, all in voxels."""
+    # A hair more, as the distance itself decides.
+    low = int(np.ceil(at - reach - 1e-6))
+    return max(low, 0), min(int(np.floor(at + reach + 1e-6)) + 1, count)
+
+
 @numba.njit(cache=True, parallel=True)
 def _first_rank(rank, origin, voxel, points, radius):
     """Lowest rank among the voxels whose centre is within `radius` of each point."""
-    reach = int(np.ceil(radius / voxel)) + 1
+    reach = radius / voxel
     out = np.full(points.shape[0], np.iinfo(np.int64).max, dtype=np.int64)
     for n in numba.prange(points.shape[0]):
-        base = np.floor((points[n] - origin) / voxel).astype(np.int64)
+        x, y, z = points[n]
         best = np.iinfo(np.int64).max
-        for i in range(max(base[0] - reach, 0), min(base[0] + reach + 1, rank.shape[0])):
-            for j in range(max(base[1] - reach, 0), min(base[1] + reach + 1, rank.shape[1])):
-                for k in range(max(base[2] - reach, 0), min(base[2] + reach + 1, rank.shape[2])):
+        first_i, end_i = _within((x - origin[0]) / voxel - 0.5, reach, rank.shape[0])
+        first_j, end_j = _within((y - origin[1]) / voxel - 0.5, reach, rank.shape[1])
+        first_k, end_k = _within((z - origin[2]) / voxel - 0.5, reach, rank.shape[2])
+        for i in range(first_i, end_i):
+            dx = origin[0] + (i + 0.5) * voxel - x
+            for j in range(first_j, end_j):
+                dy = origin[1] + (j + 0.5) * voxel - y
+                for k in range(first_k, end_k):
                     if rank[i, j, k] >= best:
                         continue
-                    dx = origin[0] + (i + 0.5) * voxel - points[n, 0]
-                    dy = origin[1] + (j + 0.5) * voxel - points[n, 1]
-                    dz = origin[2] + (k + 0.5) * voxel - points[n, 2]
+                    dz = origin[2] + (k + 0.5) * voxel - z
                     if dx * dx + dy * dy + dz * dz <= radius * radius:
                         best = rank[i, j, k]
         out[n] = best

@@ -23,6 +23,7 @@ import torch
 from jaxtyping import Bool, Float, Float64
 from torch import Tensor, nn
 
+from rfgs_core.adam import Adam
 from rfgs_core.encode import MATCHED_FILTER
 from rfgs_core.encode.learned import LearnedEncoder, NetworkKind
 from rfgs_core.encode.learned.blocks import Blocks
@@ -208,7 +209,7 @@ def _descend(
     seed: int,
     on_step: Callable[[float], None] | None,
 ) -> None:
-    optimiser = torch.optim.Adam([*encoder.model.parameters(), *prior.parameters()], lr=_RATE)
+    optimiser = Adam.of([*encoder.model.parameters(), *prior.parameters()], _RATE)
     for step in range(steps):
         rng = np.random.default_rng(sub_seed(seed, "step", step))
         error, features = masked_error(encoder, prior, *examples[step % len(examples)].draw(rng))

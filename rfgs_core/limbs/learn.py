@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import torch
 
+from rfgs_core.adam import Adam
 from rfgs_core.device import Device
 from rfgs_core.encode.body_maps import Ranges
 from rfgs_core.limbs.disturb import disturbed
@@ -93,7 +94,7 @@ def learn(
     generator = torch.Generator(config.device)
     generator.manual_seed(sub_seed(config.seed, radio.name, "draws"))
     network = LimbNetwork(Ranges.of(radio.bandwidth_hz).count, config.size).to(config.device)
-    optimiser = torch.optim.AdamW(network.parameters(), config.rate, weight_decay=0.02)
+    optimiser = Adam.of(network.parameters(), config.rate, decay=0.02)
     kept = Kept(config.kept, radio, config.device)
     progress = Progress(0, 0.0)
     if checkpoint is not None and checkpoint.exists():
@@ -109,8 +110,7 @@ def learn(
         count = len(chunk.joints)
         progress = Progress(progress.frames + count, time.monotonic() - begun)
         share = config.share(progress)
-        for group in optimiser.param_groups:
-            group["lr"] = _rate(config.rate, share)
+        optimiser.set_rate(_rate(config.rate, share))
         owed += config.passes * count / config.batch
         while owed >= 1.0 and kept.seen >= min(_FIRST, config.kept):
             batch = kept.draw(config.batch, generator)
@@ -150,7 +150,7 @@ def _rate(most: float, share: float) -> float:
 
 def _step(
     network: LimbNetwork,
-    optimiser: torch.optim.Optimizer,
+    optimiser: Adam,
     chunk: Chunk,
     generator: torch.Generator,
 ) -> torch.Tensor:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import torch
 from safetensors.torch import save
 
+from rfgs_core.adam import Adam
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.files import write_bytes
 from rfgs_core.limbs.network import LimbNetwork
@@ -29,9 +30,7 @@ class Progress(NamedTuple):
     """Time so far [s]."""
 
 
-def keep(
-    path: Path, network: LimbNetwork, optimiser: torch.optim.Optimizer, progress: Progress
-) -> None:
+def keep(path: Path, network: LimbNetwork, optimiser: Adam, progress: Progress) -> None:
     """Writes the state of a training in one step."""
     state = {f"weight.{name}": value.cpu() for name, value in network.state_dict().items()}
     for name, parameter in network.named_parameters():
@@ -42,7 +41,7 @@ def keep(
     write_bytes(path, sealed(save(state, {"seal": BLANK})))
 
 
-def resume(path: Path, network: LimbNetwork, optimiser: torch.optim.Optimizer) -> Progress:
+def resume(path: Path, network: LimbNetwork, optimiser: Adam) -> Progress:
     """Reads what `keep` wrote into a network and its optimiser.
 
     Raises:

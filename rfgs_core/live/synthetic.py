@@ -15,7 +15,7 @@ import time
 from multiprocessing.connection import Connection
 
 import numpy as np
-from jaxtyping import Complex64, Float64
+from jaxtyping import Complex64, Complex128, Float64
 
 from rfgs_core.capture.feitcsi import HEADER_BYTES
 from rfgs_core.capture.layout_file import CaptureLayout
@@ -76,29 +76,35 @@ def channels(
         row: Which receiver.
         places: Where the person stands [m].
     """
-    index = occupied(FORMAT, WIDTH_MHZ)
-    assert index is not None
-    freq_hz = CENTRE_HZ + index * SPACING_HZ[FORMAT]
     wavelength_m = SPEED_OF_LIGHT / CENTRE_HZ
     sender, receiver = np.array((0.3, 0.3, 1.2)), np.array(_RECEIVERS[row])
     antennas = receiver + np.array([[0, -0.25, 0], [0, 0.25, 0]]) * wavelength_m
     rng = np.random.default_rng(0)
     angle, height = rng.uniform(0, 2 * np.pi, _POINTS), rng.uniform(0.1, 1.7, _POINTS)
     body = np.stack([np.cos(angle), np.sin(angle)], axis=1) * _BODY_RADIUS_M
-    direct_m = np.linalg.norm(antennas - sender, axis=1)
-    values = _waves(direct_m[None, :, None], wavelength_m / (4 * np.pi * direct_m), freq_hz)
-    values = np.repeat(values, len(places), axis=0)
-    for point, z in zip(body, height, strict=True):
-        at = np.concatenate([places + point, np.full((len(places), 1), z)], axis=1)
-        there = np.linalg.norm(at - sender, axis=1)[:, None]
-        back = np.linalg.norm(at[:, None] - antennas, axis=2)
-        level = _ECHO_M * wavelength_m / (4 * np.pi * there * back) / np.sqrt(_POINTS)
-        values += _waves((there + back)[..., None], level, freq_hz)
-    return values.astype(np.complex64)
+    direct_m = np.linalg.norm(antennas - sender, axis=1)[:, None]
+    direct = _waves(direct_m, wavelength_m / (4 * np.pi * direct_m))
+    at_xy = places[:, None] + body
+    at = np.concatenate([at_xy, np.broadcast_to(height[:, None], (*at_xy.shape[:2], 1))], axis=2)
+    there = np.linalg.norm(at - sender, axis=2)[:, None]
+    back = np.linalg.norm(at[:, None] - antennas[:, None], axis=3)
+    level = _ECHO_M * wavelength_m / (4 * np.pi * there * back) / np.sqrt(_POINTS)
+    return (direct + _waves(there + back, level)).astype(np.complex64)
 
 
-def _waves(path_m: np.ndarray, level: np.ndarray, freq_hz: np.ndarray) -> np.ndarray:
-    return level[..., None] * np.exp(-2j * np.pi * freq_hz * path_m / SPEED_OF_LIGHT)
+def _waves(
+    path_m: Float64[np.ndarray, "*any point"], level: Float64[np.ndarray, "*any point"]
+) -> Complex128[np.ndarray, "*any f"]:
+    """Σ level·exp(−j2πf·path/c) over points: sixteen subcarriers on, times up to fifteen more."""
+    index = occupied(FORMAT, WIDTH_MHZ)
+    assert index is not None
+    first, spacing_hz = index[0], SPACING_HZ[FORMAT]
+    coarse_hz = CENTRE_HZ + spacing_hz * np.arange(first, index[-1] + 1, 16)
+    turn = -2j * np.pi * path_m[..., None] / SPEED_OF_LIGHT
+    coarse = level[..., None] * np.exp(turn * coarse_hz)
+    fine = np.exp(turn * (spacing_hz * np.arange(16)))
+    waves = np.swapaxes(coarse, -1, -2) @ fine
+    return waves.reshape(*waves.shape[:-2], -1)[..., index - first]
 
 
 def record(value: Complex64[np.ndarray, "rx subcarrier"], clock_us: int = 0) -> bytearray:

@@ -10,6 +10,7 @@ import numpy as np
 import torch
 from jaxtyping import Float, Float64
 
+from rfgs_core.adam import Adam
 from rfgs_core.bodies.body_prior import Bodies, outward_normals
 from rfgs_core.bodies.localise import pair_maps
 from rfgs_core.bodies.posture import tell_postures
@@ -141,16 +142,17 @@ def descend(
     on_step: Callable[[float], None] | None = None,
 ) -> list[float]:
     """Adam with a rate that falls evenly in its logarithm; the losses of all steps."""
-    optimiser = torch.optim.Adam(field.parameters(), lr=settings.learning_rate, eps=1e-15)
+    rate = settings.learning_rate
+    optimiser = Adam.of(field.parameters(), rate, eps=1e-15)
     fall = LAST_RATE ** (1.0 / max(settings.steps, 1))
-    schedule = torch.optim.lr_scheduler.ExponentialLR(optimiser, fall)
     losses = []
     for step in range(settings.steps):
         loss = task.loss(field, step)  # type: ignore[arg-type]
         optimiser.zero_grad()
         loss.backward()
         optimiser.step()
-        schedule.step()
+        rate *= fall
+        optimiser.set_rate(rate)
         losses.append(float(loss.detach()))
         if on_step is not None:
             on_step(losses[-1])

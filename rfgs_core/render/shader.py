@@ -159,7 +159,7 @@ def _fit(
         for name, shape in _SHAPES.items()
     }
     weights = {name: value.to(rms.device).requires_grad_() for name, value in drawn.items()}
-    optimizer = Adam(dict.fromkeys(weights.values(), config.learning_rate))
+    optimizer = Adam.of(weights.values(), config.learning_rate)
     for _ in range(config.steps):
         chosen = torch.randint(len(views), (config.pictures_per_step,), generator=generator)
         optimizer.zero_grad()

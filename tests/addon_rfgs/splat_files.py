@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from plyfile import PlyData, PlyElement
 
-from addon_rfgs.seals import BLANK, sealed
+from rfgs_core.seals import BLANK, sealed
 
 COLUMNS = [
     *("x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2", "opacity"),

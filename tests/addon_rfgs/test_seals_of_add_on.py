@@ -8,10 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytest.importorskip("bpy")
-
-from addon_rfgs import seals as own
-from addon_rfgs.errors import AddonError
 from rfgs_core import seals
 from rfgs_core.arrays import save_arrays
 from rfgs_core.gaussians import Gaussians
@@ -19,6 +15,10 @@ from rfgs_core.gaussians.ply import cloud_of, write_ply
 
 
 def test_each_reads_what_the_other_wrote(tmp_path: Path) -> None:
+    pytest.importorskip("bpy")
+    from addon_rfgs import seals as own
+    from addon_rfgs.errors import AddonError
+
     said = {"b": [1, 2.5], "a": "ä"}
     own.write_sealed_json(tmp_path / "own.json", said)
     seals.write_sealed_json(tmp_path / "core.json", said)

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import subprocess
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,10 @@ import pytest
 from dataset_factory.scene.bundle import Bundle, read_bundle
 from rfgs_core.skeleton import JOINTS
 
-pytest.importorskip("anny")
-pytestmark = pytest.mark.slow
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(find_spec("anny") is None, reason="needs anny"),
+]
 
 
 @pytest.fixture(scope="module")

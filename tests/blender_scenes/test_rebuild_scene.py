@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import subprocess
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -13,10 +14,9 @@ import pytest
 
 from blender_scenes.catalogue import scenes
 
-pytest.importorskip("anny")
-
 
 @pytest.mark.slow
+@pytest.mark.skipif(find_spec("anny") is None, reason="needs anny")
 @pytest.mark.parametrize("name", sorted(scenes()))
 def test_building_again_gives_the_committed_scene(
     name: str, python: Callable[..., subprocess.CompletedProcess[str]], tmp_path: Path

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import subprocess
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +13,10 @@ import pytest
 
 from rfgs_core.articulated import Body, people
 
-pytest.importorskip("anny")
-pytestmark = pytest.mark.slow
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(find_spec("anny") is None, reason="needs anny"),
+]
 
 
 def test_joints_are_those_of_the_scenes(

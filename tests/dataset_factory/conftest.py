@@ -14,6 +14,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from dataset_factory import cli
@@ -44,6 +45,33 @@ def build(out: Path, moving: str, wall: str, scale: str, kind: str = "PERSON") -
         env={**os.environ, "PYTHONPATH": str(ROOT)},
     )
     return out
+
+
+@pytest.fixture(scope="session", autouse=True)
+def points_spread_once() -> Iterator[None]:
+    """Spreads points over each mesh once for all tests: half of what a tracer takes to be made.
+
+    A mesh that comes for the second time is spread again, and must get the same points.
+    """
+    from rfgs_core.simulate.surface import points
+
+    spread, kept, compared = points.spread, {}, set()
+
+    def once(*arguments: Any) -> tuple[np.ndarray, ...]:
+        *arrays, per_m2, rng = arguments
+        key = (*(array.tobytes() for array in arrays), per_m2, str(rng.bit_generator.state))
+        if key not in compared:
+            found = spread(*arguments)
+            for one, other in zip(found, kept.get(key, found), strict=True):
+                np.testing.assert_array_equal(one, other)
+            if key in kept:
+                compared.add(key)
+            kept[key] = found
+        return tuple(array.copy() for array in kept[key])
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(points, "spread", once)
+        yield
 
 
 @pytest.fixture(scope="session")

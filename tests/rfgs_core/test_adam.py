@@ -10,13 +10,18 @@ import torch
 
 from rfgs_core.adam import Adam
 
+Make = Callable[[dict[torch.Tensor, float]], Any]
 
-def descend(make: Callable[[dict[torch.Tensor, float]], Any]) -> list[torch.Tensor]:
+
+def descend(
+    make: Make, before_step: Callable[[Any, int], None] = lambda optimiser, step: None
+) -> list[torch.Tensor]:
     """Where two tensors go, the second without a gradient in the second step."""
     generator = torch.Generator().manual_seed(1)
     leaves = [torch.randn(4, 3, generator=generator).requires_grad_() for _ in range(2)]
     optimiser = make(dict(zip(leaves, (0.1, 0.003), strict=True)))
-    for moving in (2, 1, 2):
+    for step, moving in enumerate((2, 1, 2)):
+        before_step(optimiser, step)
         loss = torch.stack([(torch.sin(3 * leaf) ** 2).sum() for leaf in leaves[:moving]]).sum()
         optimiser.zero_grad()
         loss.backward()
@@ -32,6 +37,24 @@ def of_torch(rates: dict[torch.Tensor, float]) -> torch.optim.Adam:
 def test_steps_and_moments_are_those_of_torchs_class_to_the_bit() -> None:
     for ours, theirs in zip(descend(Adam), descend(of_torch), strict=True):
         assert torch.equal(ours, theirs)
+
+
+def test_an_eps_and_a_rate_that_falls_are_torchs_too() -> None:
+    def torchs(optimiser: torch.optim.Adam, step: int) -> None:
+        optimiser.param_groups[0]["lr"] = 0.1 / (1 + step)
+
+    ours = descend(
+        lambda rates: Adam.of(rates, 0.1, eps=1e-3),
+        lambda optimiser, step: optimiser.set_rate(0.1 / (1 + step)),
+    )
+    theirs = descend(lambda rates: torch.optim.Adam(list(rates), 0.1, eps=1e-3), torchs)
+    assert all(torch.equal(a, b) for a, b in zip(ours, theirs, strict=True))
+
+
+def test_weights_decay_as_those_of_torchs_adamw() -> None:
+    ours = descend(lambda rates: Adam.of(rates, 0.1, decay=0.02))
+    theirs = descend(lambda rates: torch.optim.AdamW(list(rates), 0.1, weight_decay=0.02))
+    assert all(torch.equal(a, b) for a, b in zip(ours, theirs, strict=True))
 
 
 def test_a_step_leaves_torchs_compiler_unimported(python) -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from rfgs_core.blender_bench import bench_blender
 from rfgs_core.errors import MissingToolError
 
-pytest.importorskip("bpy")
+pytestmark = pytest.mark.skipif(find_spec("bpy") is None, reason="needs bpy")
 
 
 def test_arrays_beat_a_loop_over_points(monkeypatch: pytest.MonkeyPatch) -> None:

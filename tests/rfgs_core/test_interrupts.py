@@ -107,6 +107,15 @@ def test_mistakes_of_ours_keep_their_traceback(tmp_path: Path) -> None:
     assert "Traceback" in answer.stderr and "ZeroDivisionError" in answer.stderr
 
 
+@pytest.mark.parametrize("name", ["drjit", "json"])
+def test_objects_are_left_at_the_end_unless_a_library_would_complain(
+    tmp_path: Path, name: str
+) -> None:
+    show = "atexit.register(lambda: print(gc.get_freeze_count() > 0))"
+    text = f"import gc\ndef main():\n    sys.modules['{name}'] = None\n    {show}\n"
+    assert run(tmp_path, text).stdout.split() == [str(name != "drjit")]
+
+
 @pytest.mark.parametrize("module", ["dataset_factory", "rfgs_core.cli"])
 def test_programs_load_nothing_before_they_can_be_interrupted(module: str) -> None:
     look = (

@@ -129,7 +129,7 @@ def opened(uri: str) -> np.ndarray:
 
 
 def test_pictures_of_a_tile_have_one_camera_and_one_scale_of_colours(surface_run) -> None:
-    evaluate = replace(surface_run, shift_m=np.array([0.15, 0.0, 0.0]))
+    evaluate = replace(surface_run, shift_m=np.array([0.15, 0.0, 0.0]), frames=[1])
     evaluate.path.joinpath("config.json").write_text("{}")
     evaluate_run(evaluate, oracle=False)
     tile = tile_of(evaluate, methods_of(evaluate))

@@ -201,7 +201,7 @@ def test_no_stage_reads_what_a_packet_shares(
     for name in ("delta", "static"):
         one, other = getattr(before, name), getattr(after, name)
         np.testing.assert_allclose(other, one, atol=0.06 * np.abs(one).max())
-    run = train(own_dataset, tmp_path / "run", replace(quick_config, observe=kind))
+    run = train(own_dataset, tmp_path / "run", replace(quick_config, observe=kind), [1])
     centre = run.moving(1).means.mean(dim=0).numpy()
     assert np.linalg.norm(centre[:2] - [1.3, 1.4]) < 0.35
     metrics = evaluate_run(run, oracle=False)

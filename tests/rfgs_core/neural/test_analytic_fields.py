@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import torch
 
+from rfgs_core.adam import Adam
 from rfgs_core.neural.encodings import HashGrid, integrated, positional
 from rfgs_core.neural.fields import NeuralField
 from rfgs_core.neural.settings import FieldKind, FieldSettings
@@ -42,16 +43,15 @@ def relative_error(kind: FieldKind, several_extents: bool = False, steps: int = 
         chosen = torch.randint(2, (count,), generator=generator) * 0.25
         return x, chosen if several_extents else torch.zeros(count)
 
-    optimiser = torch.optim.Adam(field.parameters(), lr=1e-2)
-    schedule = torch.optim.lr_scheduler.ExponentialLR(optimiser, 0.1 ** (1 / steps))
-    for _ in range(steps):
+    optimiser = Adam.of(field.parameters(), 1e-2)
+    for step in range(steps):
         x, extent_m = places(1024)
         found = field(x, extent_m[:, None].expand(-1, 3)).features[:, 0]
         loss = torch.mean((found - blurred(x, extent_m)) ** 2)
         optimiser.zero_grad()
         loss.backward()
         optimiser.step()
-        schedule.step()
+        optimiser.set_rate(1e-2 * 0.1 ** ((step + 1) / steps))
     x, extent_m = places(4096)
     with torch.no_grad():
         found = field(x, extent_m[:, None].expand(-1, 3)).features[:, 0]

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import subprocess
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from dataset_factory.scene.bundle import Bundle, read_bundle
 from rfgs_core.dataset.pictures import read_exr
 from rfgs_core.render.cameras import Camera
 
-pytest.importorskip("bpy")
+pytestmark = pytest.mark.skipif(find_spec("bpy") is None, reason="needs bpy")
 
 FRAMES = (1, 2)
 

@@ -39,7 +39,7 @@ def test_noise_reaches_the_fit_and_lost_packets_do_not(
     settings = Impairments(thermal_noise=True, power_dbm=-40.0, loss_rate=0.4)
     impair_dataset(own_dataset, settings, seed=1)
     config = replace(quick_config, channel="impaired")
-    run = train(own_dataset, tmp_path / "run", config)
+    run = train(own_dataset, tmp_path / "run", config, [1])
     sequence, opened = run.sequence, open_run(run.path)
     assert opened.channel == "impaired"
     frame = sequence.frames[0]

@@ -40,6 +40,7 @@ PAIR_SHARE, AUDIBLE = 0.75, 5.0
 _HIDES_M, _BEHIND_M = 0.3, 0.7
 #: With fewer device pairs an echo off a wall cannot be told from a body.
 FEWEST_PAIRS = 3
+_NOBODY = Bodies.together([])
 #: Nobody is looked for beyond so many.
 MOST = 8
 #: Places where one more is tried: the highest peaks of what remains of the channel …
@@ -116,10 +117,12 @@ def place_bodies(
     return _bodies(found).axes_xy if len(found) == count else None
 
 
-def loudest_gain(observations: Observations, config: TrainConfig, seed: int) -> float:
-    """Evidence of the body that explains most of a frame [nat]; zero where there is none."""
-    found = _added(observations, config, seed, 1, lambda _: True)
-    return found[0].nat if found else 0.0
+def loudest_gain(observations: Observations) -> float:
+    """Evidence of an upright body at the highest peak of a frame [nat]; zero where nobody is."""
+    if not observations.changed or len(observations.pairs[1]) < FEWEST_PAIRS:
+        return 0.0
+    place = locate_bodies(pair_maps(observations), observations.bounds_m, 1)
+    return gain_near(observations, _NOBODY, Bodies.standing(place)).nat
 
 
 def _added(

@@ -73,7 +73,7 @@ class _Looks:
     def loudest(self, row: int, path_m: float) -> float:
         """Evidence of the loudest body of one frame [nat]."""
         seen = self.frames[row].lengthened(-path_m)
-        return self._looked(loudest_gain(seen, self.config, self.seed))
+        return self._looked(loudest_gain(seen))
 
     def everybody(self, path_m: float) -> float:
         """Evidence of everybody in some frames [nat]: whoever is left out would draw the others."""

@@ -200,7 +200,8 @@ def trained(dataset: Dataset, radio: str, config: TrainConfig, place: Path) -> R
     """A run of all frames of a dataset, in a folder of its own."""
     sequence = dataset.sequence()
     place.parent.mkdir(parents=True, exist_ok=True)
-    return train_sequence(dataset, sequence, radio, sequence.frames, config, place)
+    frames = sequence.frames
+    return train_sequence(dataset, sequence, radio, frames, config, place, excess="auto")
 
 
 def beside_baselines(run: Run) -> dict[str, Any]:

@@ -24,6 +24,8 @@ from rfgs_core.threads import one_torch_thread
 
 #: auto: looked for where people can be sensed; a number: so much [m].
 ExcessPath = Literal["auto"] | float
+#: The most that may be told [m].
+MOST_M = 20.0
 #: Frames that are asked where the first one asked says that there is a wall.
 FRAMES = 3
 
@@ -47,9 +49,11 @@ def excess_of_run(
         asked: How to know.
 
     Raises:
-        RfgsError: An excess path is asked for that the settings have no use for.
+        RfgsError: An excess path is out of range, or the settings have no use for it.
     """
     if asked != "auto":
+        if not 0.0 <= asked <= MOST_M:
+            raise RfgsError(f"--excess-path {asked:g}: expected auto, or 0 to {MOST_M:g} m")
         if asked and config.observe != "complex":
             raise RfgsError(
                 f"--excess-path {asked:g}: expected the phases that --observe complex reports, "

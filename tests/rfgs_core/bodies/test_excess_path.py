@@ -105,4 +105,7 @@ def test_without_phases_there_is_no_excess_path(small_run: Run, tmp_path: Path, 
     assert main([*command, "--excess-path", "0.5"]) == 2
     told = capsys.readouterr()
     assert "--excess-path 0.5: expected the phases" in told.out + told.err
-    assert main([*command[:-2], "--excess-path", "-1"]) == 2
+    for wrong in ("-1", "nan", "21"):
+        assert main([*command[:-2], "--excess-path", wrong]) == 2
+        told = capsys.readouterr()
+        assert f"--excess-path {wrong}: expected auto, or 0 to 20 m" in told.out + told.err

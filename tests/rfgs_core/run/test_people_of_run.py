@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
@@ -50,12 +50,23 @@ def test_votes_that_are_not_asked_would_change_nothing() -> None:
 def test_frames_are_asked_until_most_agree(
     tiny_dataset: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    @dataclass(frozen=True)
+    class Seen:
+        frame: int
+        path_m: float = 0.0
+
+        def lengthened(self, path_m: float) -> Seen:
+            return Seen(self.frame, path_m)
+
     sequence, asked = open_dataset(tiny_dataset).sequence(), []
-    monkeypatch.setattr(run_people, "observe", lambda _sequence, _radio, frame, *_: frame)
-    monkeypatch.setattr(run_people, "count_bodies", lambda frame, *_: asked.append(frame) or [None])
+    monkeypatch.setattr(run_people, "observe", lambda _sequence, _radio, frame, *_: Seen(frame))
+    monkeypatch.setattr(run_people, "count_bodies", lambda seen, *_: asked.append(seen) or [None])
     monkeypatch.setattr(run_people, "why_not_sensed", lambda *_: None)
-    heads = head_count(sequence, "wifi", list(range(1, 10)), TrainConfig(), "sensed")
-    assert asked == [5, 1, 9] and heads == HeadCount(1, "sensed", {"5": 1, "1": 1, "9": 1})
+    config = TrainConfig(excess_m=0.9)
+    heads = head_count(sequence, "wifi", list(range(1, 10)), config, "sensed")
+    # People are counted with the wall taken off.
+    assert asked == [Seen(5, -0.9), Seen(1, -0.9), Seen(9, -0.9)]
+    assert heads == HeadCount(1, "sensed", {"5": 1, "1": 1, "9": 1})
 
 
 def test_what_is_kept_is_read(tmp_path: Path) -> None:

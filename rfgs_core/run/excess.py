@@ -9,15 +9,13 @@ from typing import Literal
 
 from tqdm import tqdm
 
-from rfgs_core.background.learned import learned_background
 from rfgs_core.bodies.excess_path import FIRST_LOOK, excess_path_m
 from rfgs_core.dataset import Sequence
 from rfgs_core.errors import RfgsError
 from rfgs_core.frames import spread_frames
-from rfgs_core.measure.observations import observe
 from rfgs_core.run.config import CONFIG_FILE
 from rfgs_core.run.folder import open_run
-from rfgs_core.run.people import AUTO_PAIRS, why_not_sensed
+from rfgs_core.run.people import AUTO_PAIRS, reader, why_not_sensed
 from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import TrainConfig
 from rfgs_core.threads import one_torch_thread
@@ -71,13 +69,7 @@ def _found(sequence: Sequence, radio: str, frames: list[int], config: TrainConfi
     """Looks for an excess path in up to `FRAMES` frames, first in the one in the middle."""
     some = spread_frames(frames, FRAMES)
     some.insert(0, some.pop(len(some) // 2))
-    empty = None
-    if config.background == "learned":
-        empty = learned_background(sequence, radio, config.channel, config.observe, config.packets)
-    seen = [
-        observe(sequence, radio, frame, config.channel, config.observe, empty, config.packets)
-        for frame in some
-    ]
+    seen = list(map(reader(sequence, radio, config), some))
     seed = sub_seed(config.seed, sequence.name, radio, "excess path")
     with (
         tqdm(total=FIRST_LOOK, desc="looking for a wall", unit="look", delay=1.0) as bar,

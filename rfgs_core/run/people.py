@@ -19,7 +19,7 @@ from rfgs_core.bodies.count import FEWEST_PAIRS, count_bodies
 from rfgs_core.dataset import Sequence
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.frames import spread_frames
-from rfgs_core.measure.observations import observe
+from rfgs_core.measure.observations import Observations, observe
 from rfgs_core.records import record
 from rfgs_core.run.config import CONFIG_FILE
 from rfgs_core.run.costs import count_price, count_stage, speed_noted
@@ -214,21 +214,30 @@ def head_count(
         raise RfgsError(f"--people sensed: {why_not}; expected --people told, or their number")
     if asked == "told" or why_not:
         return HeadCount(told(sequence), "told")
-    empty = None
-    if config.background == "learned":
-        empty = learned_background(sequence, radio, config.channel, config.observe, config.packets)
-    votes = {}
+    seen, votes = reader(sequence, radio, config), {}
     on_frame(0)
     for frame in _middle_and_ends_first(spread_frames(frames, votes_of(frames))):
-        seen = observe(
-            sequence, radio, frame, config.channel, config.observe, empty, config.packets
-        ).lengthened(-config.excess_m)
         seed = sub_seed(config.seed, sequence.name, radio, frame, "people")
-        votes[str(frame)] = len(count_bodies(seen, config, seed))
+        votes[str(frame)] = len(count_bodies(seen(frame), config, seed))
         on_frame(len(votes))
         if decided(list(votes.values()), votes_of(frames)):
             break
     return HeadCount(voted(list(votes.values())), "sensed", votes)
+
+
+def reader(sequence: Sequence, radio: str, config: TrainConfig) -> Callable[[int], Observations]:
+    """Reads frames as a training would, before there is a run: a background is learned once."""
+    empty = None
+    if config.background == "learned":
+        empty = learned_background(sequence, radio, config.channel, config.observe, config.packets)
+
+    def read(frame: int) -> Observations:
+        seen = observe(
+            sequence, radio, frame, config.channel, config.observe, empty, config.packets
+        )
+        return seen.lengthened(-config.excess_m)
+
+    return read
 
 
 def votes_of(frames: list[int]) -> int:

@@ -79,8 +79,10 @@ def _take_light(
 
 
 @numba.njit(inline="always", **_OPTIONS)
-def _is_dark(light: np.ndarray) -> bool:
-    """Whether no pixel of a tile passes `LIGHT_MIN` any more."""
+def _is_finished(drawn: int, light: np.ndarray) -> bool:
+    """Whether no pixel of a tile passes `LIGHT_MIN` any more, looked at every few splats."""
+    if drawn % _LOOK_EVERY != _LOOK_EVERY - 1:
+        return False
     most = light[0]
     for pixel in range(TILE_PX * TILE_PX):
         most = max(most, light[pixel])
@@ -114,7 +116,7 @@ def blend(
         share = np.zeros(TILE_PX * TILE_PX, values.dtype)
         sums = np.zeros((channels, TILE_PX * TILE_PX), values.dtype)
         for entry in range(starts[tile], starts[tile + 1]):
-            if (entry - starts[tile]) % _LOOK_EVERY == _LOOK_EVERY - 1 and _is_dark(light):
+            if _is_finished(entry - starts[tile], light):
                 break
             splat = splats[entries[entry]]
             rows = _rows_reached(splat, top)
@@ -154,7 +156,7 @@ def value_shares(
         light = np.ones(TILE_PX * TILE_PX, towards.dtype)
         share = np.zeros(TILE_PX * TILE_PX, towards.dtype)
         for entry in range(starts[tile], starts[tile + 1]):
-            if (entry - starts[tile]) % _LOOK_EVERY == _LOOK_EVERY - 1 and _is_dark(light):
+            if _is_finished(entry - starts[tile], light):
                 break
             splat = splats[entries[entry]]
             rows = _rows_reached(splat, top)
@@ -232,7 +234,7 @@ def shape_shares(
         worth, pulls = np.zeros(TILE_PX * TILE_PX), np.zeros(TILE_PX * TILE_PX)
         share, end = np.zeros(TILE_PX * TILE_PX, towards.dtype), starts[tile + 1]
         for entry in range(starts[tile], starts[tile + 1]):
-            if (entry - starts[tile]) % _LOOK_EVERY == _LOOK_EVERY - 1 and _is_dark(light):
+            if _is_finished(entry - starts[tile], light):
                 end = entry
                 break
             splat = splats[entries[entry]]

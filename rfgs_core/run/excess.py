@@ -72,7 +72,7 @@ def _found(sequence: Sequence, radio: str, frames: list[int], config: TrainConfi
     seen = list(map(reader(sequence, radio, config), some))
     seed = sub_seed(config.seed, sequence.name, radio, "excess path")
     with (
-        tqdm(total=FIRST_LOOK, desc="looking for a wall", unit="look", delay=1.0) as bar,
+        tqdm(total=FIRST_LOOK, desc="looking for a wall", unit="look", delay=2.0) as bar,
         one_torch_thread(),
     ):
 

@@ -20,6 +20,9 @@ from rfgs_core.bodies.tracks import Tracks
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.fit.frame import OnSkins, followed
 from rfgs_core.limbs.evidence.tell import long_enough, looks, stands, tell
+from rfgs_core.limbs.postures.tell import can_tell
+from rfgs_core.limbs.postures.tell import looks as posture_looks
+from rfgs_core.limbs.postures.tell import tell as tell_posture
 from rfgs_core.limbs.propose import SMOOTH_S, Joints, combined, propose, smoothed
 from rfgs_core.limbs.skins import PosedPeople
 from rfgs_core.limbs.weights import Trained, own_network
@@ -102,18 +105,21 @@ def find_limbs(
     config: TrainConfig,
     trained: Trained | None,
     on_frame: Callable[[], Any] = lambda: None,
+    seeking: Callable[[int], Callable[[], Any]] = lambda _: lambda: None,
 ) -> Limbs | None:
     """Follows people through a run's frames and poses them; what is kept is read.
 
-    Evidence tells those of people who walk, the network those of everybody: both together count
-    where both tell. Where neither does for some, these stand. Frames of the sequence beside those
-    of the run, near enough to smooth them, are read as well.
+    Evidence tells those of people who walk, or else whatever they do; the network tells those of
+    everybody: both together count where both tell. Where neither does for some, these stand.
+    Frames of the sequence beside those of the run, near enough to smooth them, are read as well.
 
     Args:
         run: The run.
         config: Its settings.
         trained: The network for its radio; None where there is none.
         on_frame: Called as frames are read and looked at; see `looks_at`.
+        seeking: Told how many looks it takes to seek other postures than walks, if it is done;
+            what it gives is called at each.
 
     Returns:
         None where nothing can be told, or nothing that would be of use.
@@ -145,6 +151,7 @@ def find_limbs(
     told: list[Joints | None] = [None] * len(alone[0])
     if walks:
         told = _by_evidence(alone, tracks, config.seed, on_frame)
+        told = _by_postures(told, alone, tracks, config.seed, seeking)
     if trained is not None:
         said = _by_network(trained, alone, tracks)
         told = [
@@ -203,6 +210,26 @@ def _by_evidence(
     for body in range(axes_xy.shape[1]):
         told = tell([frame[body] for frame in alone], axes_xy[:, body], seed, on_frame)
         found.append(None if told is None else told.joints)
+    return found
+
+
+def _by_postures(
+    told: list[Joints | None],
+    alone: list[list[Observations]],
+    tracks: list[Tracks],
+    seed: int,
+    seeking: Callable[[int], Callable[[], Any]],
+) -> list[Joints | None]:
+    """Joints of each person in all frames, as `told` where a walk is; None of whom nothing is."""
+    rest = [body for body, joints in enumerate(told) if joints is None]
+    if not rest or not can_tell(alone[0][0]):
+        return told
+    on_frame = seeking(len(rest) * posture_looks(len(alone)))
+    axes_xy = np.array([track.axes_xy for track in tracks])
+    found = list(told)
+    for body in rest:
+        one = tell_posture([frame[body] for frame in alone], axes_xy[:, body], seed, on_frame)
+        found[body] = None if one is None else one.joints
     return found
 
 

@@ -5,8 +5,11 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from tqdm import tqdm
 
@@ -224,8 +227,13 @@ def _evidence(run: Run, config: TrainConfig) -> bool:
 def _limbs(run: Run, config: TrainConfig, trained: Trained | None, looks: int) -> Limbs | None:
     """Follows and poses the people of all frames, where a network or evidence tells limbs."""
     begin = time.perf_counter()
-    with tqdm(total=looks, desc="posing people") as bar, one_torch_thread():
-        limbs = find_limbs(run, config, trained, bar.update)
+    with ExitStack() as bars, one_torch_thread():
+        bar = bars.enter_context(tqdm(total=looks, desc="posing people"))
+
+        def seeking(count: int) -> Callable[[], Any]:
+            return bars.enter_context(tqdm(total=count, desc="seeking postures")).update
+
+        limbs = find_limbs(run, config, trained, bar.update, seeking)
         if bar.n >= looks:
             each_s = (time.perf_counter() - begin) / looks
             note_speed(pose_stage(run, looks), Speed(0.0, each_s))

@@ -15,7 +15,7 @@ from rfgs_core.limbs.evidence.kernel import Facets, covariance
 from rfgs_core.worlds.figure import Figure, seen_from
 
 #: Facets lie as close as a tracer would set them for this wavelength [m]: phases are random.
-_WAVELENGTH_M = 0.1
+WAVELENGTH_M = 0.1
 #: Width of the lobe around a facet's normal [rad], wider than without walls.
 LOBE_RAD = 0.25
 #: Of a body in a wall's mirror every so manieth facet is enough.
@@ -32,9 +32,9 @@ class Posed(NamedTuple):
     """Facets that the transmitting and the receiving end of each pair see, by its devices."""
 
 
-def figure_of(body: Body) -> Figure:
-    """Facets on a body for its evidence."""
-    return Figure.of(body, _WAVELENGTH_M)
+def figure_of(body: Body, wavelength_m: float = WAVELENGTH_M) -> Figure:
+    """Facets on a body for its evidence, as close as for some wavelength [m]."""
+    return Figure.of(body, wavelength_m)
 
 
 def posed(figure: Figure, pose: Pose, pairs: list[Pair]) -> Posed:

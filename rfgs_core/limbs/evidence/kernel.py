@@ -81,7 +81,9 @@ def covariance(
     return _routines()[0](1.0, rows.T)
 
 
-def log_evidence(change: Complex128[np.ndarray, "entry"], covariance: np.ndarray) -> float:
+def log_evidence(
+    change: Complex128[np.ndarray, "entry"], covariance: np.ndarray, least_noise: float = 0.0
+) -> float:
     """Log evidence of entries at the best level and share of noise [nat].
 
     Zero where nothing was heard or nothing is seen, which speaks for no pose.
@@ -89,6 +91,7 @@ def log_evidence(change: Complex128[np.ndarray, "entry"], covariance: np.ndarray
     Args:
         change: Entries.
         covariance: Their covariance without level and noise, at least its upper triangle.
+        least_noise: Smaller shares of noise are not tried.
     """
     level = float(np.diagonal(covariance).real.mean())
     if not (level > 0.0 and change.any()):
@@ -102,7 +105,8 @@ def log_evidence(change: Complex128[np.ndarray, "entry"], covariance: np.ndarray
         return known[step]
 
     # Evidence over the share of noise has one hill, which is climbed from the middle.
-    place, steps = len(NOISE_SHARES) // 2, range(len(NOISE_SHARES))
+    first = int(np.searchsorted(NOISE_SHARES, 0.999 * least_noise))
+    place, steps = len(NOISE_SHARES) // 2, range(first, len(NOISE_SHARES))
     while True:
         best = max((s for s in (place, place - 1, place + 1) if s in steps), key=at)
         if best == place:

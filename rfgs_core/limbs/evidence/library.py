@@ -53,13 +53,13 @@ class Stride(NamedTuple):
                 if angle_rad is not None:
                     local[row] = about(Y, angle_rad) @ local[row]
             low = grounded(body, Pose.from_local(body.heads[0], local))
-            poses.append(_over_origin(body, low))
+            poses.append(over_origin(body, low))
         return Stride(poses, self.lasts_s)
 
 
 def upright(body: Body) -> Pose:
     """Who stands with hanging arms above the origin and looks along x."""
-    return _over_origin(body, grounded(body, Pose(body.heads[0], body.neutral)))
+    return over_origin(body, grounded(body, Pose(body.heads[0], body.neutral)))
 
 
 def strides(body: Body, speed_m_s: float, count: int, seed: int) -> list[Stride]:
@@ -105,7 +105,7 @@ def _straight(motion: Motion, body: Body, speed_m_s: float) -> Stride | None:
         # One heading for the whole stride: how the trunk twists belongs to it.
         back = -float(heading[start:end].mean())
         turn = about_z(back)
-        return Stride([_over_origin(body, motion.at(t).turned(turn)) for t in moments], lasts_s)
+        return Stride([over_origin(body, motion.at(t).turned(turn)) for t in moments], lasts_s)
     return None
 
 
@@ -116,7 +116,7 @@ def _peaks(reach: Float64[np.ndarray, "moment"]) -> list[int]:
     return (np.flatnonzero(inner) + 1).tolist()
 
 
-def _over_origin(body: Body, pose: Pose) -> Pose:
+def over_origin(body: Body, pose: Pose) -> Pose:
     """The pose with the pelvis above the origin, as high as before."""
     return pose.moved(-body.joints17(pose)[0] * [1.0, 1.0, 0.0])
 

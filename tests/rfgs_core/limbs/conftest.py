@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from rfgs_core.articulated import Pose, people
+from rfgs_core.articulated import Body, Pose, people
 from rfgs_core.limbs.evidence.library import Stride, about_z, strides
 from rfgs_core.measure.observations import Observations
 from rfgs_core.radio import layout
@@ -62,6 +62,12 @@ def _heard(pose: Pose) -> Observations:
 def stride() -> Stride:
     """How the walker goes, on the spot."""
     return _walker()[1]
+
+
+@pytest.fixture(scope="session")
+def walker_body() -> Body:
+    """The walker at rest."""
+    return _walker()[0].body
 
 
 @pytest.fixture(scope="session")

@@ -21,6 +21,7 @@ from rfgs_core.files import read_json
 from rfgs_core.limbs import weights
 from rfgs_core.limbs.evidence.tell import Told
 from rfgs_core.limbs.network import LimbNetwork
+from rfgs_core.limbs.postures.tell import Told as Posture
 from rfgs_core.limbs.propose import Joints
 from rfgs_core.limbs.weights import save_network
 from rfgs_core.radio.presets import preset
@@ -125,6 +126,7 @@ def test_without_a_network_evidence_tells_who_walks(
     monkeypatch.setattr(weights, "OWN", tmp_path / "none")
     monkeypatch.setattr(limbs_of_run, "long_enough", lambda time_s: True)
     monkeypatch.setattr(limbs_of_run, "tell", tell)
+    monkeypatch.setattr(limbs_of_run, "tell_posture", lambda *_: None)
     limbs = read_limbs(train(tiny_dataset, tmp_path / "run", CONFIG).path)
     assert asked and asked[0] >= 2
     assert (limbs is not None) == told
@@ -136,6 +138,37 @@ def test_without_a_network_evidence_tells_who_walks(
         pelvis = limbs.people.joints17()[:, 0, 0, :2]
         found = np.array([track.axes_xy[0] for track in limbs.tracks])
         assert np.abs(pelvis - found).max() < 0.1
+
+
+@pytest.mark.parametrize("told", [True, False])
+def test_who_does_not_walk_may_do_something_else(
+    told: bool, train, tiny_dataset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    body, asked = people().body(np.zeros(0)), 0
+    upright = body.joints17(Pose(body.heads[0], body.neutral))
+
+    def tell_posture(
+        seen: list, axes_xy: np.ndarray, seed: int, on_frame: Callable
+    ) -> Posture | None:
+        nonlocal asked
+        asked += 1
+        xyz = upright + np.column_stack([axes_xy, np.full(len(axes_xy), -0.4)])[:, None, None]
+        return Posture(Joints(xyz, np.full((len(seen), 1, 17), 0.07)), 90.0) if told else None
+
+    monkeypatch.setattr(weights, "OWN", tmp_path / "none")
+    monkeypatch.setattr(limbs_of_run, "long_enough", lambda time_s: True)
+    monkeypatch.setattr(limbs_of_run, "tell", lambda *_: None)
+    monkeypatch.setattr(limbs_of_run, "can_tell", lambda _: True)
+    monkeypatch.setattr(limbs_of_run, "tell_posture", tell_posture)
+    limbs = read_limbs(train(tiny_dataset, tmp_path / "run", CONFIG).path)
+    assert asked == 1 and (limbs is not None) == told
+    if limbs is not None:
+        pelvis = limbs.people.joints17()[:, 0, 0, 2]
+        np.testing.assert_allclose(pelvis, upright[0, 2] - 0.4, atol=0.05)
+    # Where too few devices hear each other nobody is asked.
+    monkeypatch.setattr(limbs_of_run, "can_tell", lambda _: False)
+    assert read_limbs(train(tiny_dataset, tmp_path / "few", CONFIG).path) is None
+    assert asked == 1
 
 
 def test_evidence_and_a_network_count_together(
@@ -177,6 +210,7 @@ def test_of_two_people_one_walks_and_the_other_stands(
     monkeypatch.setattr(weights, "OWN", tmp_path / "none")
     monkeypatch.setattr(limbs_of_run, "long_enough", lambda time_s: True)
     monkeypatch.setattr(limbs_of_run, "tell", tell)
+    monkeypatch.setattr(limbs_of_run, "tell_posture", lambda *_: None)
     data, out = open_dataset(tiny_dataset), tmp_path / "run"
     train_sequence(data, data.sequence(), "wifi", [1, 2], CONFIG, out, people=2)
     limbs = read_limbs(out)

@@ -37,9 +37,8 @@ from rfgs_core.encode.peaks import separated_peaks
 
 #: Nearer than this no wave is followed [m].
 NEAREST_M = 0.05
-#: Of the best places, so many times those that are needed are looked at more closely: at this many
-#: others around, so many wavelengths away.
-_TRIED, _AROUND, _SHELLS = 16, 64, (1.2, 0.5, 0.25)
+#: Looked at around the best places: so many others, so many wavelengths away.
+_AROUND, _SHELLS = 64, (1.2, 0.5, 0.25)
 #: Places that are looked at together.
 _AT_ONCE = 2048
 
@@ -76,6 +75,8 @@ class SumSettings:
     """Adam steps after each round."""
     places: int = 20_000
     """Places that are looked at in each round."""
+    tried: int = 64
+    """The best of them, which are looked at more closely."""
     apart_m: float = 0.4
     """Least distance of Gaussians that are added together [m]."""
     rate: float = 0.08
@@ -251,9 +252,11 @@ def _places(
     if len(found.means):
         left = csi - found.solved(links, csi, settings).at(links)
     points = draw(settings.places, rng)
-    many = _TRIED * settings.per_round
-    best = separated_peaks(points, _explained(points, links, left), many, settings.apart_m / 2.0)
-    tried, gain = points[best], np.zeros(len(best))
+    gain, apart_m = _explained(points, links, left), settings.apart_m / 2.0
+    best = separated_peaks(points, gain, settings.tried, apart_m)
+    if not best:
+        return points[:0]
+    tried, gain = points[best], gain[best]
     wavelength_m = 2.0 * np.pi / float(links.wavenumber.mean())
     for shell in _SHELLS:
         near = rng.normal(size=(len(tried), _AROUND, 3)) * shell * wavelength_m

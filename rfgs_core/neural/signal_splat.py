@@ -28,12 +28,11 @@ import torch
 from jaxtyping import Complex64, Float, Float32, Float64
 from torch import Tensor, nn
 
+from rfgs_core.neural.direct_sum import NEAREST_M
 from rfgs_core.neural.encodings import positional
 from rfgs_core.neural.fields import perceptron
 
-#: Nearer than this no wave is followed [m].
-NEAREST_M = 0.05
-#: What of a direction the network reads beside its distance: sines of so many octaves.
+#: Octaves of sines that the network reads of a place, and what it tells of one to itself.
 _OCTAVES, _FEATURES = 4, 32
 #: A Gaussian hides at most this share of what is behind it.
 _MOST_HIDDEN = 0.99
@@ -46,7 +45,7 @@ class SplatSettings:
     gaussians: int = 300
     """Gaussians of each receiving array."""
     pixel_deg: float = 6.0
-    """Step of azimuth and elevation [degrees]."""
+    """Step of azimuth and elevation, a part of 180 [degrees]."""
     reach_deg: float = 24.0
     """Pixels farther from all first directions of Gaussians are left out [degrees]."""
     width: int = 64

@@ -86,6 +86,15 @@ class FieldRun(Run):
     shared_head: RadioHead | None = None
     """Decodes reflectivities; the first frame's, as of Gaussians."""
 
+    @staticmethod
+    def over(
+        dataset: Dataset, radio: str, frames: list[int], config: TrainConfig, out: Path
+    ) -> FieldRun:
+        """A run of some frames that says nothing yet."""
+        name, place = dataset.sequence().name, relative_dataset(out, dataset.path)
+        told = RunConfig(place, dataset.fingerprint, name, radio, frames, config)
+        return FieldRun(out, told)
+
     def moving(self, frame: int) -> Gaussians:
         """Gaussians of a frame."""
         return self.readouts[frame].gaussians
@@ -102,7 +111,8 @@ class FieldRun(Run):
 
     def bodies(self, frame: int) -> Bodies | None:
         """Where bodies are taken to be."""
-        return self.readouts[frame].bodies
+        found = self.readouts.get(frame)
+        return None if found is None else found.bodies
 
     @property
     def head(self) -> RadioHead:
@@ -135,13 +145,7 @@ def fit_fields(
         RfgsError: Nobody changes the channel of a frame.
     """
     sequence = dataset.sequence()
-    run = FieldRun(
-        out,
-        RunConfig(
-            relative_dataset(out, dataset.path), dataset.fingerprint, sequence.name, radio, frames,
-            config,
-        ),
-    )  # fmt: skip
+    run = FieldRun.over(dataset, radio, frames, config, out)
     grid, voxels = Grid.over(sequence.bounds_m), voxel_budget(sequence.instances)
     spent, head = 0.0, None
     for frame in frames:

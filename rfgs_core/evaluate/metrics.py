@@ -16,6 +16,7 @@ from tqdm import tqdm
 
 from rfgs_core.evaluate.background import Backgrounds, background_metrics
 from rfgs_core.evaluate.baselines import BASELINES, Baseline, BaselineResult, phase_free
+from rfgs_core.evaluate.evidence import Evidence
 from rfgs_core.evaluate.geometry import GEOMETRY_KEYS, geometry_metrics
 from rfgs_core.evaluate.image import IMAGE_KEYS
 from rfgs_core.evaluate.oracle import oracle_scores
@@ -107,6 +108,28 @@ def evaluate_method(run: EvaluatedRun) -> dict[str, dict[str, Values]]:
     scene, table = Scene.of(run), _Table()
     for frame in run.frames:
         _evaluate_frame(scene, frame, table, None, lambda: None, {})
+    groups = table.groups({})
+    return {name: groups[name] for name in (METHOD, GAUSSIANS_ALONE)}
+
+
+def evaluate_answers(
+    run: EvaluatedRun, answers: Callable[[int, Evidence], Mapping[str, BaselineResult]]
+) -> dict[str, dict[str, Values]]:
+    """Geometry and channels of what is answered to each frame's evidence.
+
+    Args:
+        run: Names data, radio and frames, and has no bodies or Gaussians.
+        answers: Results of a frame for `METHOD` and, without its residual, `GAUSSIANS_ALONE`.
+
+    Returns:
+        The groups of both.
+    """
+    scene, table = Scene.of(run), _Table()
+    nothing = np.zeros(scene.grid.shape, dtype=np.float32)
+    for frame in run.frames:
+        reference, csi = scene.reference(frame), scene.csi(frame)
+        for name, result in answers(frame, scene.evidence(frame, nothing)).items():
+            _add(scene, table, name, frame, result, reference, csi)
     groups = table.groups({})
     return {name: groups[name] for name in (METHOD, GAUSSIANS_ALONE)}
 

@@ -55,7 +55,7 @@ class NeuralField(nn.Module):
             finest = max(round(2.0 * self.half_m / settings.finest_m), COARSEST)
             self.table = HashGrid(LEVELS, COARSEST, finest, TABLE_SIZE, TABLE_WIDTH, generator)
             layers, size = layers - 1, self.table.out_features
-        self.network = _perceptron(size, settings.width, layers, 1 + FEATURE_DIM, generator)
+        self.network = perceptron(size, settings.width, layers, 1 + FEATURE_DIM, generator)
 
     @property
     def _octaves(self) -> int:
@@ -96,7 +96,7 @@ class NeuralField(nn.Module):
         return torch.cat(density).numpy(), torch.cat(features).numpy()
 
 
-def _perceptron(
+def perceptron(
     size: int, width: int, layers: int, out: int, generator: torch.Generator
 ) -> nn.Sequential:
     """Hidden layers with ReLU, He-initialised from the generator, and a linear last one."""

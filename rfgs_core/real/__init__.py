@@ -11,6 +11,7 @@ from rfgs_core.errors import RfgsError
 #: Part → its file, or folder of NeRF2's layout, below the data folder.
 PARTS = {
     "bedroom": "newrf/dataset_bedroom.mat",
+    "bedroom_fields": "newrf/dataset_bedroom.mat",
     "aperture": "sar/data_3dsar_pass1_az001_HH.mat",
     "ranging": "uwb/6.log",
     "breathing": "acconeer/acconeer_a121_presence-medium_range_no_timeout.h5",
@@ -35,6 +36,7 @@ def bench_real(data: Path, say: Callable[[str], None]) -> dict[str, float | str]
     """
     from rfgs_core.real.aperture import judge_aperture
     from rfgs_core.real.bedroom import judge_bedroom
+    from rfgs_core.real.bedroom_fields import judge_bedroom_fields
     from rfgs_core.real.radar import judge_breathing, judge_reflector
     from rfgs_core.real.ranging import judge_ranging
     from rfgs_core.real.spectra import judge_spectra
@@ -42,6 +44,7 @@ def bench_real(data: Path, say: Callable[[str], None]) -> dict[str, float | str]
 
     judges: dict[str, Callable[[Path], dict[str, float | str]]] = {
         "bedroom": judge_bedroom,
+        "bedroom_fields": judge_bedroom_fields,
         "aperture": judge_aperture,
         "ranging": judge_ranging,
         "breathing": judge_breathing,

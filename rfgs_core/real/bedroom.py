@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Bool, Complex, Float, Int64
+from jaxtyping import Bool, Complex, Complex128, Float, Int64
 
 from rfgs_core.capture import read_capture
 from rfgs_core.errors import RfgsFormatError
@@ -39,6 +39,34 @@ _LENGTHS_M, _NOISES = (0.25, 0.4, 0.6, 0.9), (0.01, 0.03, 0.1)
 _REFLECTED, _DIRECT = 0.6, 100.0
 
 _Surface = tuple[int, float]
+
+
+@dataclass(frozen=True)
+class Bedroom:
+    """What such a table holds."""
+
+    tx: Float[np.ndarray, "3"]
+    """The transmitter [m]."""
+    rx: Float[np.ndarray, "receiver 3"]
+    """Receivers [m]."""
+    wavenumber: float
+    """2πf/c [rad/m]."""
+    csi: Complex128[np.ndarray, "receiver"]
+    """Channel of each receiver."""
+
+    @staticmethod
+    def read(path: Path) -> Bedroom:
+        """The largest table of a file.
+
+        Raises:
+            RfgsFormatError: It has no places or no frequency.
+        """
+        capture = read_capture(path).largest
+        if capture.tx_xyz is None or capture.rx_xyz is None or capture.centre_hz is None:
+            raise RfgsFormatError(f"{path}: expected a table of receivers with places")
+        wavenumber = 2 * np.pi * capture.centre_hz / SPEED_OF_LIGHT
+        csi = capture.values.ravel().astype(np.complex128)
+        return Bedroom(capture.tx_xyz[0], capture.rx_xyz, wavenumber, csi)
 
 
 @dataclass(frozen=True)
@@ -74,13 +102,9 @@ def judge_bedroom(path: Path) -> dict[str, float | str]:
         `walls_snr_db`: line of sight and six wall images with fitted gains, walls known;
         `line_of_sight_snr_db`; `ours_snr_db`; and how ours is worst.
     """
-    capture = read_capture(path).largest
-    if capture.tx_xyz is None or capture.rx_xyz is None or capture.centre_hz is None:
-        raise RfgsFormatError(f"{path}: expected a table of receivers with places")
-    wavenumber = 2 * np.pi * capture.centre_hz / SPEED_OF_LIGHT
-    room = _Room(capture.tx_xyz[0], capture.rx_xyz, wavenumber)
-    csi = capture.values.ravel().astype(np.complex128)
-    fold = folds(capture.rx_xyz)
+    read = Bedroom.read(path)
+    room, csi = _Room(read.tx, read.rx, read.wavenumber), read.csi
+    fold = folds(room.rx)
     answers = {"line_of_sight": 0 * csi, "walls": 0 * csi, "ours": 0 * csi}
     for number in range(CELLS):
         train = fold != number

@@ -12,7 +12,7 @@ import numpy as np
 from rfgs_core.evaluate.residual import GAUSSIANS_ALONE
 from rfgs_core.evaluate.verdicts import leak
 from rfgs_core.study.ablation import VARIANTS
-from rfgs_core.study.paper_tables import ABLATED, FIELDS, TRAINED
+from rfgs_core.study.paper_tables import ABLATED, CHANNEL_FIELDS, FIELDS, TRAINED
 from rfgs_core.study.table import number
 
 #: Columns: group and key of the metrics, header, format.
@@ -58,6 +58,8 @@ _LABELS = {
     "nerf": "RF-NeRF",
     "mip": "RF-MipNeRF",
     "ngp": "RF-InstantNGP",
+    "ngrf": "direct sum, as nGRF",
+    "wrfgs": "splatted signals, as WRF-GS",
 }
 
 
@@ -166,7 +168,7 @@ def leaks(rows: Sequence[MethodRow]) -> list[str]:
 def _order(row: MethodRow) -> int:
     """Ours, neural fields, then what needs no training."""
     name = row.method.partition(", ")[0]
-    known = (*TRAINED, *ABLATED, *FIELDS)
+    known = (*TRAINED, *ABLATED, *FIELDS, *CHANNEL_FIELDS)
     return known.index(name) if name in known else len(known)
 
 

@@ -13,7 +13,8 @@ from msgspec import Struct
 from rfgs_core.dataset import Dataset, open_dataset
 from rfgs_core.device import Device
 from rfgs_core.errors import RfgsError, RfgsFormatError
-from rfgs_core.evaluate.field_run import Given, fit_fields
+from rfgs_core.evaluate.channel_fields import evaluate_channel_field
+from rfgs_core.evaluate.field_run import FieldRun, Given, fit_fields
 from rfgs_core.evaluate.metrics import METHOD, evaluate_method, evaluate_run
 from rfgs_core.evaluate.provenance import hardware, now, versions
 from rfgs_core.evaluate.residual import GAUSSIANS_ALONE
@@ -30,7 +31,7 @@ from rfgs_core.seals import read_sealed_json, write_sealed_json
 from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import TrainConfig
 from rfgs_core.study.cases import EVERY_SCENE
-from rfgs_core.study.paper_tables import ABLATED, FIELDS, TRAINED, Cell, Size
+from rfgs_core.study.paper_tables import ABLATED, CHANNEL_FIELDS, FIELDS, TRAINED, Cell, Size
 from rfgs_core.threads import one_torch_thread
 
 
@@ -91,6 +92,8 @@ def settings_of(cell: Cell, size: Size) -> dict[str, Any]:
     own["frames"] = size.frames or EVERY_SCENE[cell.scene].frames
     if cell.method in FIELDS:
         own["field"] = asdict(field_settings(cell, size))
+    elif cell.method in CHANNEL_FIELDS:
+        own["field"] = asdict(CHANNEL_FIELDS[cell.method])
     return own
 
 
@@ -134,7 +137,8 @@ class CellPart:
     @property
     def made(self) -> tuple[Path, ...]:
         """Its run, if it has one, and its file."""
-        run = () if self.cell.method in FIELDS else (Path("runs") / self.cell.name,)
+        fitted = self.cell.method in (*FIELDS, *CHANNEL_FIELDS)
+        run = () if fitted else (Path("runs") / self.cell.name,)
         return (*run, Path("cells") / f"{self.cell.name}.json")
 
     def make(self, out: Path) -> None:
@@ -157,7 +161,9 @@ def make(cell: Cell, out: Path, size: Size, device: Device = "cpu") -> dict[str,
             f"{dataset.path}: expected frames {wanted}, found {held}; delete it or choose "
             "another --out"
         )
-    maker = _field if cell.method in FIELDS else _trained
+    maker = _trained
+    if cell.method in (*FIELDS, *CHANNEL_FIELDS):
+        maker = _field if cell.method in FIELDS else _channel_field
     config = replace(train_config(cell, size), device=device)
     # Otherwise a field's sums, and so its figures, would follow from how many cores there are.
     with one_torch_thread():
@@ -180,7 +186,7 @@ def make(cell: Cell, out: Path, size: Size, device: Device = "cpu") -> dict[str,
 
 def _rendering(run: EvaluatedRun) -> dict[str, Any]:
     """How many moving Gaussians the first frame has, and how fast it is drawn."""
-    if not isinstance(run, Run):
+    if not isinstance(run, Run) or (isinstance(run, FieldRun) and not run.readouts):
         return {}
     gaussians = run.moving(run.frames[0])
     return {"gaussians": len(gaussians), "render_fps": frames_per_second(gaussians)}
@@ -229,6 +235,15 @@ def _field(
         lambda frame, _: _given(dataset.path, cell.radio, frame, shared), out,
     )  # fmt: skip
     return run, _named(cell.method, evaluate_method(run))
+
+
+def _channel_field(
+    cell: Cell, dataset: Dataset, out: Path, config: TrainConfig, size: Size
+) -> tuple[EvaluatedRun, dict[str, Any]]:
+    """A published field of channels per frame, of which no Gaussians are kept."""
+    run = FieldRun.over(dataset, cell.radio, dataset.sequence().frames, config, out)
+    groups, train_s = evaluate_channel_field(run, CHANNEL_FIELDS[cell.method], cell.seed)
+    return replace(run, config=replace(run.config, train_s=train_s)), _named(cell.method, groups)
 
 
 def _named(method: str, groups: dict[str, Any]) -> dict[str, Any]:

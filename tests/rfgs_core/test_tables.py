@@ -15,10 +15,13 @@ from rfgs_core import study
 from rfgs_core.cli import main
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import read_json
+from rfgs_core.neural.direct_sum import SumSettings
+from rfgs_core.neural.signal_splat import SplatSettings
 from rfgs_core.study.ablation import VARIANTS
 from rfgs_core.study.cell_rows import leaks, method_rows, method_table, strongest
 from rfgs_core.study.cells import make, settings_of, stored
 from rfgs_core.study.paper_tables import (
+    CHANNEL_FIELDS,
     FIELDS,
     SIZES,
     TABLES,
@@ -46,10 +49,10 @@ def result(seed: int, f10: float, **others: float) -> dict[str, Any]:
 
 def test_every_cell_once_and_one_seed_of_everything_first() -> None:
     chosen = cells(TABLES["table1"], SIZES["smoke"], 2)
-    assert len(chosen) == len({cell.name for cell in chosen}) == 2 * 2 * (len(TRAINED) + 12)
+    assert len(chosen) == len({cell.name for cell in chosen}) == 2 * 2 * (len(TRAINED) + 12 + 2)
     assert [cell.seed for cell in chosen] == sorted(cell.seed for cell in chosen)
     assert len({cell.dataset for cell in chosen}) == 2
-    assert len(FIELDS) == 3 * 2 * 2
+    assert len(FIELDS) == 3 * 2 * 2 and len(CHANNEL_FIELDS) == 2
     # Nobody is heard behind a wall before depth 3.
     behind = Cell("through_wall", "wifi", "rfgs", 0).generate(Path("x"), SIZES["paper-cpu"])
     assert behind[behind.index("--depth") + 1] == "3"
@@ -155,6 +158,39 @@ def test_a_cell_is_kept_until_its_settings_change(
         # A run that is there already gives the same row, whenever it was cut off.
         (tmp_path / "cells" / f"{cell.name}.json").unlink()
         assert make(cell, tmp_path, TINY)["methods"] == made["methods"]
+
+
+@pytest.mark.parametrize(
+    ("method", "settings"),
+    [
+        ("ngrf", SumSettings(rounds=1, per_round=1, places=20, tried=2, steps=1)),
+        ("wrfgs", SplatSettings(gaussians=4, width=4, steps=1)),
+    ],
+)
+def test_fields_of_channels_are_cells_without_runs(
+    method: str,
+    settings: SumSettings | SplatSettings,
+    tiny_dataset: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(CHANNEL_FIELDS, method, settings)
+    cell = Cell("living_room_walk", "wifi", method, 0)
+    shutil.copytree(tiny_dataset, tmp_path / cell.dataset)
+    made = make(cell, tmp_path, TINY)
+    whole, alone = made["methods"][method], made["methods"][f"{method}, alone"]
+    # In whole it carries on what it leaves, so that the two differ.
+    assert whole["rf"]["element_snr_db"] != alone["rf"]["element_snr_db"]
+    assert (whole["geometry"]["f20"] is None) == (method == "wrfgs")
+    assert alone["geometry"]["f20"] is None and made["train_s"] > 0.0
+    kept = stored(cell, tmp_path, TINY)
+    assert kept is not None and method_rows([kept]) == method_rows([made])
+    assert {path.name for path in tmp_path.iterdir()} == {"cells", "data"}
+    row, second = method_table(method_rows([made])).splitlines()[4:6]
+    assert "nGRF" in row or "WRF-GS" in row
+    assert "without residual" in second
+    monkeypatch.setitem(CHANNEL_FIELDS, method, replace(settings, steps=2))
+    assert stored(cell, tmp_path, TINY) is None
 
 
 def test_a_table_may_be_narrowed_to_what_it_has() -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from rfgs_core.encode.peaks import separated_peaks
 from rfgs_core.evaluate.baselines.matched_filter import default_score
 from rfgs_core.evaluate.baselines.scatterers import PointModel
 from rfgs_core.evaluate.evidence import BaselineResult, Evidence
@@ -28,19 +29,6 @@ SEARCH_FACTOR = 3
 LEAST_GAIN = 1e-3
 
 
-def separated_peaks(points: np.ndarray, power: np.ndarray, count: int) -> list[int]:
-    """Indices of the brightest points that keep their distance."""
-    remaining = power.astype(np.float64).copy()
-    chosen = []
-    for _ in range(count):
-        best = int(remaining.argmax())
-        if remaining[best] <= 0.0:
-            break
-        chosen.append(best)
-        remaining[np.linalg.norm(points - points[best], axis=1) < SEPARATION_M] = 0.0
-    return chosen
-
-
 def baseline(evidence: Evidence) -> BaselineResult:
     """Points found by CLEAN, shown with a round beam."""
     model = PointModel(evidence)
@@ -54,7 +42,8 @@ def baseline(evidence: Evidence) -> BaselineResult:
     before = total
     for _ in range(CYCLES):
         answer = model.back_project(residual, points)
-        for best in separated_peaks(points, np.sum(np.abs(answer) ** 2, axis=0), PEAKS_PER_CYCLE):
+        power = np.sum(np.abs(answer) ** 2, axis=0)
+        for best in separated_peaks(points, power, PEAKS_PER_CYCLE, SEPARATION_M):
             for pair in range(len(model.pairs)):
                 step = LOOP_GAIN * answer[pair, best]
                 residual[pair] = residual[pair] - step * model.steering(points[best], pair)

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from rfgs_core.bodies.body_prior import Bodies
+from rfgs_core.encode.peaks import separated_peaks
 from rfgs_core.evaluate.baselines import BASELINES
-from rfgs_core.evaluate.baselines.clean import separated_peaks
+from rfgs_core.evaluate.baselines.clean import SEPARATION_M
 from rfgs_core.evaluate.baselines.gaussian_process import krige
 from rfgs_core.evaluate.baselines.linear import linear
 from rfgs_core.evaluate.baselines.nearest_element import nearest
@@ -86,7 +87,7 @@ def test_two_separated_scatterers_are_recovered(scatterers, name: str) -> None:
     made = scatterers(TWO, voxels=2000)
     score = BASELINES[name](made.evidence).score
     points, power = made.evidence.grid.centres(), score.ravel()
-    peaks = points[separated_peaks(points, power, 2)]
+    peaks = points[separated_peaks(points, power, 2, SEPARATION_M)]
     for truth in TWO:
         assert np.linalg.norm(peaks - truth, axis=1).min() < 0.12
 

@@ -32,7 +32,7 @@ FEWEST_PAIRS, LEAST_LEAD = 6, 20.0
 #: Facets lie as close as for this wavelength [m]: guesses are many.
 _WAVELENGTH_M = 0.14
 #: A joint is known no better than this [m].
-_SUREST_M = 0.06
+_SUREST_M = 0.1
 
 
 class Told(NamedTuple):

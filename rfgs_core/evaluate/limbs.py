@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Float64
+from tqdm import tqdm
 
 from rfgs_core.articulated import fit_pose, people
 from rfgs_core.bodies.localise import locate_bodies, pair_maps
@@ -23,6 +24,8 @@ from rfgs_core.evaluate.grid import Grid, splat_gaussians
 from rfgs_core.limbs.evidence.library import headings_of, upright
 from rfgs_core.limbs.evidence.tell import tell
 from rfgs_core.limbs.network import LimbNetwork
+from rfgs_core.limbs.postures.tell import can_tell, looks
+from rfgs_core.limbs.postures.tell import tell as tell_posture
 from rfgs_core.limbs.propose import Joints, combined, propose, smoothed
 from rfgs_core.limbs.skins import PosedPeople
 from rfgs_core.measure.observations import Observations, observe
@@ -117,6 +120,8 @@ def limb_table(
     other = [(k + len(frames) // 2) % len(frames) for k in range(len(frames))]
     told = {} if network is None else _by_network(network, person, other)
     told |= _by_evidence(person, other, _SEED)
+    if _EVIDENCE not in told and can_tell(person.seen[0]):
+        told |= _by_postures(person, other, _SEED)
     if _SMOOTH in told and _EVIDENCE in told:
         both = combined(told[_EVIDENCE], told[_SMOOTH])
         told = {"evidence and network together": _on_bodies(both)} | told
@@ -148,13 +153,33 @@ def _by_network(network: LimbNetwork, person: Person, other: list[int]) -> dict[
 
 def _by_evidence(person: Person, other: list[int], seed: int) -> dict[str, Joints]:
     """Joints by evidence, and by that of other frames' radio, where they are told."""
-    swapped = [
-        replace(person.seen[k], time_s=one.time_s)
-        for k, one in zip(other, person.seen, strict=True)
-    ]
+    swapped = _swapped(person, other)
     rows = {_EVIDENCE: person.seen, "evidence, radio of another frame": swapped}
     told = {name: tell(seen, person.axes_xy, seed) for name, seen in rows.items()}
     return {name: one.joints for name, one in told.items() if one is not None}
+
+
+def _by_postures(person: Person, other: list[int], seed: int) -> dict[str, Joints]:
+    """The same by evidence of any pose."""
+    rows = {
+        "evidence of any pose": person.seen,
+        "evidence of any pose, radio of another frame": _swapped(person, other),
+    }
+    found = {}
+    with tqdm(total=len(rows) * looks(len(person.seen)), desc="seeking postures") as bar:
+        for name, seen in rows.items():
+            told = tell_posture(seen, person.axes_xy, seed, bar.update)
+            if told is not None:
+                found[name] = _on_bodies(told.joints)
+    return found
+
+
+def _swapped(person: Person, other: list[int]) -> list[Observations]:
+    """What the method may see, each frame with the radio of another."""
+    return [
+        replace(person.seen[k], time_s=one.time_s)
+        for k, one in zip(other, person.seen, strict=True)
+    ]
 
 
 def _on_bodies(joints: Joints) -> Joints:

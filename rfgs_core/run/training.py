@@ -229,13 +229,17 @@ def _limbs(run: Run, config: TrainConfig, trained: Trained | None, looks: int) -
     begin = time.perf_counter()
     with ExitStack() as bars, one_torch_thread():
         bar = bars.enter_context(tqdm(total=looks, desc="posing people"))
+        spent_s: list[float] = []
 
         def seeking(count: int) -> Callable[[], Any]:
+            spent_s.append(time.perf_counter() - begin)
             return bars.enter_context(tqdm(total=count, desc="seeking postures")).update
 
         limbs = find_limbs(run, config, trained, bar.update, seeking)
+        spent_s.append(time.perf_counter() - begin)
         if bar.n >= looks:
-            each_s = (time.perf_counter() - begin) / looks
+            # Of whom no walk is told other postures are sought, which takes longer.
+            each_s = spent_s[0] / looks
             note_speed(pose_stage(run, looks), Speed(0.0, each_s))
     return limbs
 

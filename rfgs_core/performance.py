@@ -16,7 +16,13 @@ import torch
 
 from rfgs_core.bench import PropagationBench, bench_propagation, hardware
 from rfgs_core.device import Device
-from rfgs_core.render.bench import Picture, bench_raster, time_picture
+from rfgs_core.render.bench import (
+    Distant,
+    Picture,
+    bench_raster,
+    time_distant,
+    time_picture,
+)
 from rfgs_core.scaling import Growth, growths
 from rfgs_core.selftest import OPERATIONS, SPEED, Throughput, throughput
 
@@ -25,6 +31,8 @@ PICTURES: dict[Device, tuple[tuple[int, int], ...]] = {
     "cpu": ((100_000, 512), (1_000_000, 512)),
     "cuda": ((100_000, 512), (1_000_000, 512), (1_000_000, 1024), (5_000_000, 1024)),
 }
+#: Gaussians in a box of 4 × 4 × 2.5 m, and how far from its middle the camera is [m].
+DISTANT = tuple((count, far_m) for count in (100_000, 1_000_000) for far_m in (5.0, 50.0, 500.0))
 #: What is as large as at most this grows linearly, up to the noise of timing.
 _LINEAR = 1.1
 
@@ -41,6 +49,8 @@ class Performance:
     """As of `bench_raster`."""
     pictures: tuple[Picture, ...]
     """Of `PICTURES`."""
+    distant: tuple[Distant, ...]
+    """Of `DISTANT`; not measured on a GPU."""
     memory_gib: float
     """The most memory that this process has held, before and with the pictures [GiB]; on a GPU the
     most of it that was in use there."""
@@ -71,12 +81,17 @@ def measure(
     for count, size_px in PICTURES[device]:
         note(f"a picture of {count} Gaussians")
         pictures.append(time_picture(count, size_px, device=device))
+    distant = []
+    for count, distance_m in DISTANT if device == "cpu" else ():
+        note(f"a picture of {count} Gaussians, {distance_m:g} m away")
+        distant.append(time_distant(count, distance_m))
     memory_gib = _peak_gib(device)
     return Performance(
         propagation=propagation,
         share=share,
         raster=raster,
         pictures=tuple(pictures),
+        distant=tuple(distant),
         memory_gib=memory_gib,
         growths=growths(note) if device == "cpu" else (),
         device=device,
@@ -193,6 +208,28 @@ def _pictures(found: Performance) -> str:
         f"{raster['max_abs_error']:.0e} of full brightness.\n\n"
         + _table(columns, rows)
         + f"\n{said}"
+        + (_distant(found.distant) if found.distant else "")
+    )
+
+
+def _distant(distant: Sequence[Distant]) -> str:
+    rows = [
+        (
+            f"{each.num_gaussians:,}",
+            f"{each.distance_m:g} m",
+            f"{1e3 * each.every_s:.0f} ms",
+            f"{1e3 * each.shown_s:.0f} ms",
+            f"{each.shown:,}",
+            f"{each.max_abs_error:.1g}",
+        )
+        for each in distant
+    ]
+    heads = ("Gaussians", "seen from", "all sorted", "as drawn", "sorted then", "difference")
+    return (
+        "\nOf a crowd that is small in the picture only the nearest are seen; the others are left "
+        "out before they are sorted\nwhere that pays (`rfgs_core/render/hidden.py`). A box of "
+        "4 × 4 × 2.5 m at 512 × 512 pixels; the difference is the largest\nof a pixel, of full "
+        f"brightness:\n\n{_table(heads, rows)}"
     )
 
 

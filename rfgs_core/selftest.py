@@ -25,6 +25,8 @@ from rfgs_core.render.splat import Splatted
 SIZES = ((1, 1, 1), (2, 3, 5), (129, 2, 33), (1000, 65, 61))
 #: Gaussians and edges of pictures [px].
 PICTURES = ((1, 17), (300, 33), (2000, 96))
+#: So many, small in their picture, that hidden ones are left out.
+CROWD = (60_000, 17)
 #: The sizes at which speed is measured: large enough that a GPU does not wait for the CPU.
 SPEED: dict[Device, tuple[int, int, int]] = {
     "cpu": (20_000, 64, 64),
@@ -90,6 +92,8 @@ def checks(device: Device) -> Iterator[Check]:
     yield from _propagation("60 GHz at 50 m", _far(), device)
     for size in PICTURES:
         yield from _pictures(*size, device)
+    if device == "cpu":
+        yield _crowd(*CROWD)
 
 
 def _scene(gaussians: int, links: int, subcarriers: int) -> CloudAndLinks:
@@ -165,6 +169,14 @@ def _pictures(gaussians: int, edge_px: int, device: Device) -> Iterator[Check]:
             pairs = zip(found[part], exact[part], strict=True)
             worst = max(_relative(one, other) for one, other in pairs)
             yield Check(f"{kind} of {what}, {gaussians} at {edge_px} px", worst, PICTURE[device])
+
+
+def _crowd(gaussians: int, edge_px: int) -> Check:
+    """A picture that leaves out what is hidden, beside the plain twin that draws everything."""
+    cloud, rgb, camera = random_cloud(gaussians, edge_px, seed=gaussians)
+    found, exact = splat(cloud, rgb, camera), splat_plain(cloud, rgb, camera)
+    worst = max(_relative(found.rgb, exact.rgb), _relative(found.alpha, exact.alpha))
+    return Check(f"picture of a crowd, {gaussians} at {edge_px} px", worst, PICTURE["cpu"])
 
 
 def _drawn(

@@ -14,6 +14,7 @@ from rfgs_core.gaussians.model import FEATURE_DIM, Gaussians
 from rfgs_core.render.cameras import Camera
 from rfgs_core.render.rasterizer import plan_splats, splat
 from rfgs_core.render.reference import splat_plain
+from rfgs_core.render.tiles import tile_splats
 
 
 def bench_raster(
@@ -85,6 +86,43 @@ def time_picture(
     return Picture(num_gaussians, size_px, first_s, again_s, gradients_s)
 
 
+@dataclass(frozen=True)
+class Distant:
+    """How long a picture of a cloud takes, with what its nearest Gaussians hide and without."""
+
+    num_gaussians: int
+    distance_m: float
+    """From the camera to the middle of the cloud [m]."""
+    every_s: float
+    """All that are visible sorted and drawn [s]."""
+    shown_s: float
+    """As pictures are drawn [s]: hidden ones left out before sorting, where that pays."""
+    shown: int
+    """Gaussians that were sorted then."""
+    max_abs_error: float
+    """Largest difference of the two in colours and coverage, of full brightness."""
+
+
+def time_distant(
+    num_gaussians: int, distance_m: float, size_px: int = 512, repeats: int = 3, seed: int = 0
+) -> Distant:
+    """Times pictures of a random cloud seen from near or afar, on a CPU."""
+    gaussians, rgb, _ = random_cloud(num_gaussians, size_px, seed)
+    camera = _eye(size_px, distance_m)
+    splat(gaussians, rgb, camera)  # compiles
+    every_s, every = fastest(lambda: splat(gaussians, rgb, camera, leave_out_hidden=False), repeats)
+    shown_s, shown = fastest(lambda: splat(gaussians, rgb, camera), repeats)
+    differences = (every.rgb - shown.rgb).abs().max(), (every.alpha - shown.alpha).abs().max()
+    return Distant(
+        num_gaussians,
+        distance_m,
+        every_s,
+        shown_s,
+        len(tile_splats(gaussians, camera, True).rows),
+        float(max(differences)),
+    )
+
+
 def _with_gradients(gaussians: Gaussians, rgb: torch.Tensor, camera: Camera) -> torch.Tensor:
     """A picture, its brightness sent back to everything."""
     leaves = {name: value.detach().requires_grad_(True) for name, value in gaussians.items()}
@@ -118,10 +156,10 @@ def random_cloud(
     return on_device(gaussians, device), uniform[:, 11:14].to(device), _eye(size_px)
 
 
-def _eye(size_px: int) -> Camera:
-    """A camera 5 m before the origin that looks along +y."""
+def _eye(size_px: int, distance_m: float = 5.0) -> Camera:
+    """A camera before the origin that looks along +y."""
     world_from_camera = np.array(
-        [[1.0, 0, 0, 0], [0, 0, -1.0, -5.0], [0, 1.0, 0, 0], [0, 0, 0, 1.0]]
+        [[1.0, 0, 0, 0], [0, 0, -1.0, -distance_m], [0, 1.0, 0, 0], [0, 0, 0, 1.0]]
     )
     half = size_px / 2
     return Camera(

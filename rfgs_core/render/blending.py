@@ -12,10 +12,9 @@ import numba
 import numpy as np
 
 from rfgs_core.propagation.vector_math import FAST_REDUCTION, exponential
+from rfgs_core.render.hidden import LIGHT_MIN, is_hidden, span
 from rfgs_core.render.splat import ALPHA_MAX, TILE_PX
 
-#: A tile is finished when less light than this passes anywhere; bounds the error of stopping early.
-LIGHT_MIN = 1e-5
 #: Splats after which a tile is looked at again.
 _LOOK_EVERY = 16
 
@@ -33,18 +32,6 @@ def _tile_corner(tile: int, width: int, height: int) -> tuple[int, int, int, int
     columns = (width + TILE_PX - 1) // TILE_PX
     left, top = (tile % columns) * TILE_PX, (tile // columns) * TILE_PX
     return left, min(width, left + TILE_PX), top, min(height, top + TILE_PX)
-
-
-@numba.njit(inline="always", **_OPTIONS)
-def _rows_reached(splat: np.ndarray, top: int) -> tuple[int, int]:
-    """Rows of a tile where a splat may reach `ALPHA_MIN`, a pixel of margin on both sides."""
-    a, b, c = splat[2], splat[3], splat[4]
-    half = np.sqrt(2.0 * splat[6] * a / (a * c - b * b)) + 1.0
-    middle = splat[1] - top - 0.5
-    # Cut before they are whole numbers, which hold no splat of any size.
-    first = min(max(np.floor(middle - half), 0.0), float(TILE_PX))
-    last = min(max(np.ceil(middle + half) + 1.0, first), float(TILE_PX))
-    return int(first), int(last)
 
 
 @numba.njit(inline="always", **_OPTIONS)
@@ -119,7 +106,9 @@ def blend(
             if _is_finished(entry - starts[tile], light):
                 break
             splat = splats[entries[entry]]
-            rows = _rows_reached(splat, top)
+            rows = span(splat, 1, top, TILE_PX)
+            if is_hidden(light, TILE_PX, splat, rows, (left, top)):
+                continue
             _take_light(light, share, splat, rows, left, top)
             _add(sums, share, values[entries[entry]], rows)
         for row in range(top, bottom):
@@ -159,7 +148,9 @@ def value_shares(
             if _is_finished(entry - starts[tile], light):
                 break
             splat = splats[entries[entry]]
-            rows = _rows_reached(splat, top)
+            rows = span(splat, 1, top, TILE_PX)
+            if is_hidden(light, TILE_PX, splat, rows, (left, top)):
+                continue
             _take_light(light, share, splat, rows, left, top)
             for channel in range(channels):
                 total, slope = towards.dtype.type(0.0), slopes[channel]
@@ -238,7 +229,9 @@ def shape_shares(
                 end = entry
                 break
             splat = splats[entries[entry]]
-            rows = _rows_reached(splat, top)
+            rows = span(splat, 1, top, TILE_PX)
+            if is_hidden(light, TILE_PX, splat, rows, (left, top)):
+                continue
             _take_light(light, share, splat, rows, left, top)
             _weigh(worth, slopes, values[entries[entry]], rows)
             for pixel in range(rows[0] * TILE_PX, rows[1] * TILE_PX):
@@ -246,7 +239,9 @@ def shape_shares(
         light[:] = 1.0
         for entry in range(starts[tile], end):
             splat = splats[entries[entry]]
-            rows = _rows_reached(splat, top)
+            rows = span(splat, 1, top, TILE_PX)
+            if is_hidden(light, TILE_PX, splat, rows, (left, top)):
+                continue
             _take_light(light, share, splat, rows, left, top)
             _weigh(worth, slopes, values[entries[entry]], rows)
             for pixel in range(rows[0] * TILE_PX, rows[1] * TILE_PX):

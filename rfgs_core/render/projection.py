@@ -13,6 +13,7 @@ import numba
 import numpy as np
 
 from rfgs_core.render.cameras import Camera
+from rfgs_core.render.hidden import REACH_MARGIN
 from rfgs_core.render.splat import ALPHA_MIN, DILATION_PX2, NEAR_M, SLOPE_MARGIN
 
 
@@ -107,8 +108,9 @@ def _sizes(log_scales: np.ndarray, row: int) -> tuple[float, float, float]:
 def _pixels(middle: float, variance: float, reach: float, size: int) -> tuple[int, int]:
     """First and one-past-last pixel whose centre a splat may reach."""
     half = np.sqrt(2.0 * reach * variance)
-    first = min(max(np.floor(middle - half - 0.5), 0.0), float(size))
-    last = min(max(np.ceil(middle + half + 0.5), 0.0), float(size))
+    half += REACH_MARGIN * (1.0 + half)
+    first = min(max(np.ceil(middle - half - 0.5), 0.0), float(size))
+    last = min(max(np.floor(middle + half - 0.5) + 1.0, 0.0), float(size))
     return int(first), int(last)
 
 

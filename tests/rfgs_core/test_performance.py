@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from rfgs_core.performance import Performance, page
-from rfgs_core.render.bench import Picture, time_picture
+from rfgs_core.render.bench import Distant, Picture, time_distant, time_picture
 from rfgs_core.scaling import Growth
 from rfgs_core.selftest import Throughput
 
@@ -26,6 +26,7 @@ def measured() -> Performance:
         share=Throughput(0.02, 5e10, 2e11),
         raster={"raster_s": 0.03, "twin_s": 6.0, "raster_ratio": 200.0, "max_abs_error": 1e-5},
         pictures=(Picture(100_000, 512, 0.41, 0.052, 0.31),),
+        distant=(Distant(100_000, 50.0, 0.06, 0.043, 27_905, 1e-6),),
         memory_gib=1.25,
         growths=(Growth("law", SIZES, (0.1, 0.9, 8.1)), Growth("flat", SIZES, (0.1, 0.1, 0.1))),
         device="cpu",
@@ -41,6 +42,7 @@ def test_every_number_stands_on_the_page() -> None:
     assert "| with gradients | 78.0 ms | 61× | 57× |" in text
     assert "25% of the 200 billion" in text
     assert "| 100,000 | 512 × 512 | 0.41 s | 0.052 s | 0.31 s |" in text
+    assert "| 100,000 | 50 m | 60 ms | 43 ms | 27,905 | 1e-06 |" in text
     assert re.search(r"\| law \| 100 to 10,000 \| 0.1 s to 8.1 s \| 0.95 \|", text)
     assert "1.2 GiB" in text and "Nothing grows more than linearly" in text
 
@@ -48,7 +50,7 @@ def test_every_number_stands_on_the_page() -> None:
 def test_the_page_of_a_gpu_has_frames_per_second_and_gradients() -> None:
     found = measured()
     drawn = (Picture(1_000_000, 512, 0.004, 0.004, 0.0125),)
-    told = replace(found, device="cuda", pictures=drawn, growths=())
+    told = replace(found, device="cuda", pictures=drawn, distant=(), growths=())
     told.machine["gpu"], told.propagation["torch"] = "a card", "2.13.0"
     text = page(told, "2026-11-26")
     assert "bench performance --device cuda --out FILE` on a card, torch 2.13.0, 2026-11-26" in text
@@ -66,6 +68,12 @@ def test_a_picture_is_timed_whole_and_drawn_again() -> None:
     told = time_picture(2000, 64)
     assert (told.num_gaussians, told.size_px) == (2000, 64)
     assert told.again_s > 0.0 and told.first_s > 0.0
+
+
+def test_a_crowd_is_timed_from_near_and_afar() -> None:
+    near, far = time_distant(60_000, 2.0, 64, 1), time_distant(60_000, 50.0, 64, 1)
+    assert near.shown > 3 * far.shown > 0
+    assert far.every_s > 0.0 and far.shown_s > 0.0 and far.max_abs_error < 1e-5
 
 
 @pytest.mark.parametrize("gpu", ["none", "a card"])

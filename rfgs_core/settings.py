@@ -88,10 +88,10 @@ class TrainOptions:
     who lies and which way; standing: everybody stands, as is assumed without phases anyway."""
 
     limbs: Limbs = "auto"
-    """auto: evidence tells the limbs of people who walk, a network that was trained on random
-    worlds those of others where one for the radio is at hand, and Gaussians start on the skins of
-    posed bodies; off: they start around the bodies' places, knowing nothing but whether somebody
-    stands, sits or lies."""
+    """auto: evidence tells the limbs of people who walk, and of others where six device pairs or
+    more are visible; a network that was trained on random worlds those of everybody where one for
+    the radio is at hand; Gaussians start on the skins of posed bodies; off: they start around the
+    bodies' places, knowing nothing but whether somebody stands, sits or lies."""
 
     def __post_init__(self) -> None:
         """Refuses values that no option may have.

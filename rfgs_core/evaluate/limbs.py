@@ -100,6 +100,7 @@ def limb_table(
     *,
     everything: bool = True,
     on_frame: Callable[[], Any] = lambda: None,
+    others: Callable[[Person], dict[str, np.ndarray]] = lambda person: {},
 ) -> dict[str, dict[str, float]]:
     """Errors of every row.
 
@@ -110,6 +111,7 @@ def limb_table(
         frames: Frames.
         everything: Whether held-out entries are read as well.
         on_frame: Called as frames are located.
+        others: Joints by methods of others, float64, shape (frame, 17, 3) [m], by name of the row.
 
     Returns:
         For each row: joints, with the pelvis in place, limbs and wrists [m], F-scores at 5 and
@@ -127,7 +129,7 @@ def limb_table(
         told = {"evidence and network together": _on_bodies(both)} | told
     if _SMOOTH in told:
         told[_SMOOTH] = _on_bodies(told[_SMOOTH])
-    rows = {name: joints.xyz[:, 0] for name, joints in told.items()}
+    rows = others(person) | {name: joints.xyz[:, 0] for name, joints in told.items()}
     mean, phases = _walking(person, _SEED)
     own = people().body(np.zeros(0))
     rows |= {

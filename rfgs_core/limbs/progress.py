@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import torch
 from safetensors.torch import save
+from torch import nn
 
 from rfgs_core.adam import Adam
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.files import write_bytes
-from rfgs_core.limbs.network import LimbNetwork
 from rfgs_core.limbs.tensor_file import read_tensors, refuse_misfit
 from rfgs_core.seals import BLANK, sealed
 
@@ -25,12 +25,12 @@ class Progress(NamedTuple):
     """How far a training has come."""
 
     frames: int
-    """Frames of random worlds so far."""
+    """Frames so far."""
     spent_s: float
     """Time so far [s]."""
 
 
-def keep(path: Path, network: LimbNetwork, optimiser: Adam, progress: Progress) -> None:
+def keep(path: Path, network: nn.Module, optimiser: Adam, progress: Progress) -> None:
     """Writes the state of a training in one step."""
     state = {f"weight.{name}": value.cpu() for name, value in network.state_dict().items()}
     for name, parameter in network.named_parameters():
@@ -41,7 +41,7 @@ def keep(path: Path, network: LimbNetwork, optimiser: Adam, progress: Progress) 
     write_bytes(path, sealed(save(state, {"seal": BLANK})))
 
 
-def resume(path: Path, network: LimbNetwork, optimiser: Adam) -> Progress:
+def resume(path: Path, network: nn.Module, optimiser: Adam) -> Progress:
     """Reads what `keep` wrote into a network and its optimiser.
 
     Raises:

@@ -90,7 +90,7 @@ def cast_of(
     actors = []
     for _ in range(count):
         body = people().random(rng, child=bool(rng.random() < _CHILDREN))
-        actor = _placed(rng, setting, body, lasts_s, families)
+        actor = placed(rng, setting, body, lasts_s, families)
         if actor is None:
             raise RfgsError(
                 f"no room for {count} people in {np.ptp(setting.bounds_m, axis=0).round(1)} m"
@@ -99,13 +99,22 @@ def cast_of(
     return actors
 
 
-def _placed(
+def placed(
     rng: np.random.Generator,
     setting: Setting,
     body: Body,
     lasts_s: float,
     families: tuple[str, ...],
 ) -> Actor | None:
+    """Somebody who does one of some things where there is room; None where there is none.
+
+    Args:
+        rng: Where chance comes from.
+        setting: The room; the place is taken, and a bed, chair or stairs are added to it.
+        body: Who.
+        lasts_s: How long it lasts [s].
+        families: What may be done.
+    """
     for _ in range(_MOTIONS):
         motion = random_motion(rng, body, str(rng.choice(families)))
         start_s = float(rng.uniform(0.0, max(motion.duration_s - lasts_s, 0.0)))

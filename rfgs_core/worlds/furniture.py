@@ -128,10 +128,19 @@ class Setting:
         )
 
 
-def empty_setting(rng: np.random.Generator, radio: Radio) -> Setting:
-    """Four walls of one material, or of several, a floor and a ceiling; 3 to 9 m wide."""
-    half = rng.uniform(1.6, 3.8, 2) if rng.random() < 0.8 else rng.uniform(2.5, 4.5, 2)
-    bounds = np.array([[*-half, 0.0], [*half, rng.uniform(2.4, 3.4)]])
+def empty_setting(
+    rng: np.random.Generator,
+    radio: Radio,
+    bounds_m: Float64[np.ndarray, "2 3"] | None = None,
+) -> Setting:
+    """Four walls of one material, or of several, a floor and a ceiling.
+
+    Args:
+        rng: Where chance comes from.
+        radio: Walls are of materials whose model covers its band.
+        bounds_m: Where the sides are [m]; None draws them, 3 to 9 m apart.
+    """
+    bounds = _extent(rng) if bounds_m is None else bounds_m
     walls = _allowed(WALLS, radio)
     usual = rng.choice(walls)
     sides = [str(usual if rng.random() < 0.7 else rng.choice(walls)) for _ in range(4)]
@@ -145,6 +154,12 @@ def empty_setting(rng: np.random.Generator, radio: Radio) -> Setting:
         which = setting.materials.index(slab)
         setting.parts.append(Mesh(name, which, box[2 * index : 2 * index + 2]))
     return setting
+
+
+def _extent(rng: np.random.Generator) -> Float64[np.ndarray, "2 3"]:
+    """Where the sides of a random room are [m]."""
+    half = rng.uniform(1.6, 3.8, 2) if rng.random() < 0.8 else rng.uniform(2.5, 4.5, 2)
+    return np.array([[*-half, 0.0], [*half, rng.uniform(2.4, 3.4)]])
 
 
 def furnish(rng: np.random.Generator, setting: Setting) -> None:

@@ -17,7 +17,7 @@ from rfgs_core.radio.delay import band_window, hann
 from rfgs_core.radio.tissue import normal_reflection, skin_permittivity
 from rfgs_core.worlds.echoes import Band, Listener, Seen, mirrored
 from rfgs_core.worlds.figure import Figure, Posed, look_cell, seen_among
-from rfgs_core.worlds.moments import acted
+from rfgs_core.worlds.moments import Acted, acted
 from rfgs_core.worlds.room import Room, Sight
 
 #: Of a body in a wall's mirror every fourth facet is enough: its echo is speckle all the same.
@@ -50,12 +50,18 @@ def examples(radio: Radio, seed: int) -> Iterator[Example]:
         radio: Radio of the devices.
         seed: Seed of everything.
     """
-    for figure, family, moments in acted(radio, seed, _MOMENTS):
-        for pose, room, sight, views, centre in moments:
-            weights = band_window(sight.subcarriers, hann)
-            band = Band.of(sight.freq_hz, weights, skin_reflection(radio.centre_hz))
-            maps = body_echoes(figure, figure.posed(pose), views, centre, band, room, sight)
-            yield Example(views, maps, centre, figure.body.joints17(pose), family)
+    for done in acted(radio, seed, _MOMENTS):
+        yield from hear(radio, done)
+
+
+def hear(radio: Radio, done: Acted) -> Iterator[Example]:
+    """What a radio hears of one motion, moment by moment."""
+    figure, family, moments = done
+    for pose, room, sight, views, centre in moments:
+        weights = band_window(sight.subcarriers, hann)
+        band = Band.of(sight.freq_hz, weights, skin_reflection(radio.centre_hz))
+        maps = body_echoes(figure, figure.posed(pose), views, centre, band, room, sight)
+        yield Example(views, maps, centre, figure.body.joints17(pose), family)
 
 
 @functools.lru_cache(maxsize=4)

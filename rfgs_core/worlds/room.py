@@ -90,6 +90,14 @@ class Sight:
         above_m = np.where(hidden, rng.uniform(0.15, 0.8, count), -np.inf)
         return Sight(placed, links, subcarriers, radio.freq_hz, above_m)
 
+    @staticmethod
+    def whole(radio: Radio, room: Room) -> Sight:
+        """Devices where the radio's own rule puts them, nothing left out and nothing hidden."""
+        placed = layout(radio, place_devices(radio, room.bounds_m))
+        subcarriers = np.ones(radio.num_subcarriers, dtype=bool)
+        hidden_below = np.full(radio.num_devices, -np.inf)
+        return Sight(placed, placed.measured.copy(), subcarriers, radio.freq_hz, hidden_below)
+
 
 def anywhere(
     rng: np.random.Generator,

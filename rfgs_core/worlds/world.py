@@ -149,6 +149,15 @@ class World:
         )
 
 
+@dataclass(frozen=True)
+class Place:
+    """Extent and devices that worlds share; walls, furniture and people are still drawn."""
+
+    bounds_m: Float64[np.ndarray, "2 3"]
+    """Where the sides are [m]; the floor is z = 0."""
+    devices: list[DevicePose]
+
+
 class Sounding(NamedTuple):
     """A world and what its radio hears."""
 
@@ -173,7 +182,9 @@ def refuse_radio(radio: Radio) -> None:
         )
 
 
-def random_world(radio: Radio, settings: WorldSettings, seed: int, index: int) -> World:
+def random_world(
+    radio: Radio, settings: WorldSettings, seed: int, index: int, place: Place | None = None
+) -> World:
     """A world, the same for the same radio, settings, seed and index.
 
     Args:
@@ -181,6 +192,7 @@ def random_world(radio: Radio, settings: WorldSettings, seed: int, index: int) -
         settings: What worlds have in common.
         seed: Root seed.
         index: Number of the world.
+        place: Extent and devices; None draws them.
 
     Raises:
         RfgsError: The radio's antennas move, or nobody finds room.
@@ -189,7 +201,7 @@ def random_world(radio: Radio, settings: WorldSettings, seed: int, index: int) -
     refuse_radio(radio)
     for attempt in range(_ROOMS):
         rng = np.random.default_rng(sub_seed(seed, radio.name, "world", index, attempt))
-        setting = empty_setting(rng, radio)
+        setting = empty_setting(rng, radio, None if place is None else place.bounds_m)
         if too_far(radio, setting.bounds_m):
             continue
         count = int(rng.integers(settings.people[0], settings.people[1] + 1))
@@ -197,9 +209,12 @@ def random_world(radio: Radio, settings: WorldSettings, seed: int, index: int) -
             actors = cast_of(rng, setting, count, settings.lasts_s, settings.families)
         except RfgsError:
             continue
-        kind, devices = _devices(rng, radio, setting, actors, settings)
-        places = [np.array(device.position_m) for device in devices]
-        clear = [setting.clear_of_furniture(place, _FROM_DEVICE_M) for place in places]
+        if place is None:
+            kind, devices = _devices(rng, radio, setting, actors, settings)
+        else:
+            kind, devices = replace(radio, num_devices=len(place.devices)), list(place.devices)
+        stands = [np.array(device.position_m) for device in devices]
+        clear = [setting.clear_of_furniture(point, _FROM_DEVICE_M) for point in stands]
         if not devices or not all(clear):
             continue
         for device in devices:

@@ -100,6 +100,7 @@ PIPES = [
     "rfgs addon install --blender PIPE",
     "rfgs bench training --dataset PIPE",
     "rfgs bench limbs --radio mmwave --dataset DATA --network PIPE",
+    "rfgs bench posenets --out OUT --dataset PIPE",
     "rfgs bench real --data PIPE",
     "rfgs bench blender --blender PIPE",
     *(f"rfgs-factory {name} PIPE" for name in ("check", "validate", "preview", "stats", "bench")),

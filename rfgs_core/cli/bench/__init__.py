@@ -9,6 +9,7 @@ from tyro.conf import subcommand
 
 from rfgs_core.cli.bench.gallery import Gallery
 from rfgs_core.cli.bench.judges import Fields, Limbs, Live, People, Pictures, Real, Tracers
+from rfgs_core.cli.bench.pose_networks import PoseNetworks
 from rfgs_core.cli.bench.sensitivity import Sensitivity
 from rfgs_core.cli.bench.speed import (
     Blender,
@@ -34,6 +35,7 @@ BenchArgs = (
     | Annotated[Performance, subcommand("performance")]
     | Annotated[Tracers, subcommand("tracers")]
     | Annotated[Limbs, subcommand("limbs")]
+    | Annotated[PoseNetworks, subcommand("posenets")]
     | Annotated[People, subcommand("people")]
     | Annotated[Pictures, subcommand("pictures")]
     | Annotated[Live, subcommand("live")]

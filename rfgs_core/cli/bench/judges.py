@@ -13,7 +13,7 @@ import tyro
 from rfgs_core.cli.bench.numbers import Part, need_at_least_one, note
 
 
-def _flat(table: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+def flat(table: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """Rows of a table as one dictionary, without what a row does not have."""
     return {
         f"{row}: {name}": value
@@ -69,7 +69,7 @@ class Limbs(Part):
                 sequence, self.radio, network, sequence.frames,
                 everything=not self.hold_out, on_frame=bar.update,
             )  # fmt: skip
-        return {**_flat(table), "frames": len(sequence.frames), **hardware()}
+        return {**flat(table), "frames": len(sequence.frames), **hardware()}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -164,7 +164,7 @@ class Pictures(Part):
         run = open_run(self.run_folder)
         with tqdm(total=len(run.frames) * self.steps, desc="pictures", unit="step") as bar:
             table = picture_table(run, self.steps, bar.update)
-        return {**_flat(table), "frames": len(run.frames), **hardware()}
+        return {**flat(table), "frames": len(run.frames), **hardware()}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,7 +22,7 @@ _SIZES: dict[str, dict[tuple[str, bool], tuple[int, float]]] = {
     },
     "full": {
         ("points", True): (6400, 40.0), ("points", False): (8000, 12.0),
-        ("amplitudes", True): (1600, 60.0), ("amplitudes", False): (900, 60.0),
+        ("amplitudes", True): (1600, 30.0), ("amplitudes", False): (450, 60.0),
     },
 }  # fmt: skip
 
@@ -46,7 +46,7 @@ class PoseNetworks(Part):
     radio: str | None = None
     """Which radio; left out: mmwave for points, wifi for amplitudes."""
     size: Literal["smoke", "full"] = "smoke"
-    """smoke: a minute, to see that it works; full: some 20 minutes of one core."""
+    """smoke: a minute, to see that it works; full: some ten minutes of one core."""
     frames: int | None = None
     """Frames that are made, a fifth of them to judge by; left out: what the size has."""
     passes: float | None = None

@@ -22,7 +22,7 @@ _SIZES: dict[str, dict[tuple[str, bool], tuple[int, float]]] = {
     },
     "full": {
         ("points", True): (6400, 40.0), ("points", False): (8000, 12.0),
-        ("amplitudes", True): (1600, 30.0), ("amplitudes", False): (450, 60.0),
+        ("amplitudes", True): (1600, 30.0), ("amplitudes", False): (360, 60.0),
     },
 }  # fmt: skip
 

@@ -21,7 +21,7 @@ from rfgs_core.sanitize.phase import remove_linear_phase
 #: Rows and columns of a receiving array that are read, from its middle: publications have three
 #: antennas per receiver.
 ANTENNAS = 4
-#: Every so manieth subcarrier is read: publications have 30 of them.
+#: Of so many neighbouring subcarriers one is read: publications have 30 of them.
 EVERY = 2
 
 

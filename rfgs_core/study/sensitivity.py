@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How much radio it takes: one thing of a radio or of its paths changed at a time."""
+"""How much radio it takes: one thing of a radio, its paths or the scene changed at a time."""
 
 from __future__ import annotations
 
@@ -26,6 +26,11 @@ from rfgs_core.threads import one_torch_thread
 
 #: Devices of our scenes.
 DEVICES = tuple(f"access_point_{index}" for index in range(4))
+#: Materials of the walls and of the ceiling of our rooms, and scenes without them.
+WALLS, CEILING = ("wall_*",), "ceiling_white"
+WITHOUT_WALLS = ("parking_lot", "street", "warehouse")
+#: Scenes of several people in one room, and how many these are.
+CROWDS = {"two_crossing": 2, "crowd_of_four": 4}
 #: Fewest subcarriers of a narrow band: fewer hide none from training.
 FEWEST_SUBCARRIERS = 8
 
@@ -46,6 +51,8 @@ class Setup:
     """What the changes are called in names of files."""
     without: tuple[str, ...] = ()
     """Devices of the scene that are left out."""
+    metal: tuple[str, ...] = ()
+    """Blender materials, as patterns, that are metal instead of what they were built of."""
     depth: int = 2
     """Bounces of the paths that meet people."""
     power_dbm: float | None = None
@@ -63,7 +70,9 @@ class Setup:
         """Folder of the dataset within the bench's; seeds share it."""
         noise = "" if self.power_dbm is None else f"-at{self.power_dbm:g}dbm"
         fewer = f"-less{len(self.without)}" if self.without else ""
-        return Path("data") / f"{self.scene}-{self.heard_by}-depth{self.depth}{fewer}{noise}"
+        metal = f"-metal{len(self.metal)}" if self.metal else ""
+        changed = f"{fewer}{metal}{noise}"
+        return Path("data") / f"{self.scene}-{self.heard_by}-depth{self.depth}{changed}"
 
     @property
     def name(self) -> str:
@@ -87,6 +96,7 @@ class Setup:
             *("dataset_factory", "generate", self.scene, "--radio", radio),
             *("--frames", self.frames, "--no-images", "--tracer", "fast"),
             *(word for name in self.without for word in ("--drop", name)),
+            *(word for name in self.metal for word in ("--material", f"{name}=metal")),
             *("--depth", str(self.depth), *noise, "--out", str(out / self.dataset)),
         )
 
@@ -120,7 +130,7 @@ def sweeps(radio: str, scene: str = "living_room_walk", seed: int = 0) -> dict[s
         raise RfgsError(f"--radio {radio}: expected antennas that stand still")
     if scene not in EVERY_SCENE:
         raise RfgsError(f"--scene {scene}: expected one of {', '.join(EVERY_SCENE)}")
-    plain = Setup(scene, radio, EVERY_SCENE[scene].frames, seed=seed, depth=min(2, base.deepest))
+    plain = Setup(scene, radio, _frames(scene), seed=seed, depth=min(2, base.deepest))
     found: dict[str, Sweep] = {
         # Twice an ultra-wide band would begin below 0 Hz.
         "bandwidth": [
@@ -134,7 +144,14 @@ def sweeps(radio: str, scene: str = "living_room_walk", seed: int = 0) -> dict[s
             (f"{depth}", replace(plain, depth=depth)) for depth in range(1, base.deepest + 1)
         ],
         "noise": [_noise(plain, base, less) for less in (None, 0, 10, 20, 30, 40)],
+        "people": _people(plain),
     }
+    if scene not in WITHOUT_WALLS:
+        found["walls"] = [
+            ("as built", plain),
+            ("metal walls", replace(plain, metal=WALLS)),
+            ("metal walls and ceiling", replace(plain, metal=(*WALLS, CEILING))),
+        ]
     return found
 
 
@@ -168,6 +185,19 @@ def _elements(plain: Setup, base: Radio, share: float) -> tuple[str, Setup]:
 def _devices(plain: Setup, count: int) -> tuple[str, Setup]:
     """The first few of a scene's devices."""
     return f"{count}", replace(plain, without=DEVICES[count:])
+
+
+def _people(plain: Setup) -> Sweep:
+    """The scene itself, and scenes of more people, each in a room of its own."""
+    others = [scene for scene in CROWDS if scene != plain.scene]
+    return [(plain.scene, plain)] + [
+        (f"{scene}: {CROWDS[scene]} people", replace(plain, scene=scene, frames=_frames(scene)))
+        for scene in others
+    ]
+
+
+def _frames(scene: str) -> str:
+    return EVERY_SCENE[scene].frames
 
 
 def _noise(plain: Setup, base: Radio, less_db: float | None) -> tuple[str, Setup]:
@@ -262,7 +292,12 @@ def _file(setup: Setup) -> Path:
 def _plain(setup: Setup) -> dict[str, Any]:
     """A setup as JSON holds it."""
     changes = [list(change) for change in setup.changes]
-    return {**asdict(setup), "changes": changes, "without": list(setup.without)}
+    return {
+        **asdict(setup),
+        "changes": changes,
+        "without": list(setup.without),
+        "metal": list(setup.metal),
+    }
 
 
 def every_setup(chosen: Mapping[str, Sweep]) -> list[Setup]:

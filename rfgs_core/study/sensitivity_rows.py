@@ -19,6 +19,8 @@ TITLES = {
     "devices": "devices",
     "depth": "depth of tracing: bounces of paths that meet the person",
     "noise": "thermal noise, by transmit power",
+    "people": "people, in rooms of their own",
+    "walls": "material of the room",
 }
 #: Ours, and baselines that know of bodies.
 _OF_BODIES = ("rfgs", GAUSSIANS_ALONE, "body_prior", "template", "template_filled")

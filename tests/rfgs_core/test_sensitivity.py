@@ -75,6 +75,24 @@ def test_noise_is_trained_on_and_told(tmp_path: Path) -> None:
     assert "--impairments" not in clean.generate(tmp_path)
 
 
+def test_metal_walls_are_asked_for_where_there_are_walls(tmp_path: Path) -> None:
+    (_, built), (_, walls), (_, box) = sweeps("wifi")["walls"]
+    assert "--material" not in built.generate(tmp_path)
+    for setup, names in ((walls, ["wall_*"]), (box, ["wall_*", "ceiling_white"])):
+        words = setup.generate(tmp_path)
+        asked = [words[at + 1] for at, word in enumerate(words) if word == "--material"]
+        assert asked == [f"{name}=metal" for name in names]
+    assert "walls" not in sweeps("wifi", "street")
+
+
+def test_people_are_those_of_other_scenes() -> None:
+    found = dict(sweeps("mmwave")["people"])
+    assert [setup.scene for setup in found.values()] == [
+        "living_room_walk", "two_crossing", "crowd_of_four",
+    ]  # fmt: skip
+    assert len(sweeps("wifi", "crowd_of_four")["people"]) == 2
+
+
 def test_radios_are_not_written_where_a_link_leads(tmp_path: Path) -> None:
     elsewhere, out = tmp_path / "elsewhere", tmp_path / "out"
     elsewhere.mkdir()

@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     from rfgs_core.schedule.spread import Spread
     from rfgs_core.study.sensitivity import Setup, SetupPart, Sweep
 
-SweepName = Literal["bandwidth", "elements", "devices", "depth", "noise"]
+SweepName = Literal["bandwidth", "elements", "devices", "depth", "noise", "people", "walls"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Sensitivity:
-    """F-scores against bandwidth, elements, devices, depth of tracing and noise, one at a time."""
+    """F-scores against radio, depth, noise, people and walls, one thing changed at a time."""
 
     out: Path
     """Folder of datasets, runs, tables and the picture; what is finished is kept, and the same

@@ -28,7 +28,10 @@ def write_sweeps(path: Path, rows: Sequence[SweepRow]) -> None:
                 places = [x for x, value in enumerate(values) if value is not None]
                 known = [value for value in values if value is not None]
                 axis.plot(places, known, "o-", color=colour, label=what, markersize=4)
-            axis.set_xticks(range(len(here)), [row.setting for row in here], rotation=30)
+            settings = [row.setting for row in here]
+            axis.set_xticks(
+                range(len(here)), settings, rotation=30, ha="right", rotation_mode="anchor"
+            )
             axis.set(title=_TITLES.get(name, name), ylim=(0.0, 1.0), xlim=(-0.3, len(here) - 0.7))
             axis.grid(axis="y", alpha=0.25)
         panels[0].set_ylabel("F10")

@@ -12,16 +12,15 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float, Float64
+from jaxtyping import Float, Float64
 from tqdm import tqdm
 
 from rfgs_core.articulated import fit_pose, people
-from rfgs_core.bodies.tracks import Tracks
+from rfgs_core.bodies.localise import locate_bodies, pair_maps
 from rfgs_core.dataset import Sequence
 from rfgs_core.errors import RfgsError
 from rfgs_core.evaluate.geometry import geometry_metrics, reference_points, voxel_budget
 from rfgs_core.evaluate.grid import Grid, splat_gaussians
-from rfgs_core.fit.frame import followed
 from rfgs_core.limbs.evidence.library import headings_of, upright
 from rfgs_core.limbs.evidence.tell import tell
 from rfgs_core.limbs.network import LimbNetwork
@@ -31,7 +30,6 @@ from rfgs_core.limbs.propose import Joints, combined, propose, smoothed
 from rfgs_core.limbs.skins import PosedPeople
 from rfgs_core.measure.observations import Observations, observe
 from rfgs_core.seeds import sub_seed
-from rfgs_core.settings import TrainConfig
 from rfgs_core.skeleton import JOINTS
 from rfgs_core.worlds.motion import random_motion
 
@@ -60,8 +58,6 @@ class Person:
     """What the method may see."""
     axes_xy: Float64[np.ndarray, "frame 2"]
     """Where radio finds the person [m]."""
-    lies: Bool[np.ndarray, "frame"]
-    """In which it tells that they lie there."""
     truth: Float64[np.ndarray, "frame 17 3"]
     """True joints [m]."""
 
@@ -81,18 +77,14 @@ class Person:
         count = sum(1 for row in sequence.instances if row["class"] == "person")
         if count != 1:
             raise RfgsError(f"{sequence.name}: expected one person for the table, found {count}")
-        seen, tracks, truth = [], list[Tracks](), []
+        seen, axes, truth = [], [], []
         for frame in frames:
             seen.append(observe(sequence, radio, frame, everything=everything))
-            seed = sub_seed(_SEED, sequence.name, radio, frame, "fit")
-            before = tracks[-1] if tracks else None
-            tracks.append(followed(before, seen[-1], TrainConfig(), seed))
+            axes.append(locate_bodies(pair_maps(seen[-1]), seen[-1].bounds_m, 1)[0])
             truth.append(np.asarray(sequence.joints(frame)[0], dtype=np.float64))
             on_frame()
         time_s = np.array([sequence.time_s(frame) for frame in frames])
-        axes_xy = np.array([track.axes_xy[0] for track in tracks])
-        lies = np.array([track.bodies.lies[0] for track in tracks])
-        return Person(list(frames), time_s, seen, axes_xy, lies, np.array(truth))
+        return Person(list(frames), time_s, seen, np.array(axes), np.array(truth))
 
     @property
     def headings(self) -> Float64[np.ndarray, "frame"]:
@@ -178,7 +170,7 @@ def _by_postures(person: Person, other: list[int], seed: int) -> dict[str, Joint
     found = {}
     with tqdm(total=len(rows) * looks(len(person.seen)), desc="seeking postures") as bar:
         for name, seen in rows.items():
-            told = tell_posture(seen, person.axes_xy, person.lies, seed, bar.update)
+            told = tell_posture(seen, person.axes_xy, seed, bar.update)
             if told is not None:
                 found[name] = _on_bodies(told.joints)
     return found

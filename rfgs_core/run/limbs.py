@@ -226,11 +226,9 @@ def _by_postures(
         return told
     on_frame = seeking(len(rest) * posture_looks(len(alone)))
     axes_xy = np.array([track.axes_xy for track in tracks])
-    lies = np.array([track.bodies.lies for track in tracks])
     found = list(told)
     for body in rest:
-        own = [frame[body] for frame in alone]
-        one = tell_posture(own, axes_xy[:, body], lies[:, body], seed, on_frame)
+        one = tell_posture([frame[body] for frame in alone], axes_xy[:, body], seed, on_frame)
         found[body] = None if one is None else one.joints
     return found
 

@@ -12,7 +12,6 @@ from scipy.spatial.transform import Rotation
 from rfgs_core.articulated import Body, Pose
 from rfgs_core.limbs.evidence.library import about_z, headings_of, over_origin
 from rfgs_core.seeds import sub_seed
-from rfgs_core.skeleton import JOINTS
 from rfgs_core.worlds.motion import random_motion
 
 #: Moments of each family. Those that differ most from each other have most.
@@ -30,12 +29,6 @@ SHARES = {
 }
 #: So many of the others count as like a pose.
 ALIKE = 12
-#: Eighths of a turn.
-DIRECTIONS = 8
-#: Who lies has a trunk that rises by less than this share of its length.
-_LEVEL = 0.5
-_SHOULDERS = [JOINTS.index(f"{side}_shoulder") for side in ("left", "right")]
-_HIPS = [JOINTS.index(f"{side}_hip") for side in ("left", "right")]
 
 
 @dataclass(frozen=True)
@@ -46,25 +39,6 @@ class PoseBook:
     """One for each page."""
     alike: Int64[np.ndarray, "page alike"]
     """Pages that are most like each, by mean distance of their joints, the nearest first."""
-    head_rad: Float64[np.ndarray, "page"]
-    """Of who lies, where the head points, from x towards y [rad]; NaN of everybody else."""
-
-    @property
-    def lying(self) -> Int64[np.ndarray, "lying"]:
-        """Pages of who lies."""
-        return np.flatnonzero(np.isfinite(self.head_rad))
-
-    def direction(self, page: int, heading: float) -> int:
-        """Which way a page faces once it is turned, in eighths of a turn.
-
-        Of who lies, which way the head points, by numbers of their own: on the back with the head
-        here and on the face with the head there somebody faces the same way.
-        """
-        head_rad = self.head_rad[page]
-        lies = bool(np.isfinite(head_rad))
-        way = heading + head_rad if lies else heading
-        eighth = int(way % (2.0 * np.pi) / (2.0 * np.pi) * DIRECTIONS) % DIRECTIONS
-        return eighth + DIRECTIONS * lies
 
     @staticmethod
     def of(body: Body, seed: int) -> PoseBook:
@@ -78,7 +52,7 @@ class PoseBook:
                 heading = float(headings_of(body.joints17(pose)[None])[0])
                 poses.append(pose.turned(about_z(-heading)))
                 joints.append(body.joints17(poses[-1]))
-        return PoseBook(poses, _alike(np.array(joints)), _heads(np.array(joints)))
+        return PoseBook(poses, _alike(np.array(joints)))
 
 
 def blend(one: Pose, other: Pose, share: float) -> Pose:
@@ -93,9 +67,3 @@ def _alike(joints: Float64[np.ndarray, "page 17 3"]) -> Int64[np.ndarray, "page 
     away = np.linalg.norm(joints[:, None] - joints[None], axis=3).mean(axis=2)
     np.fill_diagonal(away, np.inf)
     return np.argsort(away, axis=1)[:, :ALIKE].astype(np.int64)
-
-
-def _heads(joints: Float64[np.ndarray, "page 17 3"]) -> Float64[np.ndarray, "page"]:
-    trunk = joints[:, _SHOULDERS].mean(axis=1) - joints[:, _HIPS].mean(axis=1)
-    level = np.abs(trunk[:, 2]) < _LEVEL * np.linalg.norm(trunk, axis=1)
-    return np.where(level, np.arctan2(trunk[:, 1], trunk[:, 0]), np.nan)

@@ -26,15 +26,12 @@ from rfgs_core.worlds.figure import Figure
 
 #: Guesses that are drawn, and how far around the place that was found [m].
 DRAWN, AROUND_M = 400, 0.13
-#: Of who was told to lie, which share of guesses does, and how far around these are [m]: a bar is
-#: longer than a column, so its middle is found less surely.
-_LYING, _AROUND_LYING_M = 0.75, 0.5
 #: Generations: how many have offspring, how many each, how far these turn [rad] and move [m].
 GENERATIONS = ((48, 5, 0.26, 0.06), (36, 5, 0.16, 0.04), (24, 6, 0.1, 0.025), (12, 10, 0.07, 0.015))
 #: Later generations of guesses that frames take from their neighbours.
 LATER = GENERATIONS[2:]
-#: Each direction may have one in so many of the best of a generation.
-_SHARE = 6
+#: Directions that share the best of a generation evenly, and how many each may have at most.
+_DIRECTIONS, _SHARE = 8, 6
 #: How often offspring take a pose that is alike, and one on the way to another; else their own.
 _SWAPPED, _BLENDED = 0.35, 0.4
 #: How far on the way.
@@ -59,8 +56,6 @@ class Guess(NamedTuple):
     """Where it is on the ground [m]."""
     log: Float64[np.ndarray, "pair"]
     """Evidence of it, by device pair [nat]."""
-    direction: int
-    """Which way it faces, or lies: see `PoseBook`."""
 
     @property
     def score(self) -> float:
@@ -80,7 +75,6 @@ class FrameSearch:
         self,
         observations: Observations,
         axis_xy: Float64[np.ndarray, "2"],
-        lies: bool,
         figure: Figure,
         book: PoseBook,
         rng: np.random.Generator,
@@ -90,12 +84,10 @@ class FrameSearch:
         Args:
             observations: The frame, without the echoes of anybody else.
             axis_xy: Where the person was found [m].
-            lies: Whether it was told that they lie there.
             figure: A body with its facets.
             book: Poses to begin with.
             rng: Where chance comes from.
         """
-        self._lies = lies
         floor_m = float(observations.bounds_m[0, 2])
         centre = np.array([*axis_xy, floor_m + CENTRE_HEIGHT_M])
         self._figure, self._book, self._rng = figure, book, rng
@@ -114,21 +106,15 @@ class FrameSearch:
             log_evidence(pair.change, direct(body, pair, np.zeros(3)) + bounces, LEAST_NOISE)
             for pair, bounces in zip(self._pairs, self._bounces, strict=True)
         ]
-        direction = self._book.direction(page, heading)
-        return Guess(pose, page, heading, spot, np.array(log), direction)
+        return Guess(pose, page, heading, spot, np.array(log))
 
     def drawn(self) -> list[Guess]:
-        """Guesses out of the book, facing anywhere, around the place that was found.
-
-        Where it was told that somebody lies, most of them do, and are farther around.
-        """
+        """Guesses out of the book, facing anywhere, around the place that was found."""
         guesses = []
         for _ in range(DRAWN):
-            page, around_m = int(self._rng.integers(len(self._book.poses))), AROUND_M
-            if self._lies and self._rng.uniform() < _LYING:
-                page, around_m = int(self._rng.choice(self._book.lying)), _AROUND_LYING_M
+            page = int(self._rng.integers(len(self._book.poses)))
             heading = self._rng.uniform(0.0, 2.0 * np.pi)
-            spot = self._found + np.append(self._rng.normal(0.0, around_m, 2), 0.0)
+            spot = self._found + np.append(self._rng.normal(0.0, AROUND_M, 2), 0.0)
             guesses.append(self.guess(self._book.poses[page], page, heading, spot))
         return guesses
 
@@ -177,11 +163,11 @@ class FrameSearch:
 def spread_out(guesses: list[Guess], count: int) -> list[Guess]:
     """The likeliest, at most a share of them in each direction."""
     best: list[Guess] = []
-    taken: dict[int, int] = {}
+    taken = np.zeros(_DIRECTIONS, dtype=int)
     for guess in sorted(guesses, key=lambda guess: -guess.score):
-        so_far = taken.get(guess.direction, 0)
-        if so_far < max(count // _SHARE, 2):
-            taken[guess.direction] = so_far + 1
+        direction = int(guess.heading % (2.0 * np.pi) / (2.0 * np.pi) * _DIRECTIONS) % _DIRECTIONS
+        if taken[direction] < max(count // _SHARE, 2):
+            taken[direction] += 1
             best.append(guess)
         if len(best) == count:
             break

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from rfgs_core.articulated import people
 from rfgs_core.encode.body_maps import views_of
@@ -57,7 +57,6 @@ def looks(frames: int) -> int:
 def tell(
     seen: list[Observations],
     axes_xy: Float[np.ndarray, "frame 2"],
-    lies: Bool[np.ndarray, "frame"],
     seed: int = 0,
     on_frame: Callable[[], Any] = lambda: None,
 ) -> Told | None:
@@ -66,15 +65,14 @@ def tell(
     Args:
         seen: Frames in the order of time, without the echoes of anybody else.
         axes_xy: Where the person was found in each [m].
-        lies: In which it was told that they lie there.
         seed: Seed of the guesses.
         on_frame: Called as frames are done, twice each.
     """
     body = people().body(np.zeros(0))
     figure, book = figure_of(body, _WAVELENGTH_M), PoseBook.of(body, seed)
     searches = [
-        FrameSearch(one, np.asarray(xy, np.float64), bool(low), figure, book, _rng(seed, frame))
-        for frame, (one, xy, low) in enumerate(zip(seen, axes_xy, lies, strict=True))
+        FrameSearch(one, np.asarray(xy, np.float64), figure, book, _rng(seed, frame))
+        for frame, (one, xy) in enumerate(zip(seen, axes_xy, strict=True))
     ]
     alone = in_frames(
         lambda frame: searches[frame].bred(searches[frame].drawn()), len(seen), on_frame

@@ -18,11 +18,9 @@ from rfgs_core.limbs.postures.book import PoseBook, blend
 from rfgs_core.limbs.postures.chain import around, likeliest_path
 from rfgs_core.limbs.postures.search import FrameSearch, spread_out
 from rfgs_core.limbs.postures.tell import can_tell, tell
-from rfgs_core.skeleton import JOINTS
 from rfgs_core.worlds.motion import random_motion
 
 PLACE, HEADING = np.array([0.3, -0.2, 0.0]), 2.0
-UPRIGHT = np.array([False])
 
 
 @pytest.fixture(scope="module")
@@ -35,14 +33,6 @@ def small_book(body) -> PoseBook:
     """A few of each family."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(books, "SHARES", {"walk": 8, "stand": 4, "sit": 20, "squat": 6})
-        return PoseBook.of(body, 1)
-
-
-@pytest.fixture(scope="module")
-def lying_book(body) -> PoseBook:
-    """Most lie."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(books, "SHARES", {"stand": 4, "lie": 24, "sit": 8})
         return PoseBook.of(body, 1)
 
 
@@ -81,14 +71,7 @@ def test_a_blend_is_on_the_way(body, small_book) -> None:
 
 def test_the_best_of_few_directions_do_not_crowd_out_the_others(body, small_book, heard) -> None:
     guesses = [
-        searching.Guess(
-            small_book.poses[0],
-            0,
-            heading,
-            PLACE,
-            np.array([float(score)]),
-            small_book.direction(0, heading),
-        )
+        searching.Guess(small_book.poses[0], 0, heading, PLACE, np.array([float(score)]))
         for score, heading in enumerate([0.1, 0.1, *np.full(40, 3.0)])
     ]
     best = spread_out(guesses, 12)
@@ -105,8 +88,7 @@ def test_who_sits_is_told(heard, walker_joints, seated, body, small_book, monkey
     frame = heard(seated, HEADING, PLACE)
     done: list[int] = []
     assert can_tell(frame)
-    off = PLACE[None, :2] + [0.06, -0.05]
-    told = tell([frame], off, UPRIGHT, 3, lambda: done.append(1))
+    told = tell([frame], PLACE[None, :2] + [0.06, -0.05], 3, lambda: done.append(1))
     assert told is not None and told.lead > 100.0
     assert len(done) == telling.looks(1)
     truth = walker_joints(seated) @ about_z(HEADING).T + PLACE
@@ -126,40 +108,12 @@ def test_chance_comes_from_the_seed_alone(heard, seated, body, small_book, monke
 
     def scores(seed: int) -> list[float]:
         rng = np.random.default_rng(seed)
-        search = FrameSearch(frame, PLACE[:2], False, figure, small_book, rng)
+        search = FrameSearch(frame, PLACE[:2], figure, small_book, rng)
         return [guess.score for guess in search.bred(search.drawn(), ((2, 2, 0.1, 0.02),))]
 
     first = scores(1)
     assert first == sorted(first, reverse=True) and len(first) == 7
     assert scores(1) == first and scores(2) != first
-
-
-def test_guesses_reach_who_lies_farther_around(heard, walker_body, body, lying_book) -> None:
-    """A bar was told 0.6 m from where somebody lies: some guess is near them if that is said."""
-    frame, figure = heard(upright(walker_body), HEADING, PLACE), figure_of(body, 0.14)
-
-    def nearest(lies: bool) -> float:
-        rng, off = np.random.default_rng(3), PLACE[:2] + np.array([0.5, -0.35])
-        search = FrameSearch(frame, off, lies, figure, lying_book, rng)
-        spots = [one.spot for one in search.drawn() if one.page in lying_book.lying]
-        return float(np.linalg.norm(np.array(spots) - PLACE, axis=1).min())
-
-    assert nearest(True) < 0.1
-    assert nearest(False) > 0.2
-
-
-def test_both_ends_of_who_lies_are_tried(body, lying_book) -> None:
-    """Directions are those of the head, so that neither end crowds out the other."""
-    assert 16 <= len(lying_book.lying) <= 24
-    for page in lying_book.lying:
-        joints = body.joints17(lying_book.poses[page].turned(about_z(0.7)))
-        head = joints[JOINTS.index("head")] - joints[0]
-        way = np.arctan2(head[1], head[0]) % (2.0 * np.pi) / (2.0 * np.pi) * 8
-        off = (lying_book.direction(page, 0.7) - 8 - (way - 0.5) + 4) % 8 - 4
-        assert abs(off) < 1.0
-        assert abs(lying_book.direction(page, 0.7) - lying_book.direction(page, 0.7 + np.pi)) == 4
-    upright_pages = np.setdiff1d(np.arange(len(lying_book.poses)), lying_book.lying)
-    assert {lying_book.direction(page, 0.1) for page in upright_pages} == {0}
 
 
 def test_who_stands_is_left_to_the_prior(heard, walker_body, small_book, monkeypatch) -> None:
@@ -170,7 +124,7 @@ def test_who_stands_is_left_to_the_prior(heard, walker_body, small_book, monkeyp
     monkeypatch.setattr(telling, "LATER", few)
     monkeypatch.setattr(PoseBook, "of", lambda *_: small_book)
     seen = [heard(upright(walker_body), HEADING, PLACE)]
-    assert tell(seen, PLACE[None, :2], UPRIGHT) is None
+    assert tell(seen, PLACE[None, :2]) is None
 
 
 def test_one_radar_is_too_few(heard, seated) -> None:

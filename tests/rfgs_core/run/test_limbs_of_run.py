@@ -148,11 +148,10 @@ def test_who_does_not_walk_may_do_something_else(
     upright = body.joints17(Pose(body.heads[0], body.neutral))
 
     def tell_posture(
-        seen: list, axes_xy: np.ndarray, lies: np.ndarray, seed: int, on_frame: Callable
+        seen: list, axes_xy: np.ndarray, seed: int, on_frame: Callable
     ) -> Posture | None:
         nonlocal asked
         asked += 1
-        assert lies.tolist() == [False] * len(seen)
         xyz = upright + np.column_stack([axes_xy, np.full(len(axes_xy), -0.4)])[:, None, None]
         return Posture(Joints(xyz, np.full((len(seen), 1, 17), 0.07)), 90.0) if told else None
 

@@ -220,17 +220,17 @@ def _by_postures(
     seed: int,
     seeking: Callable[[int], Callable[[], Any]],
 ) -> list[Joints | None]:
-    """Joints of each person in all frames, as `told` where a walk is; None of whom nothing is."""
-    rest = [body for body, joints in enumerate(told) if joints is None]
-    if not rest or not can_tell(alone[0][0]):
+    """Joints in all frames, as `told` where a walk is; None of whom nothing is.
+
+    Of several people nobody is posed this way: what is left of the others' echoes poses them
+    worse than the prior has them (`two_crossing`).
+    """
+    if len(told) > 1 or told[0] is not None or not can_tell(alone[0][0]):
         return told
-    on_frame = seeking(len(rest) * posture_looks(len(alone)))
-    axes_xy = np.array([track.axes_xy for track in tracks])
-    found = list(told)
-    for body in rest:
-        one = tell_posture([frame[body] for frame in alone], axes_xy[:, body], seed, on_frame)
-        found[body] = None if one is None else one.joints
-    return found
+    on_frame = seeking(posture_looks(len(alone)))
+    axes_xy = np.array([track.axes_xy[0] for track in tracks])
+    one = tell_posture([frame[0] for frame in alone], axes_xy, seed, on_frame)
+    return [None if one is None else one.joints]
 
 
 def _by_network(

@@ -210,7 +210,8 @@ def test_of_two_people_one_walks_and_the_other_stands(
     monkeypatch.setattr(weights, "OWN", tmp_path / "none")
     monkeypatch.setattr(limbs_of_run, "long_enough", lambda time_s: True)
     monkeypatch.setattr(limbs_of_run, "tell", tell)
-    monkeypatch.setattr(limbs_of_run, "tell_posture", lambda *_: None)
+    monkeypatch.setattr(limbs_of_run, "can_tell", lambda _: True)
+    monkeypatch.setattr(limbs_of_run, "tell_posture", lambda *_: pytest.fail("of two people"))
     data, out = open_dataset(tiny_dataset), tmp_path / "run"
     train_sequence(data, data.sequence(), "wifi", [1, 2], CONFIG, out, people=2)
     limbs = read_limbs(out)

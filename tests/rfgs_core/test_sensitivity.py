@@ -159,6 +159,7 @@ def test_a_setup_is_kept_and_its_rows_tell_who_is_best(
         ("--radio lidar", "unknown radio 'lidar'"),
         ("--radio sar", "--radio sar: expected antennas that stand still"),
         ("--scene kitchen", "--scene kitchen: expected one of living_room_walk"),
+        ("--scene street --sweeps walls", "--sweeps walls: street has none; expected some of b"),
         ("--workers 0", "--workers 0: expected 1 to 256"),
     ],
 )

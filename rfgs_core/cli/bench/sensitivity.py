@@ -53,6 +53,7 @@ class Sensitivity:
             RfgsError: An option is out of range, or there are no workers.
         """
         from rfgs_core.device import need_device
+        from rfgs_core.errors import RfgsError
         from rfgs_core.study.sensitivity import SetupPart, every_setup, stored, sweeps
         from rfgs_core.study.sensitivity_rows import sweep_rows, sweep_table
 
@@ -60,6 +61,11 @@ class Sensitivity:
         need_folder(self.out)
         spread = self.spread.checked()
         every = sweeps(self.radio, self.scene, self.seed)
+        for name in self.sweeps:
+            if name not in every:
+                raise RfgsError(
+                    f"--sweeps {name}: {self.scene} has none; expected some of {', '.join(every)}"
+                )
         chosen = {name: every[name] for name in self.sweeps or every}
         parts = [SetupPart(setup, self.device) for setup in every_setup(chosen)]
         results: dict[Setup, Mapping[str, Any]] = {}

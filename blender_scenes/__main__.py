@@ -34,13 +34,20 @@ def main(arguments: list[str] | None = None) -> int:
     bodies = commands.add_parser("bodies", help="build the shape space of rfgs_core.articulated")
     bodies.add_argument("--out", type=Path, help="where to; default: into the package")
     record = commands.add_parser(
-        "recording", help="build a room in which one of our people plays motion capture (.bvh)"
+        "recording", help="build a room in which one of our people plays motion capture"
     )
-    record.add_argument("bvh", type=Path, help="the recording; any rig of a person, any unit")
+    record.add_argument(
+        "recording",
+        type=Path,
+        help="a .bvh of any rig of a person, any unit; or a clip of DeepMimic's format (.txt)",
+    )
     record.add_argument("--out", type=Path, required=True, help="the .blend to write")
     record.add_argument("--person", default="emma", help="who plays it (emma)")
     record.add_argument("--fps", type=int, default=10, help="frames per second (10)")
     record.add_argument("--up", choices=("y", "z"), default="y", help="axis that is up (y)")
+    record.add_argument(
+        "--repeat", type=int, default=1, help="how many times, for a cycle of steps (1)"
+    )
     world = commands.add_parser(
         "world", help="build a random world of `rfgs-factory worlds` as a scene to look at"
     )
@@ -102,20 +109,28 @@ def _sheet(out: Path, size_px: int, samples: int) -> int:
 
 
 def _recording(args: argparse.Namespace) -> int:
-    if not args.bvh.is_file() or not 1 <= args.fps <= 240:
-        wrong = f"{args.bvh}: no such file" if args.fps in range(1, 241) else f"--fps {args.fps}"
-        sys.stderr.write(f"error: {wrong}; expected a .bvh file and 1 to 240 frames per second\n")
+    from addon_rfgs.errors import AddonError
+
+    problem = ""
+    if not args.recording.is_file():
+        problem = f"{args.recording}: no such file; expected a .bvh file or a clip"
+    elif not 1 <= args.fps <= 240:
+        problem = f"--fps {args.fps}: expected 1 to 240 frames per second"
+    elif not 1 <= args.repeat <= 100:
+        problem = f"--repeat {args.repeat}: expected 1 to 100 times"
+    if problem:
+        sys.stderr.write(f"error: {problem}\n")
         return 2
 
     def work(out: Path) -> None:
         from blender_scenes.recording import build
 
-        frames = build(args.bvh, out, args.person, args.fps, args.up)
+        frames = build(args.recording, out, args.person, args.fps, args.up, args.repeat)
         sys.stdout.write(f"{frames} frames of {args.person}; next: rfgs-factory check {out}\n")
 
     try:
         return _write(work, args.out)
-    except ValueError as error:
+    except (AddonError, ValueError) as error:
         sys.stderr.write(f"error: {error}\n")
         return 2
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds a scene around motion capture: one of our people plays a .bvh in a room that fits."""
+"""Builds a scene around motion capture: one of our people plays it in a room that fits."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ import bpy
 import numpy as np
 
 from blender_scenes.assemble import Folders, save_scene, watch
-from blender_scenes.motion.bvh import Bvh, read_bvh
+from blender_scenes.motion.bvh import read_bvh
+from blender_scenes.motion.clip import read_clip
 from blender_scenes.motion.recorded import Recorded, retarget
+from blender_scenes.motion.recording import Recording
 from blender_scenes.motion.score import Figure, Posture, Score, compose
 from blender_scenes.people.cast import PEOPLE, Actor, cast, key_score
 from blender_scenes.sets.lighting import COOL, ceiling_row
@@ -22,59 +24,66 @@ from blender_scenes.stage import add_access_points, around_room, corners
 MARGIN_M, HEADROOM_M = 1.2, 0.6
 #: No room is smaller [m], and none larger: beyond it the unit of the file was meant otherwise.
 SMALLEST_M, LARGEST_M = (4.0, 4.0, 2.7), 40.0
+#: Names of clips of DeepMimic's format end so; others are BVH.
+CLIPS = (".txt", ".json")
 #: Frames of a scene, at most.
 MOST_FRAMES = 10_000
 
 
-def build(recording: Path, out: Path, person: str, fps: int, up: str) -> int:
+def build(path: Path, out: Path, person: str, fps: int, up: str, repeat: int) -> int:
     """Builds the scene and saves it, compressed, as `out`.
 
     Args:
-        recording: The .bvh; its limbs' lengths do not matter, nor does its unit.
+        path: A .bvh, whose limbs' lengths do not matter, nor does its unit, or a clip of
+            DeepMimic's format (.txt, .json).
         out: The .blend to write.
         person: Who plays it, one of `PEOPLE`.
         fps: Frames per second of the scene.
         up: Axis that is up in the file, `y` or `z`.
+        repeat: How many times it is played, each from where the last one ended.
 
     Returns:
         Number of frames.
 
     Raises:
-        ValueError: The recording is no BVH of a person, or is too long or goes too far; or there
-            is no such person.
+        ValueError: The file is no recording of a person, is too long or goes too far; or there is
+            no such person.
     """
     if person not in PEOPLE:
         raise ValueError(f"no person {person!r}; there are: {', '.join(PEOPLE)}")
-    bvh = read_bvh(recording)
-    frames = 1 + int(np.ceil(bvh.frame_s * (len(bvh.root) - 1) * fps))
+    read = read_clip if path.suffix in CLIPS else read_bvh
+    recording = read(path).repeated(repeat, up)
+    frames = 1 + int(np.ceil(recording.frame_s * (len(recording.root) - 1) * fps))
     if not 2 <= frames <= MOST_FRAMES:
         raise ValueError(
-            f"{recording}: {frames} frames at {fps} fps; expected 2 to {MOST_FRAMES}, choose "
+            f"{path}: {frames} frames at {fps} fps; expected 2 to {MOST_FRAMES}, choose "
             "another --fps or cut the recording"
         )
 
     def fill(scene: bpy.types.Scene, folders: Folders) -> None:
         actor = cast(PEOPLE[person], folders["Person"])
-        score, size_m = _staged(actor.figure, bvh, recording, up)
+        score, size_m = _staged(actor.figure, recording, path, up)
         key_score(actor, score, fps, 1, frames)
         _surround(scene, folders, actor, size_m)
 
-    save_scene(out, recording.stem, frames, fps, fill)
+    save_scene(out, path.stem, frames, fps, fill)
     return frames
 
 
 def _staged(
-    figure: Figure, bvh: Bvh, recording: Path, up: str
+    figure: Figure, recording: Recording, path: Path, up: str
 ) -> tuple[Score, tuple[float, float, float]]:
     """The recording in the middle of a room, and the size of that room [m]."""
-    joints = np.array([figure.skeleton.joints(pose) for pose in retarget(bvh, figure.skeleton, up)])
+    joints = np.array(
+        [figure.skeleton.joints(pose) for pose in retarget(recording, figure.skeleton, up)]
+    )
     reach = np.ptp(joints.reshape(-1, 3), axis=0)
     if not (np.isfinite(reach).all() and reach[:2].max() < LARGEST_M - 2.0 * MARGIN_M):
         raise ValueError(
-            f"{recording}: goes {reach[:2].max():.3g} m far; expected less than "
+            f"{path}: goes {reach[:2].max():.3g} m far; expected less than "
             f"{LARGEST_M - 2.0 * MARGIN_M:g} m"
         )
-    piece = Recorded(bvh, "recorded", up)
+    piece = Recorded(recording, "recorded", up)
     there = compose(figure, Posture((0.0, 0.0), 0.0), [piece])
     times = np.linspace(0.0, there.duration_s, max(2, int(25 * there.duration_s)))
     places = np.array([figure.skeleton.joints(there.pose(float(t))) for t in times])

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from blender_scenes.motion.recording import Recording
 from blender_scenes.motion.rotations import about_x, about_y, about_z
 
 _ABOUT = {"Xrotation": about_x, "Yrotation": about_y, "Zrotation": about_z}
@@ -21,33 +21,7 @@ _MOST_BYTES, _MOST_JOINTS, _MOST_TURNS, _LONGEST_S = 2**27, 1000, 5_000_000, 10.
 _SHOWN = 40
 
 
-@dataclass(frozen=True)
-class Bvh:
-    """A recorded skeleton and its motion, in the axes and units of the file."""
-
-    joints: tuple[str, ...]
-    """Names, parents before children."""
-    parents: tuple[int, ...]
-    """Index of each joint's parent, -1 for the root."""
-    offsets: np.ndarray
-    """From the parent to each joint at rest, shape (J, 3)."""
-    turns: np.ndarray
-    """Rotation of each joint against its parent, shape (F, J, 3, 3)."""
-    root: np.ndarray
-    """Position of the root, shape (F, 3)."""
-    frame_s: float
-    """Time from frame to frame [s]."""
-
-    def world_turns(self) -> np.ndarray:
-        """Rotation of each joint against its rest, in the axes of the file, (F, J, 3, 3)."""
-        out = self.turns.copy()
-        for index, parent in enumerate(self.parents):
-            if parent >= 0:
-                out[:, index] = out[:, parent] @ self.turns[:, index]
-        return out
-
-
-def read_bvh(path: Path) -> Bvh:
+def read_bvh(path: Path) -> Recording:
     """Reads a BVH file.
 
     Raises:
@@ -78,7 +52,7 @@ def read_bvh(path: Path) -> Bvh:
                 angles = np.radians(values[:, column])
                 turns[:, joint] @= np.stack([_ABOUT[name](angle) for angle in angles])
             column += 1
-    return Bvh(tuple(names), tuple(parents), np.array(offsets), turns, root, frame_s)
+    return Recording(tuple(names), tuple(parents), np.array(offsets), turns, root, frame_s)
 
 
 def _hierarchy(

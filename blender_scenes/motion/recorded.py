@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from blender_scenes.motion.bvh import Bvh
 from blender_scenes.motion.gait import facing
 from blender_scenes.motion.gestures import minimum_jerk
+from blender_scenes.motion.recording import Recording
 from blender_scenes.motion.rotations import about, about_x, about_z
 from blender_scenes.motion.score import Clip, Figure, Posture
 from blender_scenes.motion.skeleton import Pose, Skeleton
@@ -68,13 +69,15 @@ def _bare(name: str) -> str:
     return re.sub(r"[ ._]", "", name).lower()
 
 
-def match_joints(bvh: Bvh) -> dict[str, int]:
+def match_joints(recording: Recording) -> dict[str, int]:
     """Which recorded joint stands for each of our bones.
 
     Raises:
         ValueError: Hips, thighs or shins are not among the joints.
     """
-    known = {plain_name(joint): index for index, joint in reversed(list(enumerate(bvh.joints)))}
+    known = {
+        plain_name(joint): index for index, joint in reversed(list(enumerate(recording.joints)))
+    }
     found: dict[str, int] = {}
     for bone, names in _NAMES.items():
         paired = bone in (*_LIMBS, "clavicle", "wrist", "toe1-1")
@@ -85,20 +88,20 @@ def match_joints(bvh: Bvh) -> dict[str, int]:
     missing = [bone for bone in _NEEDED if bone not in found]
     if missing:
         raise ValueError(
-            f"expected joints of a person; none of {', '.join(bvh.joints)[:400]} is "
+            f"expected joints of a person; none of {', '.join(recording.joints)[:400]} is "
             f"{' or '.join(missing)}"
         )
     return found
 
 
-def retarget(bvh: Bvh, skeleton: Skeleton, up: str = "y") -> list[Pose]:
+def retarget(recording: Recording, skeleton: Skeleton, up: str = "y") -> list[Pose]:
     """One pose per recorded frame, for a body of other proportions.
 
     Limbs point where the recorded ones do; trunk, head, hands and feet turn from their rest pose
     as the recorded ones turn from theirs. The way is scaled by the length of the legs.
 
     Args:
-        bvh: The recording.
+        recording: The recording.
         skeleton: The body that shall move so.
         up: Axis that is up in the file: `y`, with people who look along +z at rest, or `z`,
             with people who look along -y.
@@ -106,20 +109,33 @@ def retarget(bvh: Bvh, skeleton: Skeleton, up: str = "y") -> list[Pose]:
     Raises:
         ValueError: The recording's joints are not those of a person.
     """
-    joints = match_joints(bvh)
+    joints = match_joints(recording)
     axes = {"y": about_x(0.5 * np.pi), "z": np.eye(3)}[up]
-    world = np.einsum("ij,fbjk,lk->fbil", axes, bvh.world_turns(), axes)
-    corrections = {bone: _correction(bvh, skeleton, joints, axes, bone) for bone in joints}
-    scale = _leg_m(skeleton) / _recorded_leg(bvh, joints)
+    world = np.einsum("ij,fbjk,lk->fbil", axes, recording.world_turns(), axes)
+    corrections = {bone: _correction(recording, skeleton, joints, axes, bone) for bone in joints}
+    scale = _leg_m(skeleton) / _recorded_leg(recording, joints)
+    hips = scale * _hips(recording, joints) @ axes.T
+    to_hips = _middle(skeleton.head, "upperleg01") - skeleton.head("root")
     poses = []
-    for frame in range(len(bvh.root)):
+    for frame in range(len(recording.root)):
         turns = {bone: world[frame, joint] @ corrections[bone] for bone, joint in joints.items()}
-        poses.append(Pose(scale * axes @ bvh.root[frame], turns))
+        # Rigs begin above their hips or between them: what the legs hang from is put in place.
+        poses.append(Pose(hips[frame] - turns["root"] @ to_hips, turns))
     return poses
 
 
+def _hips(recording: Recording, joints: dict[str, int]) -> np.ndarray:
+    """Middle between the recorded hips, in the axes and units of the file, shape (F, 3)."""
+    places = recording.places()
+    return 0.5 * (places[:, joints["upperleg01.L"]] + places[:, joints["upperleg01.R"]])
+
+
+def _middle(head: Callable[[str], np.ndarray], bone: str) -> np.ndarray:
+    return 0.5 * (head(f"{bone}.L") + head(f"{bone}.R"))
+
+
 def _correction(
-    bvh: Bvh, skeleton: Skeleton, joints: dict[str, int], axes: np.ndarray, bone: str
+    recording: Recording, skeleton: Skeleton, joints: dict[str, int], axes: np.ndarray, bone: str
 ) -> np.ndarray:
     """Rotation from our rest pose to the recorded one for a limb; nothing for other bones."""
     plain, _, side = bone.partition(".")
@@ -129,7 +145,7 @@ def _correction(
     # Between two joints the recording may have others: twist bones, a second neck.
     recorded, joint = np.zeros(3), joints[child]
     while joint >= 0 and joint != joints[bone]:
-        recorded, joint = recorded + bvh.offsets[joint], bvh.parents[joint]
+        recorded, joint = recorded + recording.offsets[joint], recording.parents[joint]
     recorded = axes @ recorded
     ours = skeleton.head(child) - skeleton.head(bone)
     axis = np.cross(ours, recorded)
@@ -145,14 +161,14 @@ def _leg_m(skeleton: Skeleton) -> float:
     return float((thigh + np.linalg.norm(legs.ankle - legs.knee, axis=1)).mean())
 
 
-def _recorded_leg(bvh: Bvh, joints: dict[str, int]) -> float:
+def _recorded_leg(recording: Recording, joints: dict[str, int]) -> float:
     """Mean length of the recorded legs, in units of the file."""
     total = 0.0
     for side in "LR":
         joint = joints.get(f"foot.{side}", joints[f"lowerleg01.{side}"])
         while joint >= 0 and joint != joints[f"upperleg01.{side}"]:
-            total += float(np.linalg.norm(bvh.offsets[joint]))
-            joint = bvh.parents[joint]
+            total += float(np.linalg.norm(recording.offsets[joint]))
+            joint = recording.parents[joint]
     return 0.5 * total
 
 
@@ -164,8 +180,8 @@ class Recorded:
     at both ends it is blended with standing.
     """
 
-    bvh: Bvh
-    """What `read_bvh` returned."""
+    recording: Recording
+    """What was read."""
     label: str
     """Name of the action."""
     up: str = "y"
@@ -177,7 +193,7 @@ class Recorded:
         """See `Piece`."""
         if start.kind != "stand":
             raise ValueError(f"expected to play {self.label} from standing, not: {start.kind}")
-        poses = retarget(self.bvh, figure.skeleton, self.up)
+        poses = retarget(self.recording, figure.skeleton, self.up)
         shift = about_z(start.heading_rad - _heading(poses[0]))
         origin = poses[0].root * [1.0, 1.0, 0.0]
         place = np.array([*start.place_m, start.floor_m])
@@ -193,10 +209,10 @@ class Recorded:
             start, place_m=(float(last.root[0]), float(last.root[1])), heading_rad=_heading(last)
         )
         first_rest, last_rest = start.pose(figure), end.pose(figure)
-        duration_s = self.bvh.frame_s * (len(poses) - 1)
+        duration_s = self.recording.frame_s * (len(poses) - 1)
 
         def pose(time_s: float) -> Pose:
-            index = min(time_s / self.bvh.frame_s, len(poses) - 1.0)
+            index = min(time_s / self.recording.frame_s, len(poses) - 1.0)
             low = min(int(index), max(len(poses) - 2, 0))
             high = min(low + 1, len(poses) - 1)
             made = figure.skeleton.blend(poses[low], poses[high], index - low)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,8 @@ MARGIN_M = 1.2
     ("recording", "more", "message"),
     [
         ("none.bvh", [], "none.bvh: no such file"),
-        ("text.bvh", ["--fps", "0"], "--fps 0; expected"),
+        ("text.bvh", ["--fps", "0"], "--fps 0: expected 1 to 240"),
+        ("text.bvh", ["--repeat", "0"], "--repeat 0: expected 1 to 100"),
     ],
 )
 def test_what_cannot_be_asked_for_is_one_line(
@@ -67,4 +69,41 @@ def test_what_is_no_recording_of_a_person_is_refused(python, tmp_path: Path) -> 
     done = python("-m", "blender_scenes", "recording", recording, "--out", out)
     assert done.returncode == 2 and not out.exists()
     assert f"error: {recording}: expected HIERARCHY and MOTION" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.slow
+def test_a_clip_is_played_as_often_as_asked(python, tmp_path: Path) -> None:
+    """Somebody who walks half a metre a cycle along x, three times."""
+    rows = []
+    for share in np.linspace(0.0, 1.0, 11):
+        row = [0.1, 0.5 * share, 0.9, 0.0]
+        for width in (4, 4, 4, 4, 1, 4, 4, 1, 4, 1, 4, 4, 1):
+            row += [1.0, 0.0, 0.0, 0.0] if width == 4 else [0.0]
+        rows.append(row)
+    clip = tmp_path / "cycle.txt"
+    clip.write_text(json.dumps({"Loop": "wrap", "Frames": rows}))
+    blend, out = tmp_path / "scene.blend", tmp_path / "bundle"
+    python(
+        *("-m", "blender_scenes", "recording", clip, "--out", blend, "--repeat", "3"),
+        must_work=True,
+    )
+    python("-m", "addon_rfgs", "--blend", blend, "export", "--out", out, must_work=True)
+    bundle = read_bundle(out)
+    assert len(bundle.frames) == 31
+    first, last = (
+        bundle.frame(frame).vertices for frame in bundle.frames[:: len(bundle.frames) - 1]
+    )
+    way_m = np.linalg.norm((last - first).mean(axis=0)[:2])
+    # The way is that of longer or shorter legs.
+    assert 1.2 < way_m < 1.8
+
+
+@pytest.mark.slow
+def test_what_is_no_clip_of_a_person_is_refused(python, tmp_path: Path) -> None:
+    clip, out = tmp_path / "dog.txt", tmp_path / "scene.blend"
+    clip.write_text(json.dumps({"Loop": "wrap", "Frames": [[0.1] * 20] * 3}))
+    done = python("-m", "blender_scenes", "recording", clip, "--out", out)
+    assert done.returncode == 2 and not out.exists()
+    assert f"error: {clip}: expected frames of 44 numbers" in done.stderr
     assert "Traceback" not in done.stderr

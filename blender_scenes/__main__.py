@@ -109,7 +109,7 @@ def _sheet(out: Path, size_px: int, samples: int) -> int:
 
 
 def _recording(args: argparse.Namespace) -> int:
-    from addon_rfgs.errors import AddonError
+    from rfgs_core.errors import RfgsError
 
     problem = ""
     if not args.recording.is_file():
@@ -130,7 +130,7 @@ def _recording(args: argparse.Namespace) -> int:
 
     try:
         return _write(work, args.out)
-    except (AddonError, ValueError) as error:
+    except (RfgsError, ValueError) as error:
         sys.stderr.write(f"error: {error}\n")
         return 2
 

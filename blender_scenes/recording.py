@@ -9,23 +9,19 @@ import bpy
 import numpy as np
 
 from blender_scenes.assemble import Folders, save_scene, watch
-from blender_scenes.motion.bvh import read_bvh
-from blender_scenes.motion.clip import read_clip
-from blender_scenes.motion.recorded import Recorded, retarget
-from blender_scenes.motion.recording import Recording
+from blender_scenes.motion.recorded import Recorded
 from blender_scenes.motion.score import Figure, Posture, Score, compose
 from blender_scenes.people.cast import PEOPLE, Actor, cast, key_score
 from blender_scenes.sets.lighting import COOL, ceiling_row
 from blender_scenes.sets.room import Room
 from blender_scenes.sets.shell import Shell, Wall, door
 from blender_scenes.stage import add_access_points, around_room, corners
+from rfgs_core.motion_capture import Recording, read_recording
 
 #: From what a joint reaches to the walls and to the ceiling [m].
 MARGIN_M, HEADROOM_M = 1.2, 0.6
 #: No room is smaller [m], and none larger: beyond it the unit of the file was meant otherwise.
 SMALLEST_M, LARGEST_M = (4.0, 4.0, 2.7), 40.0
-#: Names of clips of DeepMimic's format end so; others are BVH.
-CLIPS = (".txt", ".json")
 #: Frames of a scene, at most.
 MOST_FRAMES = 10_000
 
@@ -46,13 +42,12 @@ def build(path: Path, out: Path, person: str, fps: int, up: str, repeat: int) ->
         Number of frames.
 
     Raises:
-        ValueError: The file is no recording of a person, is too long or goes too far; or there is
-            no such person.
+        RfgsFormatError: The file is no recording of a person, or is damaged.
+        ValueError: It is too long or goes too far; or there is no such person.
     """
     if person not in PEOPLE:
         raise ValueError(f"no person {person!r}; there are: {', '.join(PEOPLE)}")
-    read = read_clip if path.suffix in CLIPS else read_bvh
-    recording = read(path).repeated(repeat, up)
+    recording = read_recording(path).repeated(repeat, up)
     frames = 1 + int(np.ceil(recording.frame_s * (len(recording.root) - 1) * fps))
     if not 2 <= frames <= MOST_FRAMES:
         raise ValueError(

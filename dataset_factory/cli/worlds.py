@@ -7,7 +7,7 @@ import logging
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import tyro
 
@@ -15,6 +15,7 @@ from dataset_factory.plan.tracers import TracerName
 from rfgs_core.errors import RfgsError
 
 if TYPE_CHECKING:
+    from rfgs_core.worlds.motion import KeptRecording
     from rfgs_core.worlds.settings_file import Pictures
 
 
@@ -53,8 +54,13 @@ class WorldsArgs:
     people: str = "1:2"
     """Fewest and most people, up to 4."""
     motion: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
-    """What people do, as in walk, sit, fall or gesture; repeat the option for several; default:
-    anything."""
+    """What people do, as in walk, sit, fall or gesture, or recorded; repeat the option for several;
+    default: anything, or what was recorded if --recording is given."""
+    recording: tyro.conf.UseAppendAction[tuple[Path, ...]] = ()
+    """Motion capture that people play on bodies of their own: a .bvh of any rig of a person, or a
+    clip in DeepMimic's format (.txt); repeat the option for several."""
+    up: Literal["y", "z"] = "y"
+    """Axis that is up in the recordings."""
     depth: int = 2
     """Interactions of a path that meets a person: 1 the person alone, 2 also one wall, 3 two."""
     seed: int = 0
@@ -83,7 +89,7 @@ def run(args: WorldsArgs) -> int:
     from rfgs_core.links import filled
     from rfgs_core.past import count_in_words
     from rfgs_core.schedule.spread import Spread
-    from rfgs_core.worlds.motion import FAMILIES
+    from rfgs_core.worlds.motion import FAMILIES, RECORDED
     from rfgs_core.worlds.settings_file import WorldsFile
     from rfgs_core.worlds.world import WorldSettings
 
@@ -102,7 +108,8 @@ def run(args: WorldsArgs) -> int:
         fps=args.fps,
         people=parse_people(args.people),
         depth=args.depth,
-        families=args.motion or FAMILIES,
+        families=args.motion or ((RECORDED,) if args.recording else FAMILIES),
+        recordings=tuple(kept_recording(path, args.up) for path in args.recording),
     )
     settings.check()
     shared = WorldsFile(radio, settings, args.seed, _pictures(args), args.tracer)
@@ -131,6 +138,22 @@ def _pictures(args: WorldsArgs) -> Pictures | None:
         if not low <= getattr(args, name) <= high:
             raise RfgsError(f"--{name} {getattr(args, name)}: expected {low} to {high}")
     return Pictures(args.cameras, args.resolution, args.samples)
+
+
+def kept_recording(path: Path, up: str) -> KeptRecording:
+    """A file of motion capture, to be kept with the worlds.
+
+    Raises:
+        RfgsError: It is missing, or no recording of a person.
+    """
+    from rfgs_core.motion_capture import read_recording
+    from rfgs_core.worlds.motion import KeptRecording
+
+    if not path.is_file():
+        raise RfgsError(f"{path}: no such file; expected a .bvh or a clip in DeepMimic's format")
+    kept = KeptRecording.of(path.name, read_recording(path), up)
+    kept.check()
+    return kept
 
 
 def parse_people(text: str) -> tuple[int, int]:

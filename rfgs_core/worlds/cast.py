@@ -13,7 +13,14 @@ from rfgs_core.articulated.bones import BONE_OF_JOINT, PARENTS
 from rfgs_core.errors import RfgsError
 from rfgs_core.skeleton import JOINTS
 from rfgs_core.worlds.furniture import Setting
-from rfgs_core.worlds.motion import FAMILIES, Motion, random_motion
+from rfgs_core.worlds.motion import (
+    FAMILIES,
+    RECORDED,
+    KeptRecording,
+    Motion,
+    random_motion,
+    recorded_motion,
+)
 from rfgs_core.worlds.motion.curves import Z, about
 from rfgs_core.worlds.motion.motion import RATE_HZ
 from rfgs_core.worlds.props import Prop, props_of
@@ -74,6 +81,7 @@ def cast_of(
     count: int,
     lasts_s: float,
     families: tuple[str, ...] = FAMILIES,
+    recordings: tuple[KeptRecording, ...] = (),
 ) -> list[Actor]:
     """People who find room for what they do; takes their places on the floor.
 
@@ -83,6 +91,7 @@ def cast_of(
         count: How many people.
         lasts_s: How long the world lasts [s].
         families: What they may do.
+        recordings: What those do whose family is `recorded`.
 
     Raises:
         RfgsError: Somebody finds no room.
@@ -90,7 +99,7 @@ def cast_of(
     actors = []
     for _ in range(count):
         body = people().random(rng, child=bool(rng.random() < _CHILDREN))
-        actor = placed(rng, setting, body, lasts_s, families)
+        actor = placed(rng, setting, body, lasts_s, families, recordings)
         if actor is None:
             raise RfgsError(
                 f"no room for {count} people in {np.ptp(setting.bounds_m, axis=0).round(1)} m"
@@ -105,6 +114,7 @@ def placed(
     body: Body,
     lasts_s: float,
     families: tuple[str, ...],
+    recordings: tuple[KeptRecording, ...] = (),
 ) -> Actor | None:
     """Somebody who does one of some things where there is room; None where there is none.
 
@@ -114,9 +124,14 @@ def placed(
         body: Who.
         lasts_s: How long it lasts [s].
         families: What may be done.
+        recordings: What is done if that is `recorded`.
     """
     for _ in range(_MOTIONS):
-        motion = random_motion(rng, body, str(rng.choice(families)))
+        family = str(rng.choice(families))
+        if family == RECORDED:
+            motion = recorded_motion(body, recordings[int(rng.integers(len(recordings)))])
+        else:
+            motion = random_motion(rng, body, family)
         start_s = float(rng.uniform(0.0, max(motion.duration_s - lasts_s, 0.0)))
         props = props_of(body, motion)
         lift_m = max(-float(motion.floor_m.min()), 0.0)

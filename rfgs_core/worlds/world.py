@@ -31,7 +31,7 @@ from rfgs_core.simulate.surface.movers import Movers
 from rfgs_core.simulate.tracer import FastTracer
 from rfgs_core.worlds.cast import Actor, cast_of, segment_centres, segments
 from rfgs_core.worlds.furniture import SKIN, Setting, empty_setting, furnish
-from rfgs_core.worlds.motion import FAMILIES
+from rfgs_core.worlds.motion import FAMILIES, RECORDED, KeptRecording
 from rfgs_core.worlds.room import IN_CORNERS, anywhere
 
 #: Devices of a world, fewest and most, and their heights in corners [m].
@@ -57,7 +57,9 @@ class WorldSettings:
     depth: int = 2
     """Interactions of people's paths."""
     families: tuple[str, ...] = FAMILIES
-    """What people may do."""
+    """What people may do; `recorded` for what `recordings` hold."""
+    recordings: tuple[KeptRecording, ...] = ()
+    """Motion capture."""
 
     @property
     def lasts_s(self) -> float:
@@ -79,11 +81,16 @@ class WorldSettings:
             raise RfgsError(f"fps {self.fps}: expected 0.1 to 1000 frames per second")
         if not 1 <= self.depth <= 3:
             raise RfgsError(f"depth {self.depth}: expected 1, 2 or 3")
-        unknown = sorted(set(self.families) - set(FAMILIES))
+        unknown = sorted(set(self.families) - {*FAMILIES, RECORDED})
         if unknown or not self.families:
             raise RfgsError(
-                f"motion {unknown[0] if unknown else ''!r}: expected some of {', '.join(FAMILIES)}"
+                f"motion {unknown[0] if unknown else ''!r}: expected some of "
+                f"{', '.join((*FAMILIES, RECORDED))}"
             )
+        if (RECORDED in self.families) != bool(self.recordings):
+            raise RfgsError(f"motion {RECORDED!r} and recordings: expected both or neither")
+        for recording in self.recordings:
+            recording.check()
 
 
 @dataclass(frozen=True)
@@ -206,7 +213,9 @@ def random_world(
             continue
         count = int(rng.integers(settings.people[0], settings.people[1] + 1))
         try:
-            actors = cast_of(rng, setting, count, settings.lasts_s, settings.families)
+            actors = cast_of(
+                rng, setting, count, settings.lasts_s, settings.families, settings.recordings
+            )
         except RfgsError:
             continue
         if place is None:

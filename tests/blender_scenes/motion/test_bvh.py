@@ -6,11 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from blender_scenes.motion.bvh import read_bvh
 from blender_scenes.motion.going import Walk
-from blender_scenes.motion.recorded import Recorded, plain_name, retarget
+from blender_scenes.motion.recorded import Recorded, poses_of
 from blender_scenes.motion.score import Figure, Posture, Score, compose
 from blender_scenes.motion.skeleton import Skeleton
+from rfgs_core.motion_capture.bvh import read_bvh
+from rfgs_core.motion_capture.joints import plain_name
 
 #: Bones that the file shall have, under names of another rig.
 OTHER_NAMES = {
@@ -118,7 +119,7 @@ def test_a_recording_comes_back_as_it_was(figure: Figure, walk: Score, recording
     skeleton = figure.skeleton
     bvh = read_bvh(recording)
     assert bvh.frame_s == pytest.approx(FRAME_S)
-    poses = retarget(bvh, skeleton)
+    poses = poses_of(bvh, skeleton)
     kept = [skeleton.index[b] for b in Writer(skeleton).bones]
     for index in range(0, len(poses), 7):
         wanted = walk.pose(index * FRAME_S)
@@ -140,7 +141,7 @@ def test_limbs_point_as_recorded_on_a_body_of_other_size(
         if name.startswith(("lowerarm", "wrist", "finger")):
             heads[index, 2] += 0.1
     other = Skeleton(small.bones, small.parents, heads, 0.8 * small.heel, small.surface)
-    poses = retarget(read_bvh(recording), other)
+    poses = poses_of(read_bvh(recording), other)
     for index in range(0, len(poses), 11):
         ours = other.joints(poses[index])
         theirs = small.joints(walk.pose(index * FRAME_S))
@@ -200,4 +201,4 @@ def test_recordings_of_things_are_refused(figure: Figure, recording: Path, tmp_p
     file = tmp_path / "thing.bvh"
     file.write_text(recording.read_text().replace("UpLeg", "Wheel"))
     with pytest.raises(ValueError, match="joints of a person"):
-        retarget(read_bvh(file), figure.skeleton)
+        poses_of(read_bvh(file), figure.skeleton)

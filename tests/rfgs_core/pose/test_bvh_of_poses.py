@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from blender_scenes.motion.bvh import read_bvh
 from rfgs_core.articulated import BONES, people
 from rfgs_core.limbs.propose import Joints
 from rfgs_core.limbs.skins import PosedPeople
+from rfgs_core.motion_capture.bvh import read_bvh
 from rfgs_core.pose.bvh import write_bvh
 from rfgs_core.worlds.motion import random_motion
 
@@ -33,15 +33,7 @@ def test_bones_come_back_where_they_were(tmp_path: Path) -> None:
     assert set(file.joints) >= set(BONES) and abs(file.frame_s - 0.1) < 1e-6
     # The frame that the run lacks is put between its neighbours.
     assert len(file.root) == 5
-    turns = file.world_turns()
-    places = np.zeros((5, len(file.joints), 3))
-    for joint, parent in enumerate(file.parents):
-        places[:, joint] = (
-            file.root
-            if parent < 0
-            else places[:, parent] + np.einsum("fij,j->fi", turns[:, parent], file.offsets[joint])
-        )
-    ours = places[..., [0, 2, 1]] * [1.0, -1.0, 1.0]
+    ours = file.places()[..., [0, 2, 1]] * [1.0, -1.0, 1.0]
     body = walker.body(0)
     for frame, row in ((0, 0), (1, 1), (2, 2), (3, 4)):
         heads = body.heads_at(walker.pose(frame, 0))

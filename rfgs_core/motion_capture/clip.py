@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """Reads clips in the format of DeepMimic (Peng et al., ACM Transactions on Graphics 37(4), 2018).
 
 Its clips were recorded from people. `pip install pybullet` brings some as
@@ -10,11 +10,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import msgspec
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from addon_rfgs.json_file import Fields, read_json
-from blender_scenes.motion.recording import Recording
-from blender_scenes.motion.rotations import about_y, about_z, matrices
+from rfgs_core.errors import RfgsFormatError
+from rfgs_core.motion_capture.recording import Recording
+from rfgs_core.records import read_record
 
 #: Joints in the order of the rows, parents, and offsets from the parents [m]: x is ahead, y up.
 _JOINTS = (
@@ -41,37 +43,41 @@ _FIXED = ("hand.R", "hand.L")
 #: Numbers of each joint in a row, behind a duration and the root's place.
 _WIDTHS = tuple(1 if name in _HINGES else 0 if name in _FIXED else 4 for name, _, _ in _JOINTS)
 _COLUMNS = 4 + sum(_WIDTHS)
-#: Largest file [bytes], and how far from one a quaternion's length may be: editing
-#: leaves some uneven.
-_MOST_BYTES, _UNEVEN = 2**25, 0.5
+#: How far from one a quaternion's length may be: editing leaves some uneven.
+_UNEVEN = 0.5
 #: From its axes to those of BVH: people look along z.
-_TURN = about_y(-0.5 * np.pi)
+_TURN = Rotation.from_euler("y", -90.0, degrees=True).as_matrix()
+
+
+class _Clip(msgspec.Struct):
+    """The file; what else is in it does not matter."""
+
+    Frames: list[list[float]]
 
 
 def read_clip(path: Path) -> Recording:
     """Reads a clip.
 
     Raises:
-        ValueError: The file is no clip of a person, or is damaged.
+        RfgsFormatError: The file is no clip of a person, or is damaged.
     """
-    form = Fields({"Frames": [[float]]})
-    read = read_json(path, form, "expected a clip as DeepMimic has them", _MOST_BYTES)
-    lengths = {len(row) for row in read["Frames"]}
+    frames = read_record(path, _Clip, "expected a clip as DeepMimic has them").Frames
+    lengths = {len(row) for row in frames}
     if lengths != {_COLUMNS}:
-        raise ValueError(
+        raise RfgsFormatError(
             f"{path}: expected frames of {_COLUMNS} numbers, those of a person, found "
             f"{', '.join(str(length) for length in sorted(lengths)[:4]) or 'none'}"
         )
-    rows = np.array(read["Frames"])
+    rows = np.array(frames)
     step_s = rows[:-1, 0] if len(rows) > 1 else rows[:, 0]
     if not (step_s > 0.0).all() or np.ptp(step_s) > 0.01 * step_s.mean():
-        raise ValueError(f"{path}: expected frames of one duration above zero")
+        raise RfgsFormatError(f"{path}: expected frames of one duration above zero")
     ends = 4 + np.cumsum(_WIDTHS)
     turns = np.broadcast_to(np.eye(3), (len(rows), len(_JOINTS), 3, 3)).copy()
     for joint, (end, width) in enumerate(zip(ends, _WIDTHS, strict=True)):
         values = rows[:, end - width : end]
         if width == 1:
-            turns[:, joint] = [about_z(angle) for angle in values[:, 0]]
+            turns[:, joint] = Rotation.from_rotvec(values * [0.0, 0.0, 1.0]).as_matrix()
         elif width == 4:
             turns[:, joint] = _turns(path, _JOINTS[joint][0], values)
     return Recording(
@@ -87,5 +93,5 @@ def read_clip(path: Path) -> Recording:
 def _turns(path: Path, joint: str, quats: np.ndarray) -> np.ndarray:
     length = np.linalg.norm(quats, axis=1, keepdims=True)
     if np.abs(length - 1.0).max() > _UNEVEN:
-        raise ValueError(f"{path}: rotations of {joint} are no unit quaternions")
-    return matrices(quats / length)
+        raise RfgsFormatError(f"{path}: rotations of {joint} are no unit quaternions")
+    return Rotation.from_quat(np.roll(quats, -1, axis=1)).as_matrix()

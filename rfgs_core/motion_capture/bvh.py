@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """Reads motion capture in BVH, Biovision's text format."""
 
 from __future__ import annotations
@@ -8,11 +8,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from blender_scenes.motion.recording import Recording
-from blender_scenes.motion.rotations import about_x, about_y, about_z
+from rfgs_core.errors import RfgsFormatError
+from rfgs_core.motion_capture.recording import Recording
 
-_ABOUT = {"Xrotation": about_x, "Yrotation": about_y, "Zrotation": about_z}
+_ABOUT = dict(zip(("Xrotation", "Yrotation", "Zrotation"), np.eye(3), strict=True))
 _ALONG = {"Xposition": 0, "Yposition": 1, "Zposition": 2}
 #: Largest file [bytes], most joints, most rotations of all frames, and longest time from frame to
 #: frame [s]: beyond them it is no recording of a person, or one to be cut.
@@ -25,20 +26,20 @@ def read_bvh(path: Path) -> Recording:
     """Reads a BVH file.
 
     Raises:
-        ValueError: The file is no BVH, or is damaged; the message says where.
+        RfgsFormatError: The file is no BVH, or is damaged; the message says where.
     """
     if path.stat().st_size > _MOST_BYTES:
-        raise ValueError(f"{path}: larger than {_MOST_BYTES >> 20} MiB; cut the recording")
+        raise RfgsFormatError(f"{path}: larger than {_MOST_BYTES >> 20} MiB; cut the recording")
     try:
         text = path.read_text("utf-8")
     except UnicodeDecodeError as error:
-        raise ValueError(f"{path}: expected a BVH text file, found other bytes") from error
+        raise RfgsFormatError(f"{path}: expected a BVH text file, found other bytes") from error
     head, found, body = text.partition("MOTION")
     if not head.strip().startswith("HIERARCHY") or not found:
-        raise ValueError(f"{path}: expected HIERARCHY and MOTION, as BVH files have")
+        raise RfgsFormatError(f"{path}: expected HIERARCHY and MOTION, as BVH files have")
     names, parents, offsets, channels = _hierarchy(path, iter(head.split()[1:]))
     if len(names) > _MOST_JOINTS:
-        raise ValueError(f"{path}: {len(names)} joints; expected at most {_MOST_JOINTS}")
+        raise RfgsFormatError(f"{path}: {len(names)} joints; expected at most {_MOST_JOINTS}")
     values, frame_s = _motion(path, body, sum(len(row) for row in channels), len(names))
     turns = np.broadcast_to(np.eye(3), (len(values), len(names), 3, 3)).copy()
     root = np.broadcast_to(offsets[0], (len(values), 3)).copy()
@@ -49,8 +50,8 @@ def read_bvh(path: Path) -> Recording:
             if name in _ALONG and joint == 0:
                 root[:, _ALONG[name]] = values[:, column]
             elif name in _ABOUT:
-                angles = np.radians(values[:, column])
-                turns[:, joint] @= np.stack([_ABOUT[name](angle) for angle in angles])
+                turn = np.radians(values[:, column, None]) * _ABOUT[name]
+                turns[:, joint] @= Rotation.from_rotvec(turn).as_matrix()
             column += 1
     return Recording(tuple(names), tuple(parents), np.array(offsets), turns, root, frame_s)
 
@@ -82,11 +83,11 @@ def _hierarchy(
             elif word == "}":
                 line.pop()
             elif word != "{":
-                raise ValueError(f"{path}: unexpected {word[:_SHOWN]!r} in the hierarchy")
+                raise RfgsFormatError(f"{path}: unexpected {word[:_SHOWN]!r} in the hierarchy")
     except (StopIteration, IndexError) as error:
-        raise ValueError(f"{path}: the hierarchy ends within a joint") from error
+        raise RfgsFormatError(f"{path}: the hierarchy ends within a joint") from error
     if not names or line or not len(names) == len(offsets) == len(channels):
-        raise ValueError(f"{path}: expected an OFFSET and CHANNELS for every joint")
+        raise RfgsFormatError(f"{path}: expected an OFFSET and CHANNELS for every joint")
     return names, parents, offsets, channels
 
 
@@ -99,7 +100,7 @@ def _channels(path: Path, words: Iterator[str]) -> list[str]:
     row = [next(words) for _ in range(int(_number(path, next(words))))]
     unknown = [name for name in row if name not in _ABOUT and name not in _ALONG]
     if unknown:
-        raise ValueError(f"{path}: unknown channel {unknown[0][:_SHOWN]!r}")
+        raise RfgsFormatError(f"{path}: unknown channel {unknown[0][:_SHOWN]!r}")
     return row
 
 
@@ -110,7 +111,7 @@ def _number(path: Path, word: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise ValueError(f"{path}: expected a number, found {word[:_SHOWN]!r}")
+        raise RfgsFormatError(f"{path}: expected a number, found {word[:_SHOWN]!r}")
     return value
 
 
@@ -119,17 +120,19 @@ def _motion(path: Path, body: str, columns: int, joints: int) -> tuple[np.ndarra
     words = body.split()
     try:
         if words[0] != "Frames:" or words[2:4] != ["Frame", "Time:"]:
-            raise ValueError(f"{path}: expected `Frames:` and `Frame Time:` after MOTION")
+            raise RfgsFormatError(f"{path}: expected `Frames:` and `Frame Time:` after MOTION")
         count, frame_s = int(_number(path, words[1])), _number(path, words[4])
         values = np.array([_number(path, word) for word in words[5:]])
     except IndexError as error:
-        raise ValueError(f"{path}: the motion has no frames") from error
+        raise RfgsFormatError(f"{path}: the motion has no frames") from error
     if count < 1 or len(values) != count * columns:
-        raise ValueError(
+        raise RfgsFormatError(
             f"{path}: expected {count} frames of {columns} channels, got {len(values)} numbers"
         )
     if count * joints > _MOST_TURNS:
-        raise ValueError(f"{path}: {count} frames of {joints} joints are too many; cut it")
+        raise RfgsFormatError(f"{path}: {count} frames of {joints} joints are too many; cut it")
     if not 0.0 < frame_s <= _LONGEST_S:
-        raise ValueError(f"{path}: {frame_s:g} s from frame to frame; expected up to {_LONGEST_S}")
+        raise RfgsFormatError(
+            f"{path}: {frame_s:g} s from frame to frame; expected up to {_LONGEST_S}"
+        )
     return values.reshape(count, columns), frame_s

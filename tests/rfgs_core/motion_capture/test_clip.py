@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon_rfgs.errors import AddonError
-from blender_scenes.motion.clip import read_clip
-from blender_scenes.motion.recorded import match_joints, retarget
-from blender_scenes.motion.score import Figure
+from rfgs_core.articulated import BONES, Pose, people
+from rfgs_core.errors import RfgsError
+from rfgs_core.motion_capture import retarget
+from rfgs_core.motion_capture.clip import read_clip
+from rfgs_core.motion_capture.joints import match_joints
 
 #: Lengths of thigh, shin and foot's height that the format fixes [m].
 THIGH_M, SHIN_M = 0.421546, 0.409870
@@ -61,22 +62,27 @@ def test_every_number_has_its_joint(tmp_path: Path) -> None:
     assert clip.frame_s == pytest.approx(1 / 30)
 
 
-def test_our_people_stand_on_the_floor_and_swing_a_leg_as_recorded(
-    figure: Figure, tmp_path: Path
-) -> None:
+def test_our_people_stand_on_the_floor_and_swing_a_leg_as_recorded(tmp_path: Path) -> None:
     rows = [standing(), standing(right_hip=0.6)]
     for row in rows:
         # Soles are on the floor where hips are a leg's length, and an ankle's height, above it.
         row[2] = THIGH_M + SHIN_M + 0.07
-    clip, skeleton = read_clip(written(tmp_path / "a.txt", rows)), figure.skeleton
-    assert {"root", "upperarm01.L", "lowerarm01.R", "wrist.R", "foot.L"} <= set(match_joints(clip))
-    upright, swung = (skeleton.joints(pose) for pose in retarget(clip, skeleton))
-    hip, ankle = skeleton.index["upperleg01.R"], skeleton.index["foot.R"]
-    assert abs(upright[ankle, 2] - 0.07 * 0.8) < 0.04
-    # Figures look along x at heading 0; retargeted ones look along -y until they are placed.
+    clip, body = read_clip(written(tmp_path / "a.txt", rows)), people().body(np.zeros(0))
+    assert {"pelvis", "upperarm_left", "lowerarm_right", "foot_left"} <= set(match_joints(clip))
+    heads = dict(zip(BONES, body.heads, strict=True))
+    root, turns = retarget(clip, heads)
+    # Bones that clips do not have follow the trunk.
+    trunk = turns["spine_middle"]
+    whole = np.stack([turns.get(name, trunk) for name in BONES], axis=1)
+    upright, swung = (
+        body.heads_at(Pose(place, turn)) for place, turn in zip(root, whole, strict=True)
+    )
+    hip, knee, ankle = (BONES.index(f"{n}_right") for n in ("upperleg", "lowerleg", "foot"))
+    scale = sum(np.diff(-upright[[hip, knee, ankle], 2])) / (THIGH_M + SHIN_M)
+    assert upright[ankle, 2] == pytest.approx(0.07 * scale, abs=1e-6)
     leg = swung[ankle] - swung[hip]
-    assert np.arctan2(-leg[1], -leg[2]) == pytest.approx(0.6, abs=0.03)
-    assert np.abs(swung - upright)[skeleton.index["foot.L"]].max() < 1e-9
+    assert np.arctan2(leg[0], -leg[2]) == pytest.approx(0.6, abs=1e-6)
+    assert np.abs(swung - upright)[BONES.index("foot_left")].max() < 1e-9
 
 
 @pytest.mark.parametrize(
@@ -97,11 +103,19 @@ def test_what_is_no_clip_of_a_person_is_named(
     assert str(path) in str(caught.value)
 
 
-@pytest.mark.parametrize("text", ["HIERARCHY", "[]", '{"Frames": [[NaN]]}', '{"Frames": [["a"]]}'])
-def test_other_files_are_one_line(tmp_path: Path, text: str) -> None:
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("HIERARCHY", "JSON"),
+        ('{"Frames": [[NaN]]}', "JSON"),
+        ("[]", "expected a clip as DeepMimic has them"),
+        ('{"Frames": [["a"]]}', "expected a clip as DeepMimic has them"),
+    ],
+)
+def test_other_files_are_one_line(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "a.txt"
     path.write_text(text)
-    with pytest.raises(AddonError, match="expected a clip as DeepMimic has them") as caught:
+    with pytest.raises(RfgsError, match=message) as caught:
         read_clip(path)
     assert str(path) in str(caught.value) and "\n" not in str(caught.value)
 

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """A recorded skeleton and its motion, whatever file it came from."""
 
 from __future__ import annotations
@@ -6,8 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from blender_scenes.motion.rotations import about, quaternions
+from scipy.spatial.transform import Rotation
 
 _UP = {"y": np.array([0.0, 1.0, 0.0]), "z": np.array([0.0, 0.0, 1.0])}
 
@@ -60,8 +59,8 @@ class Recording:
         axis = _UP[up]
         turn = self.turns[-1, 0] @ self.turns[0, 0].T
         # What the whole turn has of one about the vertical.
-        w, *xyz = quaternions(turn)
-        ahead = about(axis, 2.0 * float(np.arctan2(axis @ xyz, w)))
+        *xyz, w = Rotation.from_matrix(turn).as_quat()
+        ahead = Rotation.from_rotvec(2.0 * np.arctan2(axis @ xyz, w) * axis).as_matrix()
         level = np.eye(3) - np.outer(axis, axis)
         turns, root = [self.turns], [self.root]
         for _ in range(times - 1):

@@ -16,20 +16,22 @@ from jaxtyping import Float, Float64
 from tqdm import tqdm
 
 from rfgs_core.articulated import fit_pose, people
-from rfgs_core.bodies.localise import locate_bodies, pair_maps
+from rfgs_core.bodies.tracks import Tracks
 from rfgs_core.dataset import Sequence
 from rfgs_core.errors import RfgsError
 from rfgs_core.evaluate.geometry import geometry_metrics, reference_points, voxel_budget
 from rfgs_core.evaluate.grid import Grid, splat_gaussians
+from rfgs_core.fit.frame import followed
 from rfgs_core.limbs.evidence.library import headings_of, upright
 from rfgs_core.limbs.evidence.tell import tell
 from rfgs_core.limbs.network import LimbNetwork
 from rfgs_core.limbs.postures.tell import can_tell, looks
 from rfgs_core.limbs.postures.tell import tell as tell_posture
-from rfgs_core.limbs.propose import Joints, combined, propose, smoothed
+from rfgs_core.limbs.propose import Joints, of_walk_and_network, propose, smoothed
 from rfgs_core.limbs.skins import PosedPeople
 from rfgs_core.measure.observations import Observations, observe
 from rfgs_core.seeds import sub_seed
+from rfgs_core.settings import TrainConfig
 from rfgs_core.skeleton import JOINTS
 from rfgs_core.worlds.motion import random_motion
 
@@ -69,7 +71,7 @@ class Person:
         everything: bool,
         on_frame: Callable[[], Any],
     ) -> Person:
-        """Reads and locates.
+        """Reads and follows, as a training does.
 
         Raises:
             RfgsError: There is not exactly one person, or their joints are not known.
@@ -77,14 +79,17 @@ class Person:
         count = sum(1 for row in sequence.instances if row["class"] == "person")
         if count != 1:
             raise RfgsError(f"{sequence.name}: expected one person for the table, found {count}")
-        seen, axes, truth = [], [], []
+        seen, truth = [], []
+        tracks: list[Tracks] = []
         for frame in frames:
             seen.append(observe(sequence, radio, frame, everything=everything))
-            axes.append(locate_bodies(pair_maps(seen[-1]), seen[-1].bounds_m, 1)[0])
+            seed = sub_seed(_SEED, sequence.name, radio, frame, "fit")
+            tracks.append(followed(tracks[-1] if tracks else None, seen[-1], TrainConfig(), seed))
             truth.append(np.asarray(sequence.joints(frame)[0], dtype=np.float64))
             on_frame()
         time_s = np.array([sequence.time_s(frame) for frame in frames])
-        return Person(list(frames), time_s, seen, np.array(axes), np.array(truth))
+        axes_xy = np.array([track.axes_xy[0] for track in tracks])
+        return Person(list(frames), time_s, seen, axes_xy, np.array(truth))
 
     @property
     def headings(self) -> Float64[np.ndarray, "frame"]:
@@ -125,7 +130,7 @@ def limb_table(
     if _EVIDENCE not in told and can_tell(person.seen[0]):
         told |= _by_postures(person, other, _SEED)
     if _SMOOTH in told and _EVIDENCE in told:
-        both = combined(told[_EVIDENCE], told[_SMOOTH])
+        both = of_walk_and_network(told[_EVIDENCE], told[_SMOOTH])
         told = {"evidence and network together": _on_bodies(both)} | told
     if _SMOOTH in told:
         told[_SMOOTH] = _on_bodies(told[_SMOOTH])

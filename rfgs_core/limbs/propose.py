@@ -24,6 +24,10 @@ from rfgs_core.measure.observations import Observations
 
 #: Frames this far apart smooth each other [s], and the degree of the curve through them.
 SMOOTH_S, DEGREE = 0.4, 2
+#: Two ways contradict each other if the mean square of how far they are apart, in units of what
+#: both are expected to be off, is more than this: 0.6 to 1.9 where a walk is right, and 4 to 11 where
+#: none is or the person is a child (random worlds and recorded motions).
+_CONTRADICTION = 3.0
 #: No joint is surer than this where joints are smoothed [m].
 _SUREST_M = 0.01
 
@@ -108,6 +112,22 @@ def smoothed(joints: Joints, time_s: Float64[np.ndarray, "frame"]) -> Joints:
         xyz[frame] = np.einsum("bjk,bjkx->bjx", inverse[..., 0, :], moment)
         sigma[frame] = joints.sigma_m[near].mean(axis=0)
     return Joints(xyz, sigma)
+
+
+def contradict(one: Joints, other: Joints) -> bool:
+    """Whether two ways cannot both be right, for how far off they say that they are."""
+    apart_m = np.linalg.norm(one.xyz - other.xyz, axis=-1)
+    expected_m = np.hypot(one.sigma_m, other.sigma_m)
+    return float(np.mean((apart_m / expected_m) ** 2)) > _CONTRADICTION
+
+
+def of_walk_and_network(walk: Joints, network: Joints) -> Joints:
+    """Joints told by evidence of a walk and by the network: of both, as long as they agree.
+
+    Evidence finds the likeliest walk of a mean body on the floor, whoever it is; the network
+    assumes neither. Where they contradict each other, it alone counts.
+    """
+    return network if contradict(walk, network) else combined(walk, network)
 
 
 def combined(one: Joints, other: Joints) -> Joints:

@@ -23,7 +23,7 @@ from rfgs_core.limbs.evidence.tell import long_enough, looks, stands, tell
 from rfgs_core.limbs.postures.tell import can_tell
 from rfgs_core.limbs.postures.tell import looks as posture_looks
 from rfgs_core.limbs.postures.tell import tell as tell_posture
-from rfgs_core.limbs.propose import SMOOTH_S, Joints, combined, propose, smoothed
+from rfgs_core.limbs.propose import SMOOTH_S, Joints, of_walk_and_network, propose, smoothed
 from rfgs_core.limbs.skins import PosedPeople
 from rfgs_core.limbs.weights import Trained, own_network
 from rfgs_core.measure.observations import Observations
@@ -155,7 +155,7 @@ def find_limbs(
     if trained is not None:
         said = _by_network(trained, alone, tracks)
         told = [
-            other if one is None else combined(one, other)
+            other if one is None else of_walk_and_network(one, other)
             for one, other in zip(told, said, strict=True)
         ]
     joints = _together(told, alone, tracks)

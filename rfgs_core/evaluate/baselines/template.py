@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A blind person: an ellipsoid of a person's size, standing where the method says.
+"""Blind people: ellipsoids of a person's size, standing where the method says.
 
 It knows nothing of limbs or pose. A method that does not beat it has found where the person
 is, not what the person looks like. The template is a surface, as the reference is; filled, it is
@@ -9,6 +9,7 @@ shown as a baseline of its own.
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import Float64
 
 from rfgs_core.evaluate.evidence import BaselineResult, Evidence
 
@@ -19,12 +20,25 @@ WHY_NO_CENTROID = "the method predicts nothing, so it has no centroid"
 WHY_NO_CHANNEL = "a shape only; it predicts no channel"
 
 
-def _radius(evidence: Evidence) -> tuple[np.ndarray, np.ndarray]:
-    """Ellipsoidal radius of every voxel (1 on the surface) and its gradient's length [1/m]."""
+def _places(evidence: Evidence) -> list[tuple[float, float]]:
+    """Where on the ground bodies stand: one at the method's centroid, several where it has them.
+
+    The centroid of several is between them, where nobody is.
+    """
     assert evidence.method_centroid_m is not None
-    grid, axes = evidence.grid, SEMI_AXES_M
+    bodies = evidence.method_bodies
+    if bodies is not None and len(bodies.axes_xy) > 1:
+        return [(float(x), float(y)) for x, y in bodies.axes_xy]
     x, y, _ = evidence.method_centroid_m
-    centre = (float(x), float(y), grid.origin_m[2] + axes[2])
+    return [(float(x), float(y))]
+
+
+def _radius(
+    evidence: Evidence, place: tuple[float, float]
+) -> tuple[Float64[np.ndarray, "x y z"], Float64[np.ndarray, "x y z"]]:
+    """Ellipsoidal radius of every voxel (1 on the surface) and its gradient's length [1/m]."""
+    grid, axes = evidence.grid, SEMI_AXES_M
+    centre = (*place, grid.origin_m[2] + axes[2])
     u, v, w = ((grid.axis_m(a) - centre[a]) / axes[a] for a in range(3))
     radius = np.sqrt(u[:, None, None] ** 2 + v[:, None] ** 2 + w**2)
     slope = np.sqrt(
@@ -34,19 +48,23 @@ def _radius(evidence: Evidence) -> tuple[np.ndarray, np.ndarray]:
 
 
 def baseline(evidence: Evidence) -> BaselineResult:
-    """The ellipsoid's surface at the method's own centroid."""
+    """The ellipsoids' surfaces."""
     if evidence.method_centroid_m is None:
         return BaselineResult(reason=WHY_NO_CENTROID)
-    radius, slope = _radius(evidence)
-    # Distance to the surface to first order: (radius − 1) over the gradient's length.
-    distance_m = np.abs(radius - 1.0) / np.maximum(slope, 1e-6)
+    distance_m = np.full(evidence.grid.shape, np.inf)
+    for place in _places(evidence):
+        radius, slope = _radius(evidence, place)
+        # Distance to the surface to first order: (radius − 1) over the gradient's length.
+        off_m = np.abs(radius - 1.0) / np.maximum(slope, 1e-6)
+        distance_m = np.minimum(distance_m, off_m)
     score = np.exp(-distance_m / evidence.grid.voxel_m).astype(np.float32)
     return BaselineResult(score=score, reason=WHY_NO_CHANNEL)
 
 
 def filled(evidence: Evidence) -> BaselineResult:
-    """The same ellipsoid filled from its axis outwards; K voxels do not reach its surface."""
+    """The same ellipsoids filled from their axes outwards; K voxels do not reach their surface."""
     if evidence.method_centroid_m is None:
         return BaselineResult(reason=WHY_NO_CENTROID)
-    score = np.exp(-_radius(evidence)[0]).astype(np.float32)
+    nearest = np.min([_radius(evidence, place)[0] for place in _places(evidence)], axis=0)
+    score = np.exp(-nearest).astype(np.float32)
     return BaselineResult(score=score, reason=WHY_NO_CHANNEL)

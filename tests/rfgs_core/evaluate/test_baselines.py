@@ -233,6 +233,24 @@ def test_filled_template_stays_inside_the_ellipsoid(scatterers) -> None:
     assert radius.max() < 0.85
 
 
+@pytest.mark.parametrize("name", ["template", "template_filled"])
+def test_several_people_have_a_template_each(scatterers, name: str) -> None:
+    """Between two people, where their common centroid is, nobody stands."""
+    made = scatterers(ONE, voxels=3000)
+    places = np.array([[1.4, 1.6], [2.6, 1.6]])
+    evidence = made.evidence.with_method(np.array([2.0, 1.6, 0.9]), Bodies.standing(places))
+    score = BASELINES[name](evidence).score
+    voxels = made.evidence.grid.centres(best_voxels(score, 3000))
+    away = np.linalg.norm(voxels[:, None, :2] - places, axis=2)
+    nearest = away.argmin(axis=1)
+    assert away.min(axis=1).max() < 0.32
+    # Each has half of the voxels, around its own place.
+    assert np.bincount(nearest) == pytest.approx([1500, 1500], abs=60)
+    for body, place in enumerate(places):
+        middle = voxels[nearest == body].mean(axis=0)
+        np.testing.assert_allclose(middle[:2], place, atol=0.05)
+
+
 def test_the_prior_alone_is_that_of_the_methods_bodies(scatterers) -> None:
     made = scatterers(ONE, voxels=1500)
     sitting = Bodies(np.array([[2.0, 1.6]]), np.array([0.0]))

@@ -25,8 +25,8 @@ from rfgs_core.measure.observations import Observations
 #: Frames this far apart smooth each other [s], and the degree of the curve through them.
 SMOOTH_S, DEGREE = 0.4, 2
 #: Two ways contradict each other if the mean square of how far they are apart, in units of what
-#: both are expected to be off, is more than this: 0.6 to 1.9 where a walk is right, and 4 to 11 where
-#: none is or the person is a child (random worlds and recorded motions).
+#: both are expected to be off, is more than this: 0.6 to 1.9 where a walk is right, and 4 to 11
+#: where none is or the person is a child (random worlds and recorded motions).
 _CONTRADICTION = 3.0
 #: No joint is surer than this where joints are smoothed [m].
 _SUREST_M = 0.01

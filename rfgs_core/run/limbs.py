@@ -34,8 +34,9 @@ from rfgs_core.settings import TrainConfig
 
 _LOG = logging.getLogger(__name__)
 #: Limbs that are expected to be further off on average than this are left alone: joints of a
-#: standing body at the right place are 0.11 m off those of one who walks.
-_UNSURE_M = 0.15
+#: standing body at the right place are 0.11 m off those of one who walks. But not those that are
+#: so many times further from a standing body than they are expected to be off.
+_UNSURE_M, _FAR = 0.15, 2.0
 _REMEDY = "delete it and run the same `rfgs train` again"
 _SHAPES = {
     "frames": ("frame",),
@@ -158,12 +159,12 @@ def find_limbs(
             other if one is None else of_walk_and_network(one, other)
             for one, other in zip(told, said, strict=True)
         ]
-    joints = _together(told, alone, tracks)
-    if joints is None:
+    if not any(told):
         return None
+    joints = _together(told, alone, tracks)
     own = [frames.index(frame) for frame in run.frames]
     joints = Joints(joints.xyz[own], joints.sigma_m[own])
-    if joints.sigma_m.mean() > _UNSURE_M:
+    if not _of_use(joints, [alone[k] for k in own], [tracks[k] for k in own]):
         _LOG.warning(
             "limbs are expected to be %.2f m off, more than %.2f m: bodies stay without",
             joints.sigma_m.mean(),
@@ -251,15 +252,25 @@ def _by_network(
 
 def _together(
     told: list[Joints | None], alone: list[list[Observations]], tracks: list[Tracks]
-) -> Joints | None:
-    """Everybody's joints, standing where nothing is known of somebody; None if of nobody is."""
-    if not any(told):
-        return None
+) -> Joints:
+    """Everybody's joints, standing where nothing is known of somebody."""
     whole = []
     for body, joints in enumerate(told):
         axes_xy = np.array([track.axes_xy[body] for track in tracks])
         whole.append(joints or stands([frame[body] for frame in alone], axes_xy))
     return Joints(*(np.concatenate(values, axis=1) for values in zip(*whole, strict=True)))
+
+
+def _of_use(joints: Joints, alone: list[list[Observations]], tracks: list[Tracks]) -> bool:
+    """Whether joints say more than that somebody stands, or lies as was found."""
+    expected_m = float(joints.sigma_m.mean())
+    if expected_m <= _UNSURE_M:
+        return True
+    if any(track.bodies.lies.any() for track in tracks):
+        return False
+    standing = _together([None] * joints.xyz.shape[1], alone, tracks)
+    apart_m = np.linalg.norm(joints.xyz - standing.xyz, axis=-1).mean()
+    return float(apart_m) > _FAR * expected_m
 
 
 def frames_read(run: Run) -> list[int]:

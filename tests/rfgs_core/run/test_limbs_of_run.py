@@ -35,22 +35,27 @@ from rfgs_core.settings import TrainConfig
 CONFIG = TrainConfig(num_gaussians=400, solver_steps=2, iterations=0, posture="standing")
 
 
-@pytest.fixture
-def network(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A network for the tiny dataset's radio that says a standing body, and that of no other."""
+def saying(low_m: float, sigma_m: float) -> LimbNetwork:
+    """A network that says a standing body, so much too low, whatever it hears."""
     torch.manual_seed(5)
     made = LimbNetwork(4)
     body = people().body(np.zeros(0))
-    upright = body.joints17(Pose(body.heads[0], body.neutral)) - [0.0, 0.0, 0.95]
+    upright = body.joints17(Pose(body.heads[0], body.neutral)) - [0.0, 0.0, 0.95 + low_m]
     with torch.no_grad():
         last = made.say[-1]
         assert isinstance(last, torch.nn.Linear)
         last.weight *= 0.02
-        said = np.concatenate([upright / 0.3, np.full((17, 1), np.log(0.05))], axis=1)
+        said = np.concatenate([upright / 0.3, np.full((17, 1), np.log(sigma_m))], axis=1)
         last.bias[:] = torch.from_numpy(said.ravel()).float()
+    return made
+
+
+@pytest.fixture
+def network(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder of a network for the tiny dataset's radio, and for no other."""
     folder = tmp_path / "networks"
     folder.mkdir()
-    save_network(folder / "wifi.safetensors", made, preset("wifi"), {})
+    save_network(folder / "wifi.safetensors", saying(0.0, 0.05), preset("wifi"), {})
     monkeypatch.setattr(weights, "OWN", folder)
     return folder
 
@@ -101,6 +106,26 @@ def test_some_settings_do_without_limbs(
 ) -> None:
     run = train(tiny_dataset, tmp_path / "plain", replace(CONFIG, **changes))
     assert read_limbs(run.path) is None
+
+
+@pytest.mark.parametrize(
+    ("low_m", "sigma_m", "told"), [(0.0, 0.2, False), (0.6, 0.2, True), (0.6, 0.4, False)]
+)
+def test_unsure_limbs_are_of_use_where_nobody_stands(
+    low_m: float, sigma_m: float, told: bool, network: Path, train, tiny_dataset, tmp_path: Path
+) -> None:
+    """More than 0.15 m off, but further from a standing body than twice that: better than it."""
+    save_network(network / "wifi.safetensors", saying(low_m, sigma_m), preset("wifi"), {})
+    limbs = read_limbs(train(tiny_dataset, tmp_path / "unsure", CONFIG).path)
+    assert (limbs is not None) is told
+
+
+def test_a_single_unsure_frame_is_compared_with_standing_too(
+    network: Path, train, tiny_dataset: Path, tmp_path: Path
+) -> None:
+    save_network(network / "wifi.safetensors", saying(0.6, 0.2), preset("wifi"), {})
+    run = train(tiny_dataset, tmp_path / "one", CONFIG, frames=[1])
+    assert read_limbs(run.path) is not None
 
 
 def test_without_a_network_for_the_radio_there_are_no_limbs(
@@ -171,12 +196,14 @@ def test_who_does_not_walk_may_do_something_else(
     assert asked == 1
 
 
-def test_evidence_and_a_network_count_together(
-    network: Path, train, tiny_dataset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.parametrize(("apart_m", "together"), [(0.1, True), (0.3, False)])
+def test_evidence_and_a_network_count_together_if_they_agree(
+    apart_m: float, together: bool, network: Path, train, tiny_dataset: Path, tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
     alone = read_limbs(train(tiny_dataset, tmp_path / "alone", CONFIG).path)
     assert alone is not None
-    aside = alone.joints.xyz + np.array([0.3, 0.0, 0.0])
+    aside = alone.joints.xyz + np.array([apart_m, 0.0, 0.0])
     sigma = np.full((2, 1, 17), 0.06)
 
     def tell(*_: object) -> Told:
@@ -186,10 +213,11 @@ def test_evidence_and_a_network_count_together(
     monkeypatch.setattr(limbs_of_run, "tell", tell)
     both = read_limbs(train(tiny_dataset, tmp_path / "both", CONFIG).path)
     assert both is not None
-    share = sigma**-2.0 / (sigma**-2.0 + alone.joints.sigma_m**-2.0)
+    share = sigma**-2.0 / (sigma**-2.0 + alone.joints.sigma_m**-2.0) if together else 0.0
     moved = both.joints.xyz - alone.joints.xyz
-    np.testing.assert_allclose(moved[..., 0], 0.3 * share, atol=1e-6)
-    assert (both.joints.sigma_m < np.minimum(0.06, alone.joints.sigma_m)).all()
+    np.testing.assert_allclose(moved[..., 0], apart_m * share, atol=1e-6)
+    surer = both.joints.sigma_m < np.minimum(0.06, alone.joints.sigma_m)
+    assert surer.all() if together else not surer.any()
 
 
 def test_of_two_people_one_walks_and_the_other_stands(

@@ -35,8 +35,8 @@ from rfgs_core.settings import TrainConfig
 _LOG = logging.getLogger(__name__)
 #: Limbs that are expected to be further off on average than this are left alone: joints of a
 #: standing body at the right place are 0.11 m off those of one who walks. But not those that are
-#: so many times further from a standing body than they are expected to be off.
-_UNSURE_M, _FAR = 0.15, 2.0
+#: so many times further from a standing body than they are expected to be off: it is further off.
+_UNSURE_M, _FAR = 0.15, 1.2
 _REMEDY = "delete it and run the same `rfgs train` again"
 _SHAPES = {
     "frames": ("frame",),

@@ -20,12 +20,22 @@ from rfgs_core.run.limbs import Limbs, read_limbs
 from rfgs_core.seeds import sub_seed
 from rfgs_core.skeleton import JOINTS
 
-#: Whose pelvis is lower above the floor sits [m]: halfway between a chair and standing.
-SITTING_PELVIS_M = 0.75
+#: Whose pelvis is lower above the floor than so many times the length of thigh and shin sits:
+#: halfway between a chair and standing, for adults and children.
+_LOW, _LEG = 0.84, ("hip", "knee", "ankle")
 #: Slower people may walk any way [m/s].
 WALKING_M_S = 0.3
 #: Frames further apart than this say nothing about where somebody walks [s].
 LONGEST_STEP_S = 2.0
+
+
+def is_low(joints: Float64[np.ndarray, "17 3"], floor_m: float) -> bool:
+    """Whether somebody sits or lies: the pelvis is lower than legs of this length bear standing."""
+    legs = [
+        np.linalg.norm(np.diff(joints[[JOINTS.index(f"{side}_{n}") for n in _LEG]], axis=0), axis=1)
+        for side in ("left", "right")
+    ]
+    return bool(joints[0, 2] - floor_m < _LOW * np.sum(legs) / 2.0)
 
 
 @dataclass(frozen=True)
@@ -118,7 +128,7 @@ def _told(
             own = float(np.arctan2(-left[0], left[1]))
             way = looks[0] if len(looks) == 1 else own
             baseline[k, body] = joints_of(standing(clouds[k][body], way), floor_m)
-    seated = joints[:, :, 0, 2] - floor_m < SITTING_PELVIS_M
+    seated = np.array([[is_low(person, floor_m) for person in people] for people in joints])
     sigma_m = limbs.joints.sigma_m
     return PoseEstimate(limbs.frames, time_s, centroid, joints, seated, baseline, sigma_m)
 

@@ -10,7 +10,7 @@ from jaxtyping import Float64, Int64
 from scipy.optimize import linear_sum_assignment
 
 from rfgs_core.dataset import Sequence
-from rfgs_core.pose.estimate import SITTING_PELVIS_M, PoseEstimate
+from rfgs_core.pose.estimate import PoseEstimate, is_low
 from rfgs_core.skeleton import JOINTS
 
 #: A body further than this from everybody has lost its person [m].
@@ -42,7 +42,7 @@ def score_poses(estimate: PoseEstimate, sequence: Sequence) -> dict[str, Any]:
     result["identity_kept"] = identity_kept([[(int(b), int(p)) for b, p in row] for row in matches])
     floor_m = float(np.asarray(sequence.bounds_m)[0, 2])
     sits = [
-        (estimate.seated[k, body], truth[k][person, 0, 2] - floor_m < SITTING_PELVIS_M)
+        (estimate.seated[k, body], is_low(truth[k][person], floor_m))
         for k, row in enumerate(matches)
         for body, person in row
     ]

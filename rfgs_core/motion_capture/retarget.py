@@ -50,7 +50,7 @@ def retarget(
             hips: files differ.
 
     Raises:
-        RfgsFormatError: The recording's joints are not those of a person.
+        RfgsFormatError: The recording's joints are not those of a person, or legs have no length.
     """
     joints = {bone: row for bone, row in match_joints(recording).items() if bone in heads}
     axes = _axes(recording, joints, _UP[up])
@@ -131,4 +131,6 @@ def _recorded_leg(recording: Recording, joints: dict[str, int]) -> float:
         while joint >= 0 and joint != joints[f"upperleg_{side}"]:
             total += float(np.linalg.norm(recording.offsets[joint]))
             joint = recording.parents[joint]
+    if not total > 0.0:
+        raise RfgsFormatError("expected legs of some length, found hips, knees and feet together")
     return 0.5 * total

@@ -129,7 +129,10 @@ def placed(
     for _ in range(_MOTIONS):
         family = str(rng.choice(families))
         if family == RECORDED:
-            motion = recorded_motion(body, recordings[int(rng.integers(len(recordings)))])
+            kept = recordings[int(rng.integers(len(recordings)))]
+            # Of what lasts for minutes only what the world shows is put on a body.
+            begin_s = float(rng.uniform(0.0, max(kept.duration_s - lasts_s, 0.0)))
+            motion = recorded_motion(body, kept.between(begin_s, begin_s + lasts_s))
         else:
             motion = random_motion(rng, body, family)
         start_s = float(rng.uniform(0.0, max(motion.duration_s - lasts_s, 0.0)))

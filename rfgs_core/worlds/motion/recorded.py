@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
@@ -59,6 +59,19 @@ class KeptRecording:
             name, up, recording.joints, recording.parents, _tuples(recording.offsets),
             step * recording.frame_s, _tuples(root), _tuples(quats.reshape(*turns.shape[:2], 4)),
         )  # fmt: skip
+
+    @property
+    def duration_s(self) -> float:
+        """How long it lasts [s]."""
+        return (len(self.root) - 1) * self.frame_s
+
+    def between(self, start_s: float, end_s: float) -> KeptRecording:
+        """The part around some time of it [s], two frames at least."""
+        last = len(self.root) - 1
+        first = min(max(int(start_s / self.frame_s), 0), last - 1)
+        end = min(int(np.ceil(end_s / self.frame_s)) + 1, last)
+        part = slice(first, max(end, first + 1) + 1)
+        return replace(self, root=self.root[part], quats=self.quats[part])
 
     def check(self) -> None:
         """Refuses what no person can have done.

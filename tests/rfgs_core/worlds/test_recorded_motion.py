@@ -96,6 +96,29 @@ def test_nobody_sinks_into_the_floor(walker: PosedPeople, kept: KeptRecording) -
     assert 0.0 < min(skins) < 0.01 and max(skins) < 0.05
 
 
+def test_of_a_long_recording_a_world_shows_a_part(kept: KeptRecording) -> None:
+    for start_s, end_s, first, last in ((0.0, 0.5, 0, 6), (0.55, 0.95, 5, 11), (1.59, 9.0, 15, 16)):
+        part = kept.between(start_s, end_s)
+        assert part.root == kept.root[first : last + 1]
+        assert part.quats == kept.quats[first : last + 1]
+    assert kept.duration_s == pytest.approx(1.6)
+    # Worlds that last 0.15 s begin at different times of it.
+    settings = WorldSettings(2, families=("recorded",), people=(1, 1), recordings=(kept,))
+    worlds = [random_world(preset("wifi_commodity"), settings, 0, index) for index in range(3)]
+    motions = [world.actors[0].motion for world in worlds]
+    assert max(motion.duration_s for motion in motions) < 0.5
+    assert len({motion.local.tobytes() for motion in motions}) == 3
+
+
+def test_legs_without_length_are_refused(walker: PosedPeople, kept: KeptRecording) -> None:
+    flat = tuple(
+        (0.0, 0.0, 0.0) if name.startswith(("lowerleg", "foot")) else offset
+        for name, offset in zip(kept.joints, kept.offsets, strict=True)
+    )
+    with pytest.raises(RfgsError, match="legs of some length"):
+        recorded_motion(walker.body(0), dataclasses.replace(kept, offsets=flat))
+
+
 def test_worlds_of_recordings_are_datasets_and_keep_them(file: Path, tmp_path: Path) -> None:
     out = tmp_path / "worlds"
     asked = ("worlds", "--radio", "wifi_commodity", "--frames", "2", "--depth", "1", "--count", "1")

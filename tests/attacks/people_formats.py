@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +13,8 @@ import numpy as np
 import torch
 from formats import Format
 
-from blender_scenes.motion.bvh import read_bvh
 from rfgs_core.arrays import save_arrays
 from rfgs_core.articulated import BONES
-from rfgs_core.errors import RfgsFormatError
 from rfgs_core.fit.density.standard import StandardDensity, StandardRule
 from rfgs_core.fit.parameters import LearningRates, TrainableGaussians
 from rfgs_core.fit.refine import _arrays, _resume
@@ -23,6 +22,8 @@ from rfgs_core.gaussians.model import Gaussians
 from rfgs_core.limbs.network import LimbNetwork
 from rfgs_core.limbs.progress import Progress, keep, resume
 from rfgs_core.limbs.weights import load_network, save_network
+from rfgs_core.motion_capture.bvh import read_bvh
+from rfgs_core.motion_capture.clip import read_clip
 from rfgs_core.radio import preset
 from rfgs_core.run.limbs import LIMBS_FILE, read_limbs
 from rfgs_core.run.people import PEOPLE_FILE, HeadCount
@@ -67,7 +68,7 @@ def make_people(folder: Path) -> list[Format]:
         Format("pose", fitted / POSE_FILE, mutations.arrays_of, lambda: fitted_bones(fitted)),
         *_networks(folder),
         _half(folder / "half.npz"),
-        _recording(folder / "a.bvh"),
+        *_recordings(folder),
     ]  # fmt: skip
 
 
@@ -149,16 +150,15 @@ def _half(file: Path) -> Format:
     return Format("half a refinement", file, mutations.arrays_of, resumed)
 
 
-def _recording(file: Path) -> Format:
-    file.write_text(RECORDING)
-
-    def read() -> Any:
-        try:
-            return read_bvh(file)
-        except ValueError as error:
-            # Its room knows no `RfgsError`; the line names the file all the same.
-            if not str(error).startswith(f"{file}: "):
-                raise
-            raise RfgsFormatError(str(error)) from error
-
-    return Format("bvh", file, mutations.text_of, read, theirs=True)
+def _recordings(folder: Path) -> list[Format]:
+    """Motion capture in both formats."""
+    bvh, clip = folder / "a.bvh", folder / "a.txt"
+    bvh.write_text(RECORDING)
+    row = [0.05, 0.0, 0.9, 0.0]
+    for width in (4, 4, 4, 4, 1, 4, 4, 1, 4, 1, 4, 4, 1):
+        row += [1.0, 0.0, 0.0, 0.0] if width == 4 else [0.1]
+    clip.write_text(json.dumps({"Loop": "wrap", "Frames": [row, row]}))
+    return [
+        Format("bvh", bvh, mutations.text_of, lambda: read_bvh(bvh), theirs=True),
+        Format("clip", clip, mutations.json_of, lambda: read_clip(clip), theirs=True),
+    ]

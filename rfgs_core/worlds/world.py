@@ -88,7 +88,10 @@ class WorldSettings:
                 f"{', '.join((*FAMILIES, RECORDED))}"
             )
         if (RECORDED in self.families) != bool(self.recordings):
-            raise RfgsError(f"motion {RECORDED!r} and recordings: expected both or neither")
+            raise RfgsError(
+                f"motion {RECORDED!r} and recordings: expected both or neither, as in "
+                "--motion recorded --recording walk.bvh"
+            )
         for recording in self.recordings:
             recording.check()
 

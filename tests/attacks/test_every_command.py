@@ -109,6 +109,7 @@ PIPES = [
         for name in ("plan", "generate", "coverage")
     ),
     "rfgs-factory tracers PIPE",
+    "rfgs-factory worlds --radio wifi --recording PIPE --out OUT",
     "rfgs-factory impair PIPE --impairments lab",
     "rfgs-factory impair DATA --impairments PIPE",
     "rfgs-factory convert PIPE --to nerf2 --out OUT",

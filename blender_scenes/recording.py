@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from blender_scenes.assemble import Folders, save_scene, watch
-from blender_scenes.motion.recorded import Recorded
+from blender_scenes.motion.recorded import Recorded, poses_of
 from blender_scenes.motion.score import Figure, Posture, Score, compose
 from blender_scenes.people.cast import PEOPLE, Actor, cast, key_score
 from blender_scenes.sets.lighting import COOL, ceiling_row
@@ -69,9 +69,8 @@ def _staged(
     figure: Figure, recording: Recording, path: Path, up: str
 ) -> tuple[Score, tuple[float, float, float]]:
     """The recording in the middle of a room, and the size of that room [m]."""
-    joints = np.array(
-        [figure.skeleton.joints(pose) for pose in retarget(recording, figure.skeleton, up)]
-    )
+    poses = poses_of(recording, figure.skeleton, up)
+    joints = np.array([figure.skeleton.joints(pose) for pose in poses])
     reach = np.ptp(joints.reshape(-1, 3), axis=0)
     if not (np.isfinite(reach).all() and reach[:2].max() < LARGEST_M - 2.0 * MARGIN_M):
         raise ValueError(

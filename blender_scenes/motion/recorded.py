@@ -12,38 +12,16 @@ from blender_scenes.motion.gestures import minimum_jerk
 from blender_scenes.motion.rotations import about_z
 from blender_scenes.motion.score import Clip, Figure, Posture
 from blender_scenes.motion.skeleton import Pose, Skeleton
+from blender_scenes.people.bones import RECORDED, anny_name
 from rfgs_core.motion_capture import Recording, retarget
 
-#: Bone of anny for each that a recording may have, without side.
-_OURS = {
-    "pelvis": "root",
-    "spine_lower": "spine04",
-    "spine_middle": "spine02",
-    "spine_upper": "spine01",
-    "neck": "neck01",
-    "head": "head",
-    "clavicle": "clavicle",
-    "upperarm": "upperarm01",
-    "lowerarm": "lowerarm01",
-    "hand": "wrist",
-    "upperleg": "upperleg01",
-    "lowerleg": "lowerleg01",
-    "foot": "foot",
-    "toe": "toe1-1",
-}
-_SIDES = {"left": ".L", "right": ".R"}
 #: From where our people look at rest, -y, to where recorded ones look, x.
 _AHEAD = about_z(0.5 * np.pi)
 
 
 def poses_of(recording: Recording, skeleton: Skeleton, up: str = "y") -> list[Pose]:
     """One pose per recorded frame, for a body of other proportions; see `retarget`."""
-    bones = {
-        f"{name}{side and '_' + side}": f"{ours}{_SIDES.get(side, '')}"
-        for name, ours in _OURS.items()
-        for side in ("", *_SIDES)
-    }
-    known = {name: ours for name, ours in bones.items() if ours in skeleton.index}
+    known = {bone: anny_name(bone) for bone in RECORDED if anny_name(bone) in skeleton.index}
     heads = {name: _AHEAD @ skeleton.head(ours) for name, ours in known.items()}
     root, turns = retarget(recording, heads, up)
     back = {known[name]: _AHEAD.T @ turn @ _AHEAD for name, turn in turns.items()}

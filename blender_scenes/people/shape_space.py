@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from blender_scenes.people.body import Body, Phenotype, load_body
+from blender_scenes.people.bones import anny_name
 from rfgs_core.arrays import save_arrays
 from rfgs_core.articulated.bones import BONES
 
@@ -21,23 +22,6 @@ COMPONENTS = 12
 #: Share of anny's triangles that is kept.
 DETAIL = 0.245
 SEED = 7
-
-#: Bone of anny at whose head each bone begins, without side.
-_START = {
-    "pelvis": "root",
-    "spine_lower": "spine04",
-    "spine_middle": "spine02",
-    "spine_upper": "spine01",
-    "neck": "neck01",
-    "head": "head",
-    "clavicle": "clavicle",
-    "upperarm": "upperarm01",
-    "lowerarm": "lowerarm01",
-    "hand": "wrist",
-    "upperleg": "upperleg01",
-    "lowerleg": "lowerleg01",
-    "foot": "foot",
-}
 
 
 def write_shape_space(path: Path) -> str:
@@ -91,14 +75,7 @@ def child(rng: np.random.Generator) -> Phenotype:
 
 def joints_at_rest(body: Body) -> np.ndarray:
     """Heads of our bones [B, 3] in our axes: x ahead, y left, z up."""
-    return turned(np.stack([body.head(_anny_name(name)) for name in BONES]))
-
-
-def _anny_name(name: str) -> str:
-    stem, _, side = name.partition("_")
-    if side in ("left", "right"):
-        return f"{_START[stem]}.{side[0].upper()}"
-    return _START[name]
+    return turned(np.stack([body.head(anny_name(name)) for name in BONES]))
 
 
 def turned(points: np.ndarray) -> np.ndarray:
@@ -171,7 +148,7 @@ def _components(points: np.ndarray, grown: np.ndarray) -> tuple[dict[str, np.nda
 def _skin(body: Body, corners: np.ndarray, shares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Index and weight of the four bones that hold each vertex most, both [V, 4]."""
     merged = np.zeros((len(body.vertices), len(BONES)))
-    starts = {_anny_name(name): row for row, name in enumerate(BONES)}
+    starts = {anny_name(name): row for row, name in enumerate(BONES)}
     for column in range(len(body.bones)):
         above = column
         while body.bones[above] not in starts:

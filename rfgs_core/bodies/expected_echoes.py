@@ -61,7 +61,8 @@ class ExpectedEchoes(NamedTuple):
         self, pair: Pair, bounds_m: Float64[np.ndarray, "2 3"]
     ) -> Complex64[np.ndarray, "entry entry"]:
         """Covariance of the echoes by way of one wall."""
-        parts = [evidence.by_bounces(one.facets, pair, bounds_m, self.middle) for one in self.ways]
+        images = evidence.images_of(pair, bounds_m, self.middle)
+        parts = [evidence.by_bounces(one.facets, pair, images) for one in self.ways]
         return np.sum(parts, axis=0)
 
 

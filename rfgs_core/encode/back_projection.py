@@ -89,24 +89,21 @@ def _add_profiles(profiles, centre_k, samples_per_m, tx_xyz, rx_xyz, links, poin
 def oversampled_profiles(
     csi: Complex[np.ndarray, "link *channel subcarrier"],
     freq_hz: Float[np.ndarray, "subcarrier"],
-    subcarriers: Int[np.ndarray, "subcarrier"] | None = None,
 ) -> tuple[np.ndarray, float, float]:
-    """Delay profiles of some subcarriers, `OVERSAMPLING` samples per cell 1/B of the whole band.
+    """Delay profiles, `OVERSAMPLING` samples per resolution cell 1/B.
 
     Args:
         csi: Channel at the subcarriers.
-        freq_hz: All subcarriers of the radio [Hz], equally spaced.
-        subcarriers: Which of them `csi` holds; None for all.
+        freq_hz: The subcarriers [Hz], equally spaced.
 
     Returns:
         Profiles (…, sample), divided by the number of subcarriers and relative to the middle one,
         whose wave number [rad/m] follows, and profile samples per metre of path.
     """
-    subcarriers = np.arange(len(freq_hz)) if subcarriers is None else subcarriers
-    size = OVERSAMPLING * len(freq_hz)
-    offset = int(subcarriers[len(subcarriers) // 2])
+    size, offset = OVERSAMPLING * len(freq_hz), len(freq_hz) // 2
     narrow = csi.astype(np.complex64, copy=False)
-    profiles = delay_transform(narrow, size, subcarriers - offset) * size / len(subcarriers)
+    places = np.arange(len(freq_hz)) - offset
+    profiles = delay_transform(narrow, size, places) * size / len(freq_hz)
     centre_k = 2.0 * np.pi * float(freq_hz[offset]) / SPEED_OF_LIGHT
     spacing_hz = float(freq_hz[1] - freq_hz[0])
     return profiles, centre_k, spacing_hz * size / SPEED_OF_LIGHT

@@ -5,8 +5,9 @@ For a point p and a pair (a, b) of devices the filter output is
 
     y(p) = (1/N) Σ_{t∈a, r∈b, f} H[t, r, f] exp(+j 2π f (|p − x_t| + |p − x_r|) / c),
 
-the classical back-projection. It is evaluated through an oversampled delay profile of each
-link, which is exact to the interpolation error of a linear reading between profile samples.
+the classical back-projection. Over the whole band it is evaluated through an oversampled delay
+profile of each link, which is exact to the interpolation error of a linear reading between profile
+samples; over narrow sub-bands by their sums.
 """
 
 from __future__ import annotations
@@ -16,31 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Complex, Float, Float32, Float64, Int
 
-from rfgs_core.encode.back_projection import (
-    OVERSAMPLING,
-    POINTS,
-    back_project,
-    oversampled_profiles,
-)
+from rfgs_core.encode.back_projection import POINTS, back_project, oversampled_profiles
+from rfgs_core.encode.band_sums import sum_bands
 from rfgs_core.encode.preprocess import hamming, normalise_subcarriers
 from rfgs_core.encode.protocol import FEATURES, FrameChannel
 from rfgs_core.radio import Layout
-
-
-def _band_profiles(
-    csi: Complex[np.ndarray, "link subcarrier"],
-    freq_hz: Float[np.ndarray, "subcarrier"],
-    num_bands: int,
-) -> tuple[np.ndarray, np.ndarray, float]:
-    """Profiles (link, band, sample) of each sub-band, as `back_project` takes them."""
-    samples_per_m = 0.0
-    profiles = np.zeros((len(csi), num_bands, OVERSAMPLING * len(freq_hz)), dtype=np.complex64)
-    centre_k = np.zeros(num_bands)
-    for band, subcarriers in enumerate(np.array_split(np.arange(len(freq_hz)), num_bands)):
-        profiles[:, band], centre_k[band], samples_per_m = oversampled_profiles(
-            csi[:, subcarriers], freq_hz, subcarriers
-        )
-    return profiles, centre_k, samples_per_m
 
 
 def matched_filter(
@@ -80,15 +61,14 @@ def _focused(
     num_bands: int,
 ) -> Complex[np.ndarray, "pair band N"]:
     """The filter of the links with `pair >= 0`, in row-major order."""
-    profiles, centre_k, samples_per_m = _band_profiles(csi, freq_hz, num_bands)
+    ends = {"tx_xyz": tx_xyz, "rx_xyz": rx_xyz, "pair": pair, "points": points}
+    if num_bands > 1:
+        parts = np.array_split(np.arange(len(freq_hz)), num_bands)
+        edges = np.cumsum([0, *map(len, parts)])
+        return sum_bands(csi, freq_hz, edges, **ends)
+    profiles, centre_k, samples_per_m = oversampled_profiles(csi, freq_hz)
     return back_project(
-        profiles,
-        centre_k=centre_k,
-        samples_per_m=samples_per_m,
-        tx_xyz=tx_xyz,
-        rx_xyz=rx_xyz,
-        pair=pair,
-        points=points,
+        profiles[:, None], centre_k=np.array([centre_k]), samples_per_m=samples_per_m, **ends
     )
 
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -58,20 +58,33 @@ def direct(posed: Posed, pair: Pair, shift: np.ndarray) -> np.ndarray:
     return covariance(pair, posed.facets.moved(shift), *posed.seen[pair.devices], LOBE_RAD)
 
 
-def by_bounces(
-    facets: Facets, pair: Pair, bounds_m: Float64[np.ndarray, "2 3"], centre: np.ndarray
-) -> np.ndarray:
-    """Covariance of the echoes by way of one wall on either leg, every wall a mirror."""
+def by_bounces(facets: Facets, pair: Pair, images: Iterable[tuple[End, End]]) -> np.ndarray:
+    """Covariance of the echoes by way of one wall on either leg, every wall a mirror.
+
+    Args:
+        facets: The posed surface.
+        pair: The pair.
+        images: Its ends in the walls, see `images_of`.
+    """
     few = facets.thinned(_EVERY)
     seen = np.ones(len(few.points), dtype=bool)
     total = np.zeros((len(pair.change),) * 2, dtype=np.complex64)
-    for tx, rx in _images(pair, bounds_m, centre):
+    for tx, rx in images:
         total += covariance(pair, few, seen, seen, LOBE_RAD, tx, rx)
     return total
 
 
-def _images(pair: Pair, bounds_m: np.ndarray, centre: np.ndarray) -> Iterator[tuple[End, End]]:
-    straight_m = _path_m(pair.tx, pair.rx, centre)
+def images_of(
+    pair: Pair, bounds_m: Float64[np.ndarray, "2 3"], centre: Float64[np.ndarray, "3"]
+) -> list[tuple[End, End]]:
+    """Both ends of a pair with one of them in the mirror of a wall, echoes of which count.
+
+    Args:
+        pair: The pair.
+        bounds_m: Corners of the room [m].
+        centre: Middle of the body [m].
+    """
+    straight_m, images = _path_m(pair.tx, pair.rx, centre), []
     for axis in range(3):
         for at_m in bounds_m[:, axis].tolist():
             for ends in (
@@ -79,7 +92,8 @@ def _images(pair: Pair, bounds_m: np.ndarray, centre: np.ndarray) -> Iterator[tu
                 (pair.tx, pair.rx.mirrored(axis, at_m)),
             ):
                 if _path_m(*ends, centre) - straight_m <= _LATEST_M:
-                    yield ends
+                    images.append(ends)
+    return images
 
 
 def _path_m(tx: End, rx: End, centre: np.ndarray) -> float:

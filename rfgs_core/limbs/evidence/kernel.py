@@ -26,6 +26,7 @@ import numpy as np
 from jaxtyping import Bool, Complex64, Complex128, Float64
 
 from rfgs_core.limbs.evidence.entries import End, Pair
+from rfgs_core.propagation.vector_math import FAST_MATH, sine_cosine_of_turns
 from rfgs_core.worlds.echoes import shadowing
 
 #: Shares of noise that are tried, against the mean power of the echoes.
@@ -76,9 +77,10 @@ def covariance(
         tx.share, rx.share, bands.first_k, bands.step_k, bands.middle_k, bands.block, bands.share,
         lobe_rad,
     )  # fmt: skip
-    if not len(rows):
+    if not rows.size:
         return np.zeros((len(pair.change),) * 2, dtype=np.complex64)
-    return _routines()[0](1.0, rows.T)
+    # As Fortran sees them the conjugate responses are (facet, entry): Σ is their Aᴴ A.
+    return _routines()[0](1.0, rows.T, trans=2)
 
 
 def log_evidence(
@@ -116,7 +118,7 @@ def log_evidence(
 
 @functools.cache
 def _routines() -> tuple[Any, Any, Any]:
-    """A Aᴴ in single precision; Cholesky's factor and solving with it in double."""
+    """A Aᴴ or Aᴴ A in single precision; Cholesky's factor and solving with it in double."""
     from scipy.linalg import get_blas_funcs, get_lapack_funcs
 
     product: Any = get_blas_funcs("herk", dtype=np.complex64)
@@ -163,20 +165,51 @@ def _weight(
     return sent / (d_t * d_r), d_t + d_r
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
-def _add_phases(
+@numba.njit(cache=True, nogil=True, fastmath=FAST_MATH)
+def _array_responses(
     x: np.ndarray, xyz: np.ndarray, steered: np.ndarray, block: np.ndarray, share: np.ndarray,
-    k: float, out: np.ndarray,
-) -> None:  # fmt: skip
-    """Response of each block of an array to a point."""
-    out[:] = 0.0
+    per_m: float,
+) -> np.ndarray:  # fmt: skip
+    """Response of each block of an array to points [m], rows real and imaginary, (block, 2, N)."""
+    out = np.zeros((len(share), 2, x.shape[1]), np.float32)
+    x0, x1, x2 = x[0], x[1], x[2]
     for e in range(len(xyz)):
-        a, b, c = xyz[e, 0] - x[0], xyz[e, 1] - x[1], xyz[e, 2] - x[2]
-        phase = k * (math.sqrt(a * a + b * b + c * c) - steered[e])
-        out[block[e]] += share[block[e]] * complex(math.cos(phase), -math.sin(phase))
+        real, imaginary, times = out[block[e], 0], out[block[e], 1], np.float32(share[block[e]])
+        a, b, c, away = xyz[e, 0], xyz[e, 1], xyz[e, 2], steered[e]
+        for i in range(x.shape[1]):
+            p, q, r = a - x0[i], b - x1[i], c - x2[i]
+            turns = per_m * (math.sqrt(p * p + q * q + r * r) - away)
+            sine, cosine = sine_cosine_of_turns(np.float32(turns - math.floor(turns + 0.5)))
+            real[i] += times * cosine
+            imaginary[i] -= times * sine
+    return out
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST_MATH)
+def _band_responses(
+    late: np.ndarray, first_per_m: float, step_per_m: float, band: np.ndarray, share: np.ndarray
+) -> np.ndarray:
+    """Response of each band to paths longer by `late` [m], as `_array_responses`."""
+    out, wave = np.zeros((len(share), 2, len(late)), np.float32), np.zeros((4, len(late)))
+    x, y, u, v = wave[0], wave[1], wave[2], wave[3]
+    for i in range(len(late)):
+        first, step = first_per_m * late[i], step_per_m * late[i]
+        sine, cosine = sine_cosine_of_turns(np.float32(first - math.floor(first + 0.5)))
+        x[i], y[i] = cosine, -sine
+        sine, cosine = sine_cosine_of_turns(np.float32(step - math.floor(step + 0.5)))
+        u[i], v[i] = cosine, -sine
+    for f in range(len(band)):
+        if band[f] >= 0:
+            real, imaginary, times = out[band[f], 0], out[band[f], 1], share[band[f]]
+            for i in range(len(late)):
+                real[i] += times * x[i]
+                imaginary[i] += times * y[i]
+        for i in range(len(late)):
+            x[i], y[i] = x[i] * u[i] - y[i] * v[i], x[i] * v[i] + y[i] * u[i]
+    return out
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST_MATH)
 def _responses(
     points: np.ndarray, normals: np.ndarray, root_area: np.ndarray, by_tx: np.ndarray,
     by_rx: np.ndarray, tx: np.ndarray, rx: np.ndarray, tx_steered: np.ndarray,
@@ -185,7 +218,7 @@ def _responses(
     first_k: float, step_k: float, middle_k: float, band: np.ndarray, band_share: np.ndarray,
     lobe: float,
 ) -> np.ndarray:  # fmt: skip
-    """Weighted responses of the facets that count, complex64, shape (facet, entry)."""
+    """Conjugate weighted responses of the facets that count, complex64, shape (entry, facet)."""
     tx_mid, rx_mid = np.zeros(3), np.zeros(3)
     for axis in range(3):
         tx_mid[axis], rx_mid[axis] = tx[:, axis].mean(), rx[:, axis].mean()
@@ -195,30 +228,36 @@ def _responses(
             weight[i], path[i] = _weight(points[i], normals[i], tx_mid, rx_mid, by_rx[i], lobe)
             weight[i] *= root_area[i]
     used = np.flatnonzero(weight > _WEAKEST * weight.max())
-    steered = tx_steered.mean() + rx_steered.mean()
-    sent = np.zeros(len(tx_share), np.complex128)
-    heard = np.zeros(len(rx_share), np.complex128)
-    banded = np.zeros(len(band_share), np.complex128)
-    out = np.zeros((len(used), len(sent) * len(heard) * len(banded)), np.complex64)
+    x, late, strength = np.zeros((3, len(used))), np.zeros(len(used)), np.zeros(len(used))
     for row in range(len(used)):
-        i = used[row]
-        _add_phases(points[i], tx, tx_steered, tx_block, tx_share, middle_k, sent)
-        _add_phases(points[i], rx, rx_steered, rx_block, rx_share, middle_k, heard)
+        x[0, row], x[1, row], x[2, row] = points[used[row]]
         # Across the band only the length of the path counts, not that within the arrays.
-        late = path[i] - steered
-        turn = complex(math.cos(step_k * late), -math.sin(step_k * late))
-        start = (first_k - middle_k) * late
-        wave = complex(math.cos(start), -math.sin(start))
-        banded[:] = 0.0
-        for f in range(len(band)):
-            if band[f] >= 0:
-                banded[band[f]] += wave * band_share[band[f]]
-            wave *= turn
-        e = 0
-        for a in range(len(sent)):
-            for b in range(len(heard)):
-                both = weight[i] * sent[a] * heard[b]
-                for f in range(len(banded)):
-                    out[row, e] = both * banded[f]
-                    e += 1
-    return out
+        late[row] = path[used[row]] - tx_steered.mean() - rx_steered.mean()
+        strength[row] = weight[used[row]]
+    per_m = 1.0 / (2.0 * math.pi)
+    sent = _array_responses(x, tx, tx_steered, tx_block, tx_share, middle_k * per_m)
+    heard = _array_responses(x, rx, rx_steered, rx_block, rx_share, middle_k * per_m)
+    banded = _band_responses(late, (first_k - middle_k) * per_m, step_k * per_m, band, band_share)
+    return _products(sent, heard, banded, strength.astype(np.float32))
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST_MATH)
+def _products(
+    sent: np.ndarray, heard: np.ndarray, banded: np.ndarray, weight: np.ndarray
+) -> np.ndarray:
+    """Conjugates of all products of three responses and a weight, complex64, (entry, facet)."""
+    count = len(weight)
+    out = np.zeros((len(sent) * len(heard) * len(banded), 2 * count), np.float32)
+    both, e = np.zeros((2, count), np.float32), 0
+    for a in range(len(sent)):
+        for b in range(len(heard)):
+            for i in range(count):
+                p, q, r, s = sent[a, 0, i], sent[a, 1, i], heard[b, 0, i], heard[b, 1, i]
+                both[0, i], both[1, i] = weight[i] * (p * r - q * s), weight[i] * (p * s + q * r)
+            for f in range(len(banded)):
+                row = out[e]
+                for i in range(count):
+                    p, q, r, s = both[0, i], both[1, i], banded[f, 0, i], banded[f, 1, i]
+                    row[2 * i], row[2 * i + 1] = p * r - q * s, -(p * s + q * r)
+                e += 1
+    return out.view(np.complex64)

@@ -13,7 +13,7 @@ from jaxtyping import Float64
 
 from rfgs_core.articulated import Pose
 from rfgs_core.encode.body_maps import CENTRE_HEIGHT_M
-from rfgs_core.limbs.evidence.body import by_bounces, direct, posed
+from rfgs_core.limbs.evidence.body import by_bounces, direct, images_of, posed
 from rfgs_core.limbs.evidence.entries import pairs_of
 from rfgs_core.limbs.evidence.kernel import log_evidence
 from rfgs_core.limbs.evidence.library import about_z
@@ -49,12 +49,13 @@ def evidence_table(
     centre = np.array([*place[0], floor_m + CENTRE_HEIGHT_M])
     pairs = pairs_of(observations, centre)
     table = {pair.devices: np.zeros((len(poses), len(shifts), len(alphas))) for pair in pairs}
+    images = {pair.devices: images_of(pair, observations.bounds_m, centre) for pair in pairs}
     for row, pose in enumerate(poses):
         body = posed(figure, pose.turned(about_z(place[1])).moved(spot), pairs)
         for pair in pairs:
             bounces = 0.0
             if any(alphas):
-                bounces = by_bounces(body.facets, pair, observations.bounds_m, centre)
+                bounces = by_bounces(body.facets, pair, images[pair.devices])
             for column, shift in enumerate(shifts):
                 straight = direct(body, pair, shift)
                 table[pair.devices][row, column] = [

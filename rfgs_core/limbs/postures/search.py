@@ -16,7 +16,7 @@ from jaxtyping import Float64
 
 from rfgs_core.articulated import Pose
 from rfgs_core.encode.body_maps import CENTRE_HEIGHT_M
-from rfgs_core.limbs.evidence.body import by_bounces, direct, posed
+from rfgs_core.limbs.evidence.body import by_bounces, direct, images_of, posed
 from rfgs_core.limbs.evidence.entries import pairs_of
 from rfgs_core.limbs.evidence.kernel import log_evidence
 from rfgs_core.limbs.evidence.library import about_z, upright
@@ -95,7 +95,8 @@ class FrameSearch:
         self._pairs = pairs_of(observations, centre)
         stands = posed(figure, upright(figure.body).moved(self._found), self._pairs)
         self._bounces = [
-            _ALPHA**2 * by_bounces(stands.facets, pair, observations.bounds_m, centre)
+            _ALPHA**2
+            * by_bounces(stands.facets, pair, images_of(pair, observations.bounds_m, centre))
             for pair in self._pairs
         ]
 

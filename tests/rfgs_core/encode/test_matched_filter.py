@@ -78,7 +78,7 @@ def test_sub_bands_are_the_sums_over_their_subcarriers(small: tuple) -> None:
     got = matched_filter(*small, points, num_bands=5)
     for band, subcarriers in enumerate(np.array_split(np.arange(64), 5)):
         expected = plain(csi[..., subcarriers], elements, pair, freq_hz[subcarriers], points)
-        assert np.abs(got[:, band] - expected).max() < 0.01 * np.abs(expected).std()
+        assert np.abs(got[:, band] - expected).max() < 1e-4 * np.abs(expected).std()
 
 
 def test_sub_bands_average_to_the_full_band(small: tuple) -> None:

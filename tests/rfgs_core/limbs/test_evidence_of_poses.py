@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rfgs_core.articulated import people
-from rfgs_core.limbs.evidence.body import LOBE_RAD, by_bounces, direct, figure_of, posed
+from rfgs_core.limbs.evidence.body import LOBE_RAD, by_bounces, direct, figure_of, images_of, posed
 from rfgs_core.limbs.evidence.entries import End, Pair, pairs_of
 from rfgs_core.limbs.evidence.kernel import NOISE_SHARES, Facets, covariance, log_evidence
 from rfgs_core.limbs.evidence.library import PHASES, Stride, strides, upright
@@ -174,7 +174,7 @@ def test_a_wall_sends_what_images_of_the_ends_send(frame) -> None:
     every = np.ones(len(few.points), bool)
     images = (pair.tx.mirrored(1, 2.5), pair.rx), (pair.tx, pair.rx.mirrored(1, 2.5))
     wanted = sum(covariance(pair, few, every, every, LOBE_RAD, *ends) for ends in images)
-    got = by_bounces(there.facets, pair, bounds_m, CENTRE)
+    got = by_bounces(there.facets, pair, images_of(pair, bounds_m, CENTRE))
     assert np.abs(got).max() > 0.0
     np.testing.assert_allclose(got, wanted, atol=1e-6 * np.abs(wanted).max())
     assert np.trace(direct(there, pair, np.zeros(3))).real > 0.0

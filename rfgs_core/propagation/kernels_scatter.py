@@ -24,7 +24,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit, prange
 
-from rfgs_core.propagation.vector_math import (
+from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.vector_math import (
     BLOCK,
     FAST_MATH,
     FAST_REDUCTION,
@@ -34,7 +35,6 @@ from rfgs_core.propagation.vector_math import (
     six_rows,
     three_rows,
 )
-from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
 #: Subcarriers handled in one pass over a block; chunks are padded to a multiple of it.
 UNROLL = 4

@@ -51,7 +51,7 @@ from rfgs_core.propagation.kernels_scatter import (
     start_subcarriers,
     turn,
 )
-from rfgs_core.propagation.vector_math import BLOCK, scratch, six_rows, three_rows
+from rfgs_core.vector_math import BLOCK, scratch, six_rows, three_rows
 
 
 class CloudGradient(NamedTuple):

@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit, prange
 
 from rfgs_core.propagation.fresnel import EDGE_M
-from rfgs_core.propagation.vector_math import (
+from rfgs_core.vector_math import (
     BLOCK,
     FAST_MATH,
     exponential,

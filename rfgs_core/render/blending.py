@@ -11,9 +11,9 @@ from typing import Any
 import numba
 import numpy as np
 
-from rfgs_core.propagation.vector_math import FAST_REDUCTION, exponential
 from rfgs_core.render.hidden import LIGHT_MIN, is_hidden, span
 from rfgs_core.render.splat import ALPHA_MAX, TILE_PX
+from rfgs_core.vector_math import FAST_REDUCTION, exponential
 
 #: Splats after which a tile is looked at again.
 _LOOK_EVERY = 16

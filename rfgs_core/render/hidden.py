@@ -20,7 +20,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from rfgs_core.propagation.vector_math import FAST_REDUCTION
+from rfgs_core.vector_math import FAST_REDUCTION
 
 #: Splats are left out where less light than this passes, and a tile is finished when that is
 #: everywhere.

@@ -26,7 +26,7 @@ import numpy as np
 from jaxtyping import Bool, Complex64, Complex128, Float64
 
 from rfgs_core.limbs.evidence.entries import End, Pair
-from rfgs_core.propagation.vector_math import FAST_MATH, sine_cosine_of_turns
+from rfgs_core.vector_math import FAST_MATH, sine_cosine_of_turns
 from rfgs_core.worlds.echoes import shadowing
 
 #: Shares of noise that are tried, against the mean power of the echoes.
@@ -171,15 +171,18 @@ def _array_responses(
     per_m: float,
 ) -> np.ndarray:  # fmt: skip
     """Response of each block of an array to points [m], rows real and imaginary, (block, 2, N)."""
-    out = np.zeros((len(share), 2, x.shape[1]), np.float32)
+    out, late = np.zeros((len(share), 2, x.shape[1]), np.float32), np.zeros(x.shape[1])
     x0, x1, x2 = x[0], x[1], x[2]
     for e in range(len(xyz)):
         real, imaginary, times = out[block[e], 0], out[block[e], 1], np.float32(share[block[e]])
         a, b, c, away = xyz[e, 0], xyz[e, 1], xyz[e, 2], steered[e]
+        # One loop over this many arrays, which might overlap, would not become vector code.
         for i in range(x.shape[1]):
             p, q, r = a - x0[i], b - x1[i], c - x2[i]
-            turns = per_m * (math.sqrt(p * p + q * q + r * r) - away)
-            sine, cosine = sine_cosine_of_turns(np.float32(turns - math.floor(turns + 0.5)))
+            late[i] = math.sqrt(p * p + q * q + r * r) - away
+        for i in range(x.shape[1]):
+            turns = per_m * late[i]
+            sine, cosine = sine_cosine_of_turns(np.float32(turns - np.floor(turns + 0.5)))
             real[i] += times * cosine
             imaginary[i] -= times * sine
     return out
@@ -194,9 +197,9 @@ def _band_responses(
     x, y, u, v = wave[0], wave[1], wave[2], wave[3]
     for i in range(len(late)):
         first, step = first_per_m * late[i], step_per_m * late[i]
-        sine, cosine = sine_cosine_of_turns(np.float32(first - math.floor(first + 0.5)))
+        sine, cosine = sine_cosine_of_turns(np.float32(first - np.floor(first + 0.5)))
         x[i], y[i] = cosine, -sine
-        sine, cosine = sine_cosine_of_turns(np.float32(step - math.floor(step + 0.5)))
+        sine, cosine = sine_cosine_of_turns(np.float32(step - np.floor(step + 0.5)))
         u[i], v[i] = cosine, -sine
     for f in range(len(band)):
         if band[f] >= 0:

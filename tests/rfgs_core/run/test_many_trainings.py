@@ -19,6 +19,7 @@ from rfgs_core.dataset.writer import finish_dataset, write_dataset_info
 from rfgs_core.errors import RfgsError
 from rfgs_core.run import open_run
 from rfgs_core.schedule.archive import unpack
+from rfgs_core.settings import TrainOptions
 
 #: A training that takes a second.
 QUICK = (
@@ -207,6 +208,44 @@ def test_no_link_leads_out_of_the_folder_of_runs(
         assert main(asked(two_sequences, out, "--sequence", "all", "--workers", workers)) == 1
         assert capsys.readouterr().out.count("a symbolic link leads out of") == 2
     assert not list((tmp_path / "victim").iterdir()) and not (tmp_path / "nowhere").exists()
+
+
+def test_a_cluster_makes_a_single_run_in_the_folder_itself(
+    two_sequences: Path, by_one_process: Path, cluster: Any, tmp_path: Path, capsys
+) -> None:
+    out = tmp_path / "below" / "wifi-run"
+    out.mkdir(parents=True)
+    more = ("--sequence", "tiny", "--scheduler", cluster.scheduler_address)
+    assert main(asked(two_sequences, out, *more)) == 0
+    assert capsys.readouterr().out.startswith(f"people: 1, asked\n{out}: 2 frames, 40 Gaussians")
+    found, expected = content(out.parent), content(by_one_process)
+    for name in expected:
+        if name.startswith("tiny-wifi") and not name.endswith("config.json"):
+            assert found[name.replace("tiny-wifi", "wifi-run")] == expected[name], name
+    assert open_run(out).sequence.path == two_sequences / "tiny"
+    assert [path.name for path in out.parent.iterdir()] == ["wifi-run"]
+    # What a worker refuses is an error of the command, and the run is as it was.
+    assert main(asked(two_sequences, out, *more, "--seed", "3")) == 2
+    assert "holds a run with another seed" in capsys.readouterr().err
+    assert main([*asked(two_sequences, tmp_path / "no", *more), "--density", "paper"]) == 2
+    assert "reads the sample points of the paper's" in capsys.readouterr().err
+
+
+def test_a_learned_encoder_goes_to_the_worker(two_sequences: Path, tmp_path: Path, capsys) -> None:
+    file, words = tmp_path / "cnn.npz", ["--radio", "wifi", "--sequence", "tiny"]
+    assert main(["encode", str(two_sequences), *words, "--steps", "1", "--out", str(file)]) == 0
+    options = TrainOptions(posture="standing", limbs="off")
+    args = TrainArgs(
+        two_sequences, ("wifi",), tmp_path / "runs", ("tiny",), encoder=f"cnn:{file}", people=1,
+        iterations=1, gaussians=40, shader=False, options=options,
+    )  # fmt: skip
+    (training,) = trainings(args)
+    parcel, there = training.parcel(tmp_path), tmp_path / "there"
+    unpack(parcel.archive(), there / parcel.part.dataset)
+    expected = file.read_bytes()
+    file.unlink()
+    parcel.part.make(there)
+    assert (there / "runs/encoder.npz").read_bytes() == expected
 
 
 def test_a_worker_gets_one_sequence_and_what_is_begun(

@@ -7,9 +7,10 @@ import gc
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from jaxtyping import install_import_hook
@@ -81,6 +82,35 @@ def python() -> Callable[..., subprocess.CompletedProcess[str]]:
         return done
 
     return run
+
+
+@pytest.fixture(scope="session")
+def start_cluster() -> Callable[..., AbstractContextManager[Any]]:
+    """Starts a cluster of two processes of this machine, which come back when they are killed."""
+
+    @contextmanager
+    def running(folder: Path, threads: int = 1) -> Iterator[Any]:
+        from distributed import LocalCluster
+
+        with LocalCluster(
+            n_workers=2,
+            threads_per_worker=threads,
+            processes=True,
+            dashboard_address=None,
+            local_directory=str(folder / "dask"),
+            silence_logs=50,
+        ) as cluster:
+            yield cluster
+
+    return running
+
+
+@pytest.fixture
+def cluster(
+    start_cluster: Callable[..., AbstractContextManager[Any]], tmp_path: Path
+) -> Iterator[Any]:
+    with start_cluster(tmp_path) as cluster:
+        yield cluster
 
 
 @pytest.fixture(scope="session")

@@ -74,9 +74,7 @@ class RunConfig:
         except RfgsFormatError:
             raise
         except RfgsError as error:
-            raise RfgsError(
-                f"{run} is not a run: it has no {CONFIG_FILE}; `rfgs train` makes one"
-            ) from error
+            raise RfgsError(_why_no_run(run)) from error
         if stored.get("schema") != SCHEMA:
             raise RfgsFormatError(
                 f"{path}: expected schema {SCHEMA}, found {stored.get('schema')}; "
@@ -100,6 +98,20 @@ class RunConfig:
         return config
 
 
+def runs_in(folder: Path) -> list[Path]:
+    """Runs that lie side by side in a folder, as `rfgs train` leaves several; by name."""
+    return sorted(file.parent for file in folder.glob(f"*/{CONFIG_FILE}"))
+
+
+def _why_no_run(folder: Path) -> str:
+    """Why a folder is not a run, and what to name instead."""
+    held = [str(run) for run in runs_in(folder)]
+    if not held:
+        return f"{folder} is not a run: it has no {CONFIG_FILE}; `rfgs train` makes one"
+    more = f" and {len(held) - _NAMED} more" if len(held) > _NAMED else ""
+    return f"{folder} is not a run, but holds some; name one: {', '.join(held[:_NAMED])}{more}"
+
+
 def relative_dataset(run: Path, dataset: Path) -> str:
     """Path of the dataset as stored in a run: relative, so that both can move together."""
     return Path(os.path.relpath(dataset.resolve(), run.resolve())).as_posix()
@@ -108,6 +120,8 @@ def relative_dataset(run: Path, dataset: Path) -> str:
 #: What held of runs without a word of it: they started from the prior, and saw no wall.
 _UNSAID = {"start": "prior", "excess_m": 0.0}
 _REMEDY = "train again"
+#: Runs that are named where one of a folder's is expected.
+_NAMED = 6
 _OWN = tuple(field.name for field in fields(RunConfig) if field.name not in ("settings", "train_s"))
 _SETTINGS = tuple(field.name for field in fields(TrainConfig) if field.name not in _NOT_KEPT)
 

@@ -22,7 +22,6 @@ from rfgs_core.background.learned import (
 from rfgs_core.background.static_set import fit_static_set
 from rfgs_core.dataset import Dataset, Sequence
 from rfgs_core.device import need_device
-from rfgs_core.errors import RfgsError
 from rfgs_core.files import sweep
 from rfgs_core.fit.calibrate import calibrate
 from rfgs_core.fit.frame import FrameState, start_anywhere, start_frame, start_on_skins
@@ -30,11 +29,11 @@ from rfgs_core.fit.refine import need_sample_points
 from rfgs_core.fit.stages import fit_frame
 from rfgs_core.gaussians.ply import GaussianCloud, read_ply, write_ply
 from rfgs_core.limbs.weights import Trained
-from rfgs_core.links import refuse_link
 from rfgs_core.locks import alone_in
 from rfgs_core.measure.offsets import Offsets
 from rfgs_core.measure.resolving import resolving
 from rfgs_core.past import Speed, note_speed
+from rfgs_core.run.begun import POINT_CLOUD_FILE, asked_of, open_or_create, refuse_other_files
 from rfgs_core.run.calibration import (
     calibration_path,
     need_shared_links,
@@ -42,7 +41,6 @@ from rfgs_core.run.calibration import (
     write_calibration,
 )
 from rfgs_core.run.checkpoint import checkpoint_path, finished_frame, partial_path, store_frame
-from rfgs_core.run.config import CONFIG_FILE, RunConfig, relative_dataset
 from rfgs_core.run.costs import CostBar, cost_bar, pose_stage, price_line
 from rfgs_core.run.encoders import (
     ENCODER_FILE,
@@ -50,7 +48,7 @@ from rfgs_core.run.encoders import (
     refuse_other_radios,
     run_encoder,
 )
-from rfgs_core.run.excess import ExcessPath, excess_of_run
+from rfgs_core.run.excess import ExcessPath
 from rfgs_core.run.folder import (
     BACKGROUND_FILE,
     Run,
@@ -66,7 +64,7 @@ from rfgs_core.run.limbs import (
     looks_at,
 )
 from rfgs_core.run.log import Scalars, TrainingLog
-from rfgs_core.run.people import People, counted, need_no_people
+from rfgs_core.run.people import People, need_no_people
 from rfgs_core.run.static import (
     has_static_set,
     need_phases,
@@ -113,28 +111,15 @@ def train_sequence(
     _check(dataset, sequence, radio, config)
     if encoder_file is not None:
         refuse_other_radios(encoder_file, sequence, radio, config.packets)
-    if out.exists() and not out.is_dir():
-        raise RfgsError(f"{out} is a file; expected a folder, choose another --out")
-    refuse_link(out / CONFIG_FILE)
+    refuse_other_files(out)
     out.mkdir(parents=True, exist_ok=True)
     with alone_in(out, out, "rfgs train"):
         sweep(out, ".tmp-*")
-        _refuse_other_files(out)
         begin = time.perf_counter()
-        excess_m = excess_of_run(out, sequence, radio, frames, config, excess)
-        config = replace(config, excess_m=excess_m)
-        heads = counted(out, sequence, radio, frames, config, people)
-        asked = RunConfig(
-            dataset=relative_dataset(out, dataset.path),
-            dataset_fingerprint=dataset.fingerprint,
-            sequence=sequence.name,
-            radio=radio,
-            frames=frames,
-            settings=config if heads is None else replace(config, bodies=max(heads.count, 1)),
-            train_s=round(time.perf_counter() - begin, 2),
-        )
+        asked, heads = asked_of(out, dataset, sequence, radio, frames, config, people, excess)
+        asked = replace(asked, train_s=round(time.perf_counter() - begin, 2))
         # The file of a run does not keep every setting: the device is free.
-        run = _open_or_create(out, asked)
+        run = open_or_create(out, asked)
         if heads is not None:
             heads.write(out)
         return _train(run, asked.settings, sequence, encoder_file, log)
@@ -301,34 +286,10 @@ def _calibrate(run: Run, frame: int, config: TrainConfig, seed: int) -> None:
     write_calibration(run.path, frame, calibrate(reported, config, seed, known))
 
 
-def _refuse_other_files(out: Path) -> None:
-    """Refuses a folder that holds something else than a run."""
-    # Whoever starts a training from elsewhere keeps its log there.
-    begun = (out / CONFIG_FILE).exists()
-    if not begun and any(entry.name != "log" for entry in out.iterdir()):
-        raise RfgsError(f"{out} is not empty and not a run; choose another --out")
-
-
-def _open_or_create(out: Path, config: RunConfig) -> Run:
-    if not (out / CONFIG_FILE).exists():
-        config.write(out)
-        return Run(out, config)
-    run = open_run(out)
-    if config.dataset_fingerprint == run.config.dataset_fingerprint:
-        run = run.with_dataset(out / config.dataset)
-    differing = config.differing(run.config)
-    if differing:
-        raise RfgsError(
-            f"{out} holds a run with another {', '.join(differing)}; choose another --out or "
-            "delete that folder"
-        )
-    return run
-
-
 def _write_point_cloud(run: Run) -> None:
     """Static Gaussians and those of the first frame in one file, for any splat viewer."""
     write_ply(
-        run.path / "point_cloud.ply",
+        run.path / POINT_CLOUD_FILE,
         GaussianCloud.join(
             static_cloud(run.path), read_ply(run.ply_path(run.frames[0]), "train this run again")
         ),

@@ -5,15 +5,22 @@ from __future__ import annotations
 
 import io
 import zipfile
+from collections.abc import Collection
 from pathlib import Path
 
+from rfgs_core.links import refuse_link
 
-def packed(folder: Path, without: str = "") -> bytes:
+
+def packed(folder: Path, without: str = "", only: Collection[str] = ()) -> bytes:
     """A folder's files as an archive.
 
     Args:
         folder: The folder.
         without: A folder in it that stays behind; empty takes everything.
+        only: Names in it that are taken; empty takes all.
+
+    Raises:
+        RfgsFormatError: A link leads out of a dataset or run, which there would be a plain file.
     """
     buffer = io.BytesIO()
     with zipfile.ZipFile(
@@ -21,7 +28,9 @@ def packed(folder: Path, without: str = "") -> bytes:
     ) as archive:
         for path in sorted(folder.rglob("*")):
             name = path.relative_to(folder)
-            if path.is_file() and name.parts[0] != without:
+            wanted = name.parts[0] != without and (not only or name.parts[0] in only)
+            if wanted and path.is_file():
+                refuse_link(path)
                 archive.write(path, name.as_posix())
     return buffer.getvalue()
 

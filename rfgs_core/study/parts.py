@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parts of a study or table, made one after another here or side by side by workers.
+"""Parts of a study, a table or many trainings: made one after another here, or by workers.
 
 Workers share no disk with this process: a part's dataset goes there as an archive, what was made
-of it comes back as one, and only this process writes the study.
+of it comes back as one, and only this process writes the folder of all.
 """
 
 from __future__ import annotations
@@ -11,7 +11,9 @@ import hashlib
 import os
 import shutil
 import tempfile
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
@@ -35,7 +37,7 @@ class Part(Protocol):
 
     @property
     def dataset(self) -> Path:
-        """Folder of its dataset within the study's."""
+        """Folder of its dataset within the study's; of one that lies elsewhere, at a worker."""
         ...
 
     @property
@@ -53,6 +55,16 @@ class Part(Protocol):
 
 
 P = TypeVar("P", bound=Part)
+
+
+@dataclass(frozen=True)
+class Parcel:
+    """What a worker gets of a part."""
+
+    part: Part
+    """As it is made there."""
+    archive: Callable[[], bytes]
+    """Packs what will be the folder of its dataset; asked once for parts of the same dataset."""
 
 
 def datasets_missing(
@@ -86,8 +98,9 @@ def outcomes(
     out: Path,
     spread: Spread,
     finished: Callable[[P], bool],
-    generate: Callable[[P], None],
+    generate: Callable[[P], None] | None,
     tell: Callable[[str], None],
+    send: Callable[[P], Parcel] | None = None,
 ) -> Iterator[tuple[P, str]]:
     """Parts as they are there; first what is finished, then those without a dataset.
 
@@ -96,8 +109,9 @@ def outcomes(
         out: Folder of the study or table.
         spread: Who makes them.
         finished: Whether a part was made before; an `RfgsError` says why it can be made in no way.
-        generate: Generates the dataset of a part.
+        generate: Generates the dataset of a part; None where all are there.
         tell: Is told what is under way.
+        send: As of `made`.
 
     Yields:
         Each part, and why it is not there; empty if it is.
@@ -116,20 +130,27 @@ def outcomes(
             yield part, ""
         else:
             left.append(part)
-    missing = datasets_missing(left, out, generate, tell)
+    missing = datasets_missing(left, out, generate, tell) if generate else {}
     yield from ((part, missing[part.dataset]) for part in left if part.dataset in missing)
-    for part, failure in made([one for one in left if one.dataset not in missing], out, spread):
+    ready = [one for one in left if one.dataset not in missing]
+    for part, failure in made(ready, out, spread, send):
         tell(str(part))
         yield part, failure
 
 
-def made(parts: Sequence[P], out: Path, spread: Spread) -> Iterator[tuple[P, str]]:
+def made(
+    parts: Sequence[P],
+    out: Path,
+    spread: Spread,
+    send: Callable[[P], Parcel] | None = None,
+) -> Iterator[tuple[P, str]]:
     """Makes parts, whose datasets are there.
 
     Args:
         parts: What is missing.
         out: Folder of the study or table.
         spread: Who makes them: one after another here, or workers.
+        send: What a worker gets of a part; left out: the part, and its dataset within the study.
 
     Yields:
         Each part when it is made or has failed, and why it failed; empty if it did not. Of
@@ -149,23 +170,31 @@ def made(parts: Sequence[P], out: Path, spread: Spread) -> Iterator[tuple[P, str
     refuse_link(out / _SCRATCH)
     try:
         with spread.ready(len(parts), out / _SCRATCH, out / _LOG, _leave) as workers:
-            yield from _by_workers(workers, parts, out)
+            yield from _by_workers(workers, parts, out, send)
     finally:
-        shutil.rmtree(out / _SCRATCH, ignore_errors=True)
+        if not spread.scheduler:
+            shutil.rmtree(out / _SCRATCH, ignore_errors=True)
 
 
-def _by_workers(workers: Workers, parts: Sequence[P], out: Path) -> Iterator[tuple[P, str]]:
-    client, datasets = workers.client, {}
+def _by_workers(
+    workers: Workers, parts: Sequence[P], out: Path, send: Callable[[P], Parcel] | None
+) -> Iterator[tuple[P, str]]:
+    client, datasets, left = workers.client, {}, Counter(part.dataset for part in parts)
     log = str((out / _LOG).absolute()) if workers.ours else ""
 
     def submit(part: P) -> Future:
+        parcel = send(part) if send else Parcel(part, lambda: packed(out / part.dataset))
         if part.dataset not in datasets:
             # A task of its own, so that Dask makes it again where the worker that held it died.
-            archive = packed(out / part.dataset)
-            datasets[part.dataset] = client.submit(bytes, archive, pure=False)
-        return client.submit(_make, part, datasets[part.dataset], versions(), log, pure=False)
+            datasets[part.dataset] = client.submit(bytes, parcel.archive(), pure=False)
+        dataset = datasets[part.dataset]
+        return client.submit(_make, parcel.part, dataset, versions(), log, pure=False)
 
     for part, answer in workers.answers(parts, submit, doing="making"):
+        left[part.dataset] -= 1
+        if not left[part.dataset]:
+            # Of many datasets, workers would come to hold all.
+            del datasets[part.dataset]
         archive, failure = answer.value
         if not failure:
             _place(archive, part, out)

@@ -8,7 +8,6 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -186,35 +185,6 @@ def data_of() -> Callable[[Path], dict[str, bytes]]:
         }
 
     return read
-
-
-@pytest.fixture(scope="session")
-def start_cluster() -> Callable[..., AbstractContextManager[Any]]:
-    """Starts a cluster of two processes of this machine, which come back when they are killed."""
-
-    @contextmanager
-    def running(folder: Path, threads: int = 1) -> Iterator[Any]:
-        from distributed import LocalCluster
-
-        with LocalCluster(
-            n_workers=2,
-            threads_per_worker=threads,
-            processes=True,
-            dashboard_address=None,
-            local_directory=str(folder / "dask"),
-            silence_logs=50,
-        ) as cluster:
-            yield cluster
-
-    return running
-
-
-@pytest.fixture
-def cluster(
-    start_cluster: Callable[..., AbstractContextManager[Any]], tmp_path: Path
-) -> Iterator[Any]:
-    with start_cluster(tmp_path) as cluster:
-        yield cluster
 
 
 @pytest.fixture(scope="session")

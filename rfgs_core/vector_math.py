@@ -74,7 +74,7 @@ def exponential(x: float) -> float:
     return math.exp(x)
 
 
-def sine_cosine_of_turns(turns: float) -> tuple[float, float]:
+def sine_cosine_of_turns(turns: float | np.float32) -> tuple[float, float]:
     """Sine and cosine of 2 pi `turns`, for `turns` in [-0.5, 0.5]."""
     return math.sin(2 * math.pi * turns), math.cos(2 * math.pi * turns)
 

@@ -33,12 +33,13 @@ class TrainArgs:
 
     dataset: tyro.conf.Positional[Path]
     """Dataset folder, as `rfgs-factory generate` makes it."""
-    radio: tuple[str, ...]
-    """Which of the dataset's radios, for example wifi; or several."""
     out: Path
     """Folder of the run; with several sequences or radios, of their runs SEQUENCE-RADIO."""
-    sequence: tuple[str, ...] = ()
-    """Which sequence, or several, or all; may be left out when there is only one."""
+    radio: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
+    """Which of the dataset's radios, for example wifi; repeat the option for several."""
+    sequence: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
+    """Which sequence, or all; repeat the option for several. May be left out when there is only
+    one."""
     frames: str | None = None
     """Frames A:B[:STEP] (inclusive), or one number; all when left out."""
     encoder: str = "matched_filter"

@@ -205,12 +205,15 @@ def trainings(args: TrainArgs) -> list[Training]:
         RfgsError: There is no such dataset or sequence, it is not said which one is meant, or
             runs would get the same name.
     """
+    from rfgs_core.dataset import open_dataset
     from rfgs_core.errors import RfgsError
 
+    sequences = _sequences(args)
     if not args.radio:
-        raise RfgsError("--radio: expected the name of a radio, or several")
+        there = open_dataset(args.dataset).sequence(sequences[0]).radios
+        raise RfgsError(f"--radio is missing; {args.dataset} has {', '.join(there)}")
     radios = dict.fromkeys(args.radio)
-    pairs = [(sequence, radio) for sequence in _sequences(args) for radio in radios]
+    pairs = [(sequence, radio) for sequence in sequences for radio in radios]
     if len(pairs) == 1:
         return [Training(args, *pairs[0], Path(args.out.name))]
     chosen = [Training(args, *pair, Path("-".join(pair))) for pair in pairs]

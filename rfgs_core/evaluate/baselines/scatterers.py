@@ -56,7 +56,7 @@ class PointModel:
         turns = length[:, None] * (self.wavenumber[chosen] / (2.0 * np.pi))[:, None]
         phase = (-2.0 * np.pi * (turns - np.rint(turns))).astype(np.float32)
         # Four times quicker than the exponential of a complex number.
-        out = np.empty(phase.shape, dtype=np.complex64)
+        out = np.zeros(phase.shape, dtype=np.complex64)
         out.real, out.imag = np.cos(phase), np.sin(phase)
         return out
 

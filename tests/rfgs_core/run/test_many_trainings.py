@@ -61,7 +61,7 @@ def names(args: TrainArgs) -> list[str]:
 
 
 def test_runs_are_named_by_sequence_and_radio(two_sequences: Path, tmp_path: Path) -> None:
-    args = TrainArgs(two_sequences, ("wifi", "mmwave"), tmp_path / "runs", ("all",))
+    args = TrainArgs(two_sequences, tmp_path / "runs", ("wifi", "mmwave"), ("all",))
     assert names(args) == ["other-wifi", "other-mmwave", "tiny-wifi", "tiny-mmwave"]
     args = replace(args, sequence=("tiny", "other", "tiny"), radio=("wifi",))
     assert names(args) == ["tiny-wifi", "other-wifi"]
@@ -72,7 +72,7 @@ def test_runs_are_named_by_sequence_and_radio(two_sequences: Path, tmp_path: Pat
 def test_a_sequence_called_all_is_one_sequence(tiny_dataset: Path, tmp_path: Path) -> None:
     data = Path(shutil.copytree(tiny_dataset, tmp_path / "dataset"))
     info = read_dataset_info(data / "dataset.json")
-    args = TrainArgs(data, ("wifi", "uwb"), tmp_path / "runs", ("all",))
+    args = TrainArgs(data, tmp_path / "runs", ("wifi", "uwb"), ("all",))
     write_dataset_info(data, replace(info, sequences=["all", "tiny"]))
     assert names(args) == ["all-wifi", "all-uwb"]
     write_dataset_info(data, replace(info, sequences=["a", "a-b"]))
@@ -84,7 +84,10 @@ def test_a_sequence_called_all_is_one_sequence(tiny_dataset: Path, tmp_path: Pat
     ("more", "message"),
     [
         ([], "holds other, tiny; choose some with --sequence, or all with --sequence all"),
-        (["--sequence", "tiny", "no"], "no sequence 'no'; expected one of other, tiny"),
+        (
+            ["--sequence", "tiny", "--sequence", "no"],
+            "no sequence 'no'; expected one of other, tiny",
+        ),
         (["--sequence", "all", "--view"], "--view watches a single run"),
         (["--sequence", "tiny", "--view", "--scheduler", "tcp://x:1"], "--view watches a single"),
         (["--sequence", "all", "--workers", "0"], "--workers 0: expected 1 to 256"),
@@ -180,7 +183,7 @@ def test_what_fails_is_named_and_the_others_are_trained(
     shutil.copytree(by_one_process / "tiny-wifi", out / "tiny-wifi")
     (out / "other-wifi").mkdir()
     (out / "other-wifi/thesis.txt").write_text("precious")
-    more = ("--sequence", "all", "--radio", "wifi", "mmwave")
+    more = ("--sequence", "all", "--radio", "mmwave")
     assert main(asked(two_sequences, out, *more)) == 1
     said = capsys.readouterr().out.splitlines()
     assert said[0].startswith(f"{out}/other-wifi: failed: {out}/other-wifi is not empty and not a")
@@ -236,7 +239,7 @@ def test_a_learned_encoder_goes_to_the_worker(two_sequences: Path, tmp_path: Pat
     assert main(["encode", str(two_sequences), *words, "--steps", "1", "--out", str(file)]) == 0
     options = TrainOptions(posture="standing", limbs="off")
     args = TrainArgs(
-        two_sequences, ("wifi",), tmp_path / "runs", ("tiny",), encoder=f"cnn:{file}", people=1,
+        two_sequences, tmp_path / "runs", ("wifi",), ("tiny",), encoder=f"cnn:{file}", people=1,
         iterations=1, gaussians=40, shader=False, options=options,
     )  # fmt: skip
     (training,) = trainings(args)
@@ -251,7 +254,7 @@ def test_a_learned_encoder_goes_to_the_worker(two_sequences: Path, tmp_path: Pat
 def test_a_worker_gets_one_sequence_and_what_is_begun(
     two_sequences: Path, begun: Path, tmp_path: Path
 ) -> None:
-    args = TrainArgs(two_sequences, ("wifi",), begun, ("all",))
+    args = TrainArgs(two_sequences, begun, ("wifi",), ("all",))
     parcel = trainings(args)[1].parcel(begun)
     unpack(parcel.archive(), tmp_path / "there")
     assert {path.name for path in (tmp_path / "there").iterdir()} == {"dataset.json", "tiny"}

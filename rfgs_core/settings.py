@@ -154,7 +154,7 @@ class TrainConfig(TrainOptions):
     """Conjugate-gradient steps for the reflectivities."""
     iterations: int = 80
     """Adam steps per frame (the paper: 10,000)."""
-    batch_entries: int = 8192
+    batch_entries: int = 4096
     """Channel entries (links times subcarriers) per Adam step of the channel loss."""
     batch_points: int = 1024
     """Sample points per Adam step of the paper's loss (section 3.6)."""

@@ -121,7 +121,7 @@ class _Scatter(torch.autograd.Function):
     @staticmethod
     @once_differentiable
     def backward(ctx: Any, *grads: Tensor) -> tuple[Tensor | None, ...]:
-        """Chains the gradient of H to everything but the setting."""
+        """Chains the gradient of H to what is asked for: the gain alone, or all but the setting."""
         (grad_output,) = grads
         cloud, plan, chunks = ctx.state
         real = torch.from_numpy(cloud.shape).dtype
@@ -129,6 +129,11 @@ class _Scatter(torch.autograd.Function):
         for order, power in enumerate(chunks.power):
             seed[:, order, 0, chunks.column] = (grad_output.real * power).to(real)
             seed[:, order, 1, chunks.column] = (-grad_output.imag * power).to(real)
+        _, _, gain, *_ = ctx.saved_tensors
+        if sum(ctx.needs_input_grad) == 1 and ctx.needs_input_grad[2]:
+            by_gain = np.zeros_like(cloud.gain)
+            kernels_scatter_gradient.gain_backward(cloud, plan, seed.numpy(), by_gain)
+            return None, None, torch.from_numpy(by_gain).to(gain.dtype), None, None, None
         result = CloudGradient(
             *(np.zeros(field.shape, dtype=cloud.shape.dtype) for field in cloud[:5])
         )

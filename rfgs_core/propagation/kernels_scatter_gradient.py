@@ -8,7 +8,8 @@ S_n = gain c_n and k = k_c + kappa dk,
     dL/dA = Re S_0,    dL/dd = A Im(k_c S_0 + dk S_1),
     dL/dQ = -A/2 Re(k_c^2 S_0 + 2 k_c dk S_1 + dk^2 S_2),    dL/dgain = conj(A c_0).
 
-z is computed again, so memory does not grow with links times subcarriers times Gaussians.
+z is computed again, so memory does not grow with links times subcarriers times Gaussians. Where
+only the gain's gradient is asked for, as by the adjoint of the linear model in it, c_0 is enough.
 """
 
 from __future__ import annotations
@@ -102,6 +103,29 @@ def _moment_subcarriers(n: int, seed: np.ndarray, centre: float, w: np.ndarray) 
             d1[b] += sums[3]
             c2[b] += sums[4]
             d2[b] += sums[5]
+
+
+@njit(**OPTIONS)
+def _first_moment(n: int, seed: np.ndarray, w: np.ndarray) -> None:
+    """The moment of order 0 alone."""
+    zr, zi, rr, ri, e = w[ZR], w[ZI], w[RR], w[RI], w[E]
+    c0, d0 = w[MOMENTS], w[MOMENTS + 1]
+    w[MOMENTS : MOMENTS + 2, :n] = w.dtype.type(0.0)
+    for m in range(0, seed.shape[1], UNROLL):
+        g0, g1, g2, g3 = seed[0, m], seed[0, m + 1], seed[0, m + 2], seed[0, m + 3]
+        h0, h1, h2, h3 = seed[1, m], seed[1, m + 1], seed[1, m + 2], seed[1, m + 3]
+        for b in range(n):
+            x, y, u, v, s = zr[b], zi[b], rr[b], ri[b], e[b]
+            p, q = x * g0 - y * h0, x * h0 + y * g0
+            x, y, u, v = turn(x, y, u, v, s)
+            p, q = p + (x * g1 - y * h1), q + (x * h1 + y * g1)
+            x, y, u, v = turn(x, y, u, v, s)
+            p, q = p + (x * g2 - y * h2), q + (x * h2 + y * g2)
+            x, y, u, v = turn(x, y, u, v, s)
+            p, q = p + (x * g3 - y * h3), q + (x * h3 + y * g3)
+            zr[b], zi[b], rr[b], ri[b] = turn(x, y, u, v, s)
+            c0[b] += p
+            d0[b] += q
 
 
 @njit(**OPTIONS)
@@ -228,3 +252,26 @@ def scatter_backward(cloud: Cloud, plan: Plan, seed: np.ndarray, grad: CloudGrad
             _chain_visibility(plan.group[link], first, n, w, grad)
             if cloud.normals.shape[1] > 0:
                 _chain_normals(cloud, first, n, w, grad)
+
+
+@njit(parallel=True, **OPTIONS)
+def gain_backward(cloud: Cloud, plan: Plan, seed: np.ndarray, by_gain: np.ndarray) -> None:
+    """Adds the gradient of the gain alone, in the layout of `Cloud.gain`; `seed` as above."""
+    total = cloud.means.shape[1]
+    for block in prange((total + BLOCK - 1) // BLOCK):
+        w, distance = scratch(ROWS, cloud.shape), scratch(1, cloud.means)[0]
+        first = block * BLOCK
+        n = min(BLOCK, total - first)
+        for link in range(plan.ends.shape[0]):
+            illuminate(cloud, plan.ends[link], first, n, distance, w)
+            see(cloud, plan.group[link], first, n, w)
+            for c in range(plan.chunk.shape[0]):
+                column, count, piece = plan.chunk[c]
+                for order in range(cloud.gain.shape[1]):
+                    start_subcarriers(plan.subcarrier[c], n, distance, w)
+                    _first_moment(n, seed[link, order, :, column : column + count], w)
+                    real = by_gain[piece, order, 0, first : first + n]
+                    imaginary = by_gain[piece, order, 1, first : first + n]
+                    for b in range(n):
+                        real[b] += w[AMPLITUDE, b] * w[MOMENTS, b]
+                        imaginary[b] -= w[AMPLITUDE, b] * w[MOMENTS + 1, b]

@@ -31,6 +31,25 @@ def test_scatter_twins_agree(make_cloud, make_links, f0, df, knots, assert_twins
     assert_twins_agree(run, cloud)
 
 
+@pytest.mark.parametrize(("f0", "df", "knots"), BANDS)
+def test_the_gradient_of_reflectivities_alone_is_the_twin_s(
+    make_cloud, make_links, f0, df, knots, assert_twins_agree
+) -> None:
+    """What the solver of reflectivities asks for: a kernel of its own."""
+    every = make_cloud(301, f0, knots)
+    fixed = {name: every[name].detach() for name in SCATTER if name != "gamma"}
+    links, subcarriers = make_links(13), Subcarriers(f0, df, 131, blocks=((0, 70), (90, 41)))
+
+    def run(values, backend):
+        real = values["gamma"].real.dtype
+        there = {name: value.to(real) for name, value in fixed.items()}
+        return scatter(
+            **there, **values, links=links, subcarriers=subcarriers, sharpness=3.0, backend=backend
+        )
+
+    assert_twins_agree(run, {"gamma": every["gamma"]})
+
+
 def test_covariances_of_a_gpu_are_those_of_the_cpu(make_cloud) -> None:
     """Quaternions of any length, and thin Gaussians."""
     cloud = make_cloud(57, dtype=torch.float64)

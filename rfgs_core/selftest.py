@@ -121,14 +121,21 @@ def _propagation(name: str, scene: CloudAndLinks, device: Device) -> Iterator[Ch
         yield Check(f"channel {what}, {name}", _relative(found, plain), CHANNEL)
         worst = max(_relative(slopes[key], true_slopes[key]) for key in _GRADIENTS)
         yield Check(f"gradients {what}, {name}", worst, GRADIENT)
+        if not paths:
+            # A kernel of its own: the adjoint with which reflectivities are solved.
+            alone = _with_gradients(here, paths, None, ("gamma",))[1]["gamma"]
+            error = _relative(alone, true_slopes["gamma"])
+            yield Check(f"gradient of reflectivity, {name}", error, GRADIENT)
 
 
 def _with_gradients(
-    scene: CloudAndLinks, shadows: bool, backend: Backend | None
+    scene: CloudAndLinks,
+    shadows: bool,
+    backend: Backend | None,
+    wanted: tuple[str, ...] = _GRADIENTS,
 ) -> tuple[Tensor, dict[str, Tensor]]:
     leaves = {
-        key: getattr(scene.gaussians, key).detach().clone().requires_grad_(True)
-        for key in _GRADIENTS
+        key: getattr(scene.gaussians, key).detach().clone().requires_grad_(True) for key in wanted
     }
     gaussians = replace(scene.gaussians, **leaves)
     paths = scene.paths if shadows else None

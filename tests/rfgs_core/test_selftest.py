@@ -26,7 +26,7 @@ def test_all_kernels_hold_and_the_numbers_are_kept(tmp_path: Path, capsys) -> No
     text = capsys.readouterr().out
     assert "WRONG" not in text and "(50% of a product of matrices)" in text
     kept = json.loads((tmp_path / "a.json").read_text())
-    assert len(kept["checks"]) == text.count(": holds") == 33
+    assert len(kept["checks"]) == text.count(": holds") == 38
     assert all(0.0 <= row["error"] < row["bound"] for row in kept["checks"])
 
 
@@ -41,7 +41,7 @@ def test_a_wrong_kernel_is_found(
     monkeypatch.setattr(selftest, "propagate", altered)
     assert main(["selftest"]) == 1
     said = capsys.readouterr()
-    assert said.out.count("WRONG") == 20 and "error: 20 of 33 checks are wrong" in said.err
+    assert said.out.count("WRONG") == 25 and "error: 25 of 38 checks are wrong" in said.err
 
 
 def test_an_error_that_is_no_number_does_not_hold() -> None:

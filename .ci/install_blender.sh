@@ -36,7 +36,7 @@ fi
 command -v apt-get >/dev/null || fail "this script needs Debian's apt; set BLENDER=/path/to/blender instead"
 if ! command -v debootstrap >/dev/null; then
   echo "installing debootstrap"
-  apt-get update -qq && apt-get install -y -qq debootstrap >/dev/null || fail "debootstrap is missing; run: apt-get install debootstrap"
+  bash "$(dirname "$0")/apt_install.sh" debootstrap || fail "debootstrap is missing; run: apt-get install debootstrap"
 fi
 
 # The mirror this machine already uses: the first Debian main archive in apt's configuration.

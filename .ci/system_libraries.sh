@@ -20,15 +20,14 @@ need 'libEGL\.so\.1' libegl1
 need 'libgomp\.so\.1' libgomp1
 [ ${#missing[@]} -eq 0 ] && exit 0
 
-command="apt-get install -y --no-install-recommends ${missing[*]}"
 if ! command -v apt-get >/dev/null; then
   echo "error: missing system libraries; install your system's packages for: ${missing[*]}" >&2
   exit 2
 fi
 if [ "$(id -u)" -ne 0 ]; then
-  echo "error: missing system libraries; run: sudo apt-get update && sudo $command" >&2
+  echo "error: missing system libraries; run: sudo apt-get update &&" \
+    "sudo apt-get install -y --no-install-recommends ${missing[*]}" >&2
   exit 2
 fi
 echo "Installing system libraries: ${missing[*]}"
-apt-get update -qq
-DEBIAN_FRONTEND=noninteractive $command -qq >/dev/null
+exec bash "$(dirname "$0")/apt_install.sh" "${missing[@]}"

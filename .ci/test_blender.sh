@@ -15,7 +15,7 @@ fi
 # The tests of the interface draw on a screen that nobody sees.
 if ! command -v Xvfb >/dev/null && [ "$(id -u)" -eq 0 ] && command -v apt-get >/dev/null; then
   echo "Installing xvfb"
-  apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq xvfb >/dev/null ||
+  bash .ci/apt_install.sh xvfb ||
     echo "xvfb cannot be installed; tests that need a window are skipped"
 fi
 .venv/bin/pytest -m blender tests

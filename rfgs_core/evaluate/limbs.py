@@ -18,6 +18,7 @@ from tqdm import tqdm
 from rfgs_core.articulated import fit_pose, people
 from rfgs_core.bodies.tracks import Tracks
 from rfgs_core.dataset import Sequence
+from rfgs_core.dataset.observed import Observed
 from rfgs_core.errors import RfgsError
 from rfgs_core.evaluate.geometry import geometry_metrics, reference_points, voxel_budget
 from rfgs_core.evaluate.grid import Grid, splat_gaussians
@@ -29,7 +30,7 @@ from rfgs_core.limbs.postures.tell import can_tell, looks
 from rfgs_core.limbs.postures.tell import tell as tell_posture
 from rfgs_core.limbs.propose import Joints, of_walk_and_network, propose, smoothed
 from rfgs_core.limbs.skins import PosedPeople
-from rfgs_core.measure.observations import Observations, observe
+from rfgs_core.measure.observations import Observations, observe, packets_to_read
 from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import TrainConfig
 from rfgs_core.skeleton import JOINTS
@@ -68,6 +69,7 @@ class Person:
         sequence: Sequence,
         radio: str,
         frames: list[int],
+        config: TrainConfig,
         everything: bool,
         on_frame: Callable[[], Any],
     ) -> Person:
@@ -79,12 +81,16 @@ class Person:
         count = sum(1 for row in sequence.instances if row["class"] == "person")
         if count != 1:
             raise RfgsError(f"{sequence.name}: expected one person for the table, found {count}")
+        packets = packets_to_read(None, sequence, radio, config)
         seen, truth = [], []
         tracks: list[Tracks] = []
         for frame in frames:
-            seen.append(observe(sequence, radio, frame, everything=everything))
+            one = observe(
+                sequence, radio, frame, config.channel, packets=packets, everything=everything
+            )
             seed = sub_seed(_SEED, sequence.name, radio, frame, "fit")
-            tracks.append(followed(tracks[-1] if tracks else None, seen[-1], TrainConfig(), seed))
+            tracks.append(followed(tracks[-1] if tracks else None, one, config, seed))
+            seen.append(one)
             truth.append(np.asarray(sequence.joints(frame)[0], dtype=np.float64))
             on_frame()
         time_s = np.array([sequence.time_s(frame) for frame in frames])
@@ -104,6 +110,7 @@ def limb_table(
     frames: list[int],
     *,
     everything: bool = True,
+    channel: Observed = "clean",
     on_frame: Callable[[], Any] = lambda: None,
     others: Callable[[Person], dict[str, np.ndarray]] = lambda person: {},
 ) -> dict[str, dict[str, float]]:
@@ -115,6 +122,7 @@ def limb_table(
         network: The network of that radio; None leaves its rows out.
         frames: Frames.
         everything: Whether held-out entries are read as well.
+        channel: The traced channel, or what imperfect radios made of it.
         on_frame: Called as frames are located.
         others: Joints by methods of others, float64, shape (frame, 17, 3) [m], by name of the row.
 
@@ -122,7 +130,8 @@ def limb_table(
         For each row: joints, with the pelvis in place, limbs and wrists [m], F-scores at 5 and
         10 cm of the posed surface. Rows of the evidence are missing where it tells nothing.
     """
-    person = Person.of(sequence, radio, frames, everything, on_frame)
+    config = TrainConfig(channel=channel)
+    person = Person.of(sequence, radio, frames, config, everything, on_frame)
     # Frames from the other half of the sequence.
     other = [(k + len(frames) // 2) % len(frames) for k in range(len(frames))]
     told = {} if network is None else _by_network(network, person, other)

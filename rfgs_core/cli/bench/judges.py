@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import tyro
 
 from rfgs_core.cli.bench.numbers import Part, need_at_least_one, note
+from rfgs_core.dataset.observed import Observed
 
 
 def flat(table: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
@@ -50,6 +51,9 @@ class Limbs(Part):
     """Network, as `rfgs limbs` makes it; left out: the one that comes with the package."""
     hold_out: bool = False
     """Hide what the dataset holds out, as training does."""
+    channel: Observed = "clean"
+    """clean: the traced channel; impaired: what `rfgs-factory impair` made of it. Of several
+    packets per frame all are read."""
 
     def numbers(self) -> dict[str, Any]:
         """Judges every row on every frame."""
@@ -67,7 +71,7 @@ class Limbs(Part):
         with tqdm(total=len(sequence.frames), desc="limbs") as bar:
             table = limb_table(
                 sequence, self.radio, network, sequence.frames,
-                everything=not self.hold_out, on_frame=bar.update,
+                everything=not self.hold_out, channel=self.channel, on_frame=bar.update,
             )  # fmt: skip
         return {**flat(table), "frames": len(sequence.frames), **hardware()}
 

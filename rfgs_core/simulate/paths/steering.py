@@ -32,6 +32,7 @@ def steer(
     freq_hz: np.ndarray,
     nodes_hz: np.ndarray,
     transmission: np.ndarray | None = None,
+    less: float = 0.0,
 ) -> np.ndarray:
     """Sums paths for every measured pair of elements and every subcarrier.
 
@@ -45,6 +46,7 @@ def steer(
         nodes_hz: Frequencies of the amplitudes, ascending; linear in between.
         transmission: Shadow factors, shape (path, tx place of the site, rx place of the site,
             node); None for none.
+        less: Taken off each of these factors; 1 leaves what shadows change.
 
     Returns:
         Complex128, shape (tx, rx, subcarrier).
@@ -55,19 +57,19 @@ def steer(
     seen = images(paths.vertices, paths.kinds)
     left, share = _interpolation(freq_hz, nodes_hz)
     wavenumber = 2.0 * np.pi * np.asarray(freq_hz, dtype=np.float64) / SPEED_OF_LIGHT
+    if transmission is None:
+        transmission = np.ones((0, 0, 0, 0), dtype=np.complex128)
     step = float(wavenumber[1] - wavenumber[0]) if len(wavenumber) > 1 else 0.0
     for a, b in np.unique(np.stack([paths.tx, paths.rx], axis=1), axis=0):
         of_pair = np.flatnonzero((paths.tx == a) & (paths.rx == b))
-        passed = np.ones((0, 0, 0, 0), dtype=np.complex128)
-        if transmission is not None:
-            passed = transmission[of_pair]
         ends = np.stack([paths.vertices[of_pair[0], 0], paths.vertices[of_pair[0], -1]])
         for port, (i, j) in enumerate(ports(layout)):
             tx = np.flatnonzero((layout.tx_site == a) & (layout.tx_port == i))
             rx = np.flatnonzero((layout.rx_site == b) & (layout.rx_port == j))
             offsets = np.einsum("pij,ej->pei", seen.mirror[of_pair], layout.tx_xyz[tx] - ends[0])
             out[np.ix_(tx, rx)] = _steer(
-                (np.ascontiguousarray(paths.amplitude[of_pair, port]), passed),
+                np.ascontiguousarray(paths.amplitude[of_pair, port]),
+                (transmission, of_pair, less),
                 seen.one_sided[of_pair],
                 (seen.seen_from_tx[of_pair], seen.seen_from_rx[of_pair], seen.middle_m[of_pair]),
                 np.ascontiguousarray(offsets),
@@ -163,7 +165,8 @@ def _add_block(
 
 @numba.njit(cache=True, parallel=True)
 def _steer(
-    gain: tuple[np.ndarray, np.ndarray],
+    amplitude: np.ndarray,
+    passed: tuple[np.ndarray, np.ndarray, float],
     one_sided: np.ndarray,
     seen: tuple[np.ndarray, np.ndarray, np.ndarray],
     image_offset: np.ndarray,
@@ -173,7 +176,7 @@ def _steer(
     subcarriers: tuple[np.ndarray, np.ndarray, float, float],
 ) -> np.ndarray:
     """Channel of one pair of sites and ports, shape (tx, rx, subcarrier)."""
-    amplitude, passed = gain
+    factors, of_pair, less = passed
     left, share, k_0, k_step = subcarriers
     n_paths, n_nodes = amplitude.shape
     n_tx, n_rx = len(tx_xyz), len(rx_xyz)
@@ -199,8 +202,8 @@ def _steer(
                 turn[1, j] = -math.sin(k_step * d)
                 for n in range(n_nodes):
                     value = amplitude[p, n]
-                    if passed.size:
-                        value *= passed[p, t, r, n]
+                    if factors.size:
+                        value *= factors[of_pair[p], t, r, n] - less
                     block[n, 0, j] = value.real
                     block[n, 1, j] = value.imag
             _add_block(phasor, turn, block, (left, share), out[t, r])

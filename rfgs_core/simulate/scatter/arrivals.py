@@ -20,6 +20,9 @@ from rfgs_core.simulate.sight.mirrors import Mirror, free_by_mirror, on_mirror
 from rfgs_core.simulate.sight.panorama import Panorama, sees
 from rfgs_core.simulate.surface.posed import Facets
 
+#: θ and φ of a field, complex64, shape (facet, 2, node), and whether it reaches, bool, (facet,).
+Field = tuple[np.ndarray, np.ndarray]
+
 
 class Slabs(NamedTuple):
     """Slabs of all materials at equally spaced cosines of the angle of incidence."""
@@ -65,8 +68,9 @@ def straight(
     antenna: Antenna,
     slabs: Slabs,
     wanted: np.ndarray,
-    clear: np.ndarray,
-    through: np.ndarray,
+    clear: Field,
+    through: Field,
+    behind: bool,
 ) -> tuple[int, int]:
     """Fields straight from a site.
 
@@ -78,20 +82,20 @@ def straight(
         antenna: The site's antenna.
         slabs: What the faces are made of.
         wanted: Facets that matter, int64.
-        clear: Filled with θ and φ of the field where nothing is in the way, complex64, shape
-            (facet, 2, node).
-        through: Filled with those behind one surface; empty if they do not matter.
+        clear: Filled where nothing is in the way.
+        through: Filled behind one surface.
+        behind: Whether that matters.
 
     Returns:
         How many facets each of them reaches.
     """
-    wave = np.zeros((clear.shape[2], 3), dtype=np.complex64)
+    wave = np.zeros((clear[0].shape[2], 3), dtype=np.complex64)
     at_m, hit = np.zeros(1), np.zeros(1, dtype=np.int64)
     way, stack, n_clear, n_through = np.zeros(3), new_stack(), 0, 0
     for p in wanted:
         lifted = facets.lifted[p]
         free = sees(around, faces.bvh, lifted, stack)
-        if not (free or len(through)):
+        if not (free or behind):
             continue
         drawn = _picture(pictures, around.place, facets.body[p])
         hidden = hides(drawn, facets.triangles, lifted)
@@ -103,13 +107,15 @@ def straight(
             way[axis] = facets.points[p, axis] - around.place[axis]
         send(antenna, way, wave)
         if free:
-            components(wave, way, clear[p])
+            components(wave, way, clear[0][p])
+            clear[1][p] = True
             n_clear += 1
         elif crossings(faces.bvh, around.place, lifted, 2.0 * SAME_M, at_m, hit) == 1:
             face = faces.of_triangle[hit[0]]
             if face >= 0:
                 past(wave, way, faces.normal[face], False, slabs.passed[slabs.of_face[face]])
-                components(wave, way, through[p])
+                components(wave, way, through[0][p])
+                through[1][p] = True
                 n_through += 1
     return n_clear, n_through
 
@@ -161,7 +167,7 @@ def by_mirror(
     view: Mirror,
     antenna: Antenna,
     slabs: Slabs,
-    out: np.ndarray,
+    out: Field,
 ) -> int:
     """Fields from a site by way of one face.
 
@@ -174,13 +180,12 @@ def by_mirror(
         view: The face that mirrors.
         antenna: The site's antenna.
         slabs: What the faces are made of.
-        out: Filled with θ and φ of the field where nothing that moves is in the way, complex64,
-            shape (facet, 2, node).
+        out: Filled where nothing that moves is in the way.
 
     Returns:
         How many facets it reaches.
     """
-    wave = np.zeros((out.shape[2], 3), dtype=np.complex64)
+    wave = np.zeros((out[0].shape[2], 3), dtype=np.complex64)
     into, stack, count = np.zeros(3), new_stack(), 0
     factors = slabs.mirrored[slabs.of_face[view.face]]
     normal = faces.normal[view.face]
@@ -204,7 +209,8 @@ def by_mirror(
         past(wave, into, normal, True, factors)
         for axis in range(3):
             into[axis] = facets.points[p, axis] - view.image[axis]
-        components(wave, into, out[p])
+        components(wave, into, out[0][p])
+        out[1][p] = True
         count += 1
     return count
 

@@ -22,7 +22,7 @@ _SIXTEENTH = np.float32(-1.0 / 16.0)
 _FAST = {"contract", "nsz", "ninf", "nnan"}
 
 
-@numba.njit(cache=True, nogil=True, fastmath=_FAST)
+@numba.njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
 def see_elements(
     to: tuple[float, float, float],
     centre_m: float,
@@ -54,16 +54,24 @@ def see_elements(
     ox, oy, oz, o2 = offsets[0], offsets[1], offsets[2], offsets[3]
     s0, s1, s2, s3, s4 = seen[0], seen[1], seen[2], seen[3], seen[4]
     deltas, re, im = seen[5], seen[6], seen[7]
+    if len(ox) == 1 and o2[0] == 0.0:
+        # One element is its own centre.
+        s0[0], s1[0], s2[0] = np.float32(to[0]), np.float32(to[1]), np.float32(to[2])
+        s3[0], s4[0] = along / centre, _ONE / centre
+        phasor[:, 0, 0], phasor[:, 1, 0] = _ONE, np.float32(0.0)
+        return
     per_m = np.float32(turns[0])
+    # Two loops: the compiler gives up telling whether more arrays overlap.
     for e in range(len(ox)):
         farther_2 = _TWO * (x * ox[e] + y * oy[e] + z * oz[e]) + o2[e]
         d = np.sqrt(centre_2 + farther_2)
-        inverse = _ONE / d
-        s0[e], s1[e], s2[e] = (x + ox[e]) * inverse, (y + oy[e]) * inverse, (z + oz[e]) * inverse
-        s3[e] = (along + nx * ox[e] + ny * oy[e] + nz * oz[e]) * inverse
-        s4[e] = inverse
+        s4[e] = _ONE / d
         # The difference of two roots, without losing its digits.
         deltas[e] = farther_2 / (d + centre)
+    for e in range(len(ox)):
+        inverse = s4[e]
+        s0[e], s1[e], s2[e] = (x + ox[e]) * inverse, (y + oy[e]) * inverse, (z + oz[e]) * inverse
+        s3[e] = (along + nx * ox[e] + ny * oy[e] + nz * oz[e]) * inverse
     for e in range(len(ox)):
         turn = per_m * deltas[e]
         a = _PI * (turn - ((turn + _ROUND) - _ROUND))
@@ -74,18 +82,25 @@ def see_elements(
         re[e] = _ONE - _TWO * s * s
         im[e] = -_TWO * s * c
     for m in range(len(phasor)):
-        more = np.float32(2.0 * math.pi * turns[1 + m])
-        row_re, row_im = phasor[m, 0], phasor[m, 1]
-        for e in range(len(ox)):
-            a = more * deltas[e]
-            b = a * a
-            s = a * (_ONE + b * (_S3 + b * _S5))
-            c = _ONE + b * (_C2 + b * (_C4 + b * _C6))
-            row_re[e] = re[e] * c + im[e] * s
-            row_im[e] = im[e] * c - re[e] * s
+        _turn(np.float32(2.0 * math.pi * turns[1 + m]), deltas, (re, im), phasor[m])
 
 
-@numba.njit(cache=True, nogil=True, fastmath=_FAST)
+@numba.njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+def _turn(
+    more: np.float32, deltas: np.ndarray, phasor: tuple[np.ndarray, np.ndarray], out: np.ndarray
+) -> None:
+    """Fills in phasors turned by a little more per metre; a function of its own, else scalar."""
+    re, im, row_re, row_im = phasor[0], phasor[1], out[0], out[1]
+    for e in range(len(deltas)):
+        a = more * deltas[e]
+        b = a * a
+        s = a * (_ONE + b * (_S3 + b * _S5))
+        c = _ONE + b * (_C2 + b * (_C4 + b * _C6))
+        row_re[e] = re[e] * c + im[e] * s
+        row_im[e] = im[e] * c - re[e] * s
+
+
+@numba.njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
 def exact_values(
     tx: np.ndarray,
     rx: np.ndarray,
@@ -119,10 +134,11 @@ def exact_values(
         for r in range(count):
             c = along + r3[r]
             q_t2 = _TWO + _TWO * (x * r0[r] + y * r1[r] + z * r2[r]) - c * c
-            e = factor * max(q_t2, none)
+            # Not `max` and `min`: calls, which keep the loop scalar.
+            e = factor * (q_t2 if q_t2 > none else none)
             lit = (r3[r] > none) & (e < most)
             # e^−e = (e^−e/16)^16, the inner one by its series.
-            a = min(e, most) * _SIXTEENTH
+            a = (e if e < most else most) * _SIXTEENTH
             s = _ONE + a * (_ONE + a * (_HALF + a * (_E3 + a * (_E4 + a * _E5))))
             s = s * s
             s = s * s
@@ -133,7 +149,7 @@ def exact_values(
             im[r] = value * (s_re * h_im[r] + s_im * h_re[r])
 
 
-@numba.njit(cache=True, nogil=True, fastmath=_FAST)
+@numba.njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
 def centre_values(
     rx: np.ndarray, sent: np.ndarray, heard: np.ndarray, weight: complex, out: np.ndarray
 ) -> None:
@@ -149,7 +165,7 @@ def centre_values(
             im[r] = near[r] * (s_re * h_im[r] + s_im * h_re[r])
 
 
-@numba.njit(cache=True, nogil=True, fastmath=_FAST)
+@numba.njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
 def spread_values(values: np.ndarray, kernel: np.ndarray, first: int, out: np.ndarray) -> None:
     """Adds the values of all links to the cells around a delay.
 

@@ -156,7 +156,7 @@ def spread_facets(
     patches: Patches,
     used: np.ndarray,
     from_rx: np.ndarray,
-    from_tx: tuple[np.ndarray, np.ndarray],
+    from_tx: tuple[np.ndarray, np.ndarray, np.ndarray],
     arrays: Arrays,
     grid: tuple[float, float, np.ndarray],
     exact: np.ndarray,
@@ -169,8 +169,8 @@ def spread_facets(
         patches: The facets.
         used: Facets that the receiving array hears, int64.
         from_rx: θ and φ of what reaches each facet from it, complex64, shape (facet, 2, node).
-        from_tx: The same of all transmitting arrays, 0 where a facet is hidden, shape
-            (way, facet, 2, node), and which of them to take.
+        from_tx: The same of all transmitting arrays, shape (way, facet, 2, node), where each of
+            them reaches, bool, shape (way, facet), and which of them to take.
         arrays: The arrays.
         grid: Path length of a cell [m], middle wavenumber and those of the nodes [rad/m].
         exact: Whether amplitudes of a way are those of each pair of elements, shape (way,).
@@ -178,7 +178,7 @@ def spread_facets(
         out: Real and imaginary part at each node, cell and link, float32, shape
             (grid, node, 2, cell, tx · rx).
     """
-    tx_fields, ways = from_tx
+    tx_fields, reaches, ways = from_tx
     cell_m, centre_k, node_k = grid
     nodes, n_tx, n_rx = len(node_k), arrays.tx_offset.shape[2], arrays.rx_offset.shape[1]
     turns = np.concatenate((np.array([centre_k]), node_k - centre_k)) / (2.0 * math.pi)
@@ -192,8 +192,7 @@ def spread_facets(
         to_rx, d_r = _towards(patches.points[i], arrays.rx_centre)
         ready = False
         for w in ways:
-            a = tx_fields[w, i]
-            if a[0, 0] == 0.0 and a[1, 0] == 0.0:
+            if not reaches[w, i]:
                 continue
             to_tx, d_t = _towards(patches.points[i], arrays.tx_centre[w])
             spread = arrays.size_m / min(d_t, d_r)
@@ -205,7 +204,7 @@ def spread_facets(
             see_elements(to_tx, d_t, n, arrays.tx_offset[w], turns, tx_seen, sent)
             first = _window((d_t + d_r) / cell_m, kernel)
             gamma = patches.gamma[patches.material[i]]
-            _weights(a, b, gamma, d_t + d_r, centre_k, area, weight)
+            _weights(tx_fields[w, i], b, gamma, d_t + d_r, centre_k, area, weight)
             if not exact[w]:
                 _damp(to_tx, to_rx, n, (scale, d_t), node_k, weight)
             seen, fields, damping = (tx_seen, rx_seen), (sent, heard), scale * node_k**2

@@ -143,9 +143,9 @@ class PeopleChannel:
             take = np.flatnonzero(self._pairs[sent.site, b] & (walls < self._scope.depth))
             spread_facets(
                 patches,
-                np.flatnonzero(np.abs(heard.field[way, :, :, 0]).any(axis=1)),
+                np.flatnonzero(heard.reaches[way]),
                 heard.field[way],
-                (sent.field, take),
+                (sent.field, sent.reaches, take),
                 Arrays(sent.centre, sent.offset, heard.centre[way], heard.offset[way], size_m),
                 (grid.cell_m, grid.centre_k, grid.node_k),
                 walls == 0,

@@ -36,6 +36,8 @@ class Ways(NamedTuple):
     """Elements from there, and their squared distances [m, m²], float32, (way, 4, element)."""
     field: np.ndarray
     """θ and φ of the field, 0 where it does not reach, complex64, shape (way, facet, 2, node)."""
+    reaches: np.ndarray
+    """Where it does, bool, shape (way, facet)."""
 
 
 class Body(NamedTuple):
@@ -125,13 +127,13 @@ def find_ways(
     facets, faces = body.facets, scope.faces
     mirrors = [_mirrors(faces, site, body) for site in sites]
     shape = (sum(2 + len(row) for row in mirrors), len(facets.points), 2, scope.nodes)
-    field = np.zeros(shape, dtype=np.complex64)
+    field, reaches = np.zeros(shape, dtype=np.complex64), np.zeros(shape[:2], dtype=np.bool_)
     scratch = np.zeros(len(facets.points), np.int64), np.zeros((len(facets.points), 3))
     rows: list[tuple[int, int, np.ndarray, np.ndarray]] = []
     for s, (site, seen, views) in enumerate(zip(sites, pictures, mirrors, strict=True)):
         ends, with_images = _ends(scope, partners[s], body)
         elements, antenna = site.elements[port], site.antennas[port]
-        clear, through = field[len(rows)], field[len(rows) + 1]
+        at = len(rows)
         wanted = wanted_facets(facets, site.around.place, with_images)
         count = straight(
             facets,
@@ -141,15 +143,16 @@ def find_ways(
             antenna,
             scope.slabs,
             wanted,
-            clear,
-            through if scope.depth > 1 else through[:0],
+            (field[at], reaches[at]),
+            (field[at + 1], reaches[at + 1]),
+            scope.depth > 1,
         )
         rows.append((s, 0, site.around.place, elements))
         if count[1]:
             rows.append((s, 1, site.around.place, elements))
         for view in views:
             found = free_facets(facets, body.balls, ends, site.around, faces, view, scratch)
-            onto = field[len(rows)]
+            onto = field[len(rows)], reaches[len(rows)]
             if len(found[0]) and by_mirror(
                 facets, found, seen, site.around, faces, view, antenna, scope.slabs, onto
             ):
@@ -160,6 +163,7 @@ def find_ways(
         np.stack([row[2] for row in rows]),
         np.stack([_offsets(xyz, centre) for _, _, centre, xyz in rows]),
         field[: len(rows)],
+        reaches[: len(rows)],
     )
 
 

@@ -83,5 +83,5 @@ def shadow_channel(paths: PathSet, radio: Radio, layout: Layout, passed: Passed)
         passed: What bodies leave of some of them.
     """
     shaded = resampled(paths.select(passed.path), path_frequencies(paths, radio), passed.grid_hz)
-    channel = steer(shaded, layout, radio.freq_hz, passed.grid_hz, passed.factor - 1.0)
+    channel = steer(shaded, layout, radio.freq_hz, passed.grid_hz, passed.factor, 1.0)
     return channel * (radio.centre_hz / radio.freq_hz)

@@ -14,6 +14,8 @@ import numba
 import numpy as np
 from scipy.special import fresnel
 
+from rfgs_core.vector_math import sine_cosine_of_turns
+
 _TABLE_END = 30.0
 _TABLE_PER_UNIT = 512
 
@@ -28,6 +30,18 @@ def _fresnel_table() -> np.ndarray:
 
 
 FRESNEL = _fresnel_table()
+
+_NONE, _HALF, _QUARTER = np.float32(0.0), np.float32(0.5), np.float32(0.25)
+_ONE, _TWO, _BEND = np.float32(1.0), np.float32(2.0), np.float32(0.6)
+#: f and g over [0, 30] by powers of t = 2/(1 + 0.6 ν) − 1, fitted to SciPy's integrals.
+_F0, _F1, _F2 = (np.float32(v) for v in (0.185294275, 0.334076929, 0.198830534))
+_F3, _F4, _F5 = (np.float32(v) for v in (-0.0311475211, -0.198891249, -0.111905921))
+_F6, _F7, _F8 = (np.float32(v) for v in (0.0931789084, 0.0843068715, -0.039357314))
+_F9, _F10 = np.float32(-0.0256192777), np.float32(0.011226589)
+_G0, _G1, _G2 = (np.float32(v) for v in (0.019130182, 0.0993392888, 0.220564546))
+_G3, _G4, _G5 = (np.float32(v) for v in (0.246734243, 0.0758028769, -0.134334125))
+_G6, _G7, _G8 = (np.float32(v) for v in (-0.112668685, 0.0484870714, 0.0613936225))
+_G9, _G10 = np.float32(-0.0103375671), np.float32(-0.0141175795)
 
 
 @numba.njit(cache=True, fastmath={"contract", "nsz"})
@@ -49,6 +63,41 @@ def add_fresnel(
         signed = math.copysign(sign, nu) if sign > 0.0 else -math.copysign(sign, nu)
         out[0, e] += signed * (table[0, i] + (table[0, i + 1] - table[0, i]) * share)
         out[1, e] += signed * (table[1, i] + (table[1, i + 1] - table[1, i]) * share)
+
+
+@numba.njit(cache=True, fastmath={"contract", "nsz"}, error_model="numpy")
+def fill_fresnel(edges: np.ndarray, shift: float, per_m: float, out: np.ndarray) -> None:
+    """F((edge − shift) · per_m) of many edges by polynomials, errors below 1e-5, in vector code.
+
+    With the auxiliary functions f and g (Abramowitz and Stegun 1964, 7.3.9 and 7.3.10)
+    F = (1 − j)/2 + (f + j g) sin(πν²/2) + (j f − g) cos(πν²/2); both are smooth in 1/(1 + 0.6 ν).
+
+    Args:
+        edges: Edges [m], float32, shape (edge,).
+        shift: Place that they are seen from [m].
+        per_m: Fresnel coordinate per metre.
+        out: Filled, real and imaginary, float32, shape (2, edge).
+    """
+    at, scale, end = np.float32(shift), np.float32(per_m), np.float32(_TABLE_END)
+    real, imaginary = out[0], out[1]
+    for e in range(len(edges)):
+        nu = (edges[e] - at) * scale
+        size = abs(nu) if abs(nu) < end else end
+        t = _TWO / (_ONE + _BEND * size) - _ONE
+        f = _F10 * t + _F9
+        f = ((f * t + _F8) * t + _F7) * t + _F6
+        f = ((f * t + _F5) * t + _F4) * t + _F3
+        f = ((f * t + _F2) * t + _F1) * t + _F0
+        g = _G10 * t + _G9
+        g = ((g * t + _G8) * t + _G7) * t + _G6
+        g = ((g * t + _G5) * t + _G4) * t + _G3
+        g = ((g * t + _G2) * t + _G1) * t + _G0
+        turns = _QUARTER * size * size
+        sine, cosine = sine_cosine_of_turns(turns - np.floor(turns + _HALF))
+        re = f * sine - g * cosine if size < end else _NONE
+        im = f * cosine + g * sine if size < end else _NONE
+        real[e] = _HALF + re if nu > _NONE else -_HALF - re
+        imaginary[e] = im - _HALF if nu > _NONE else _HALF - im
 
 
 @numba.njit(cache=True)

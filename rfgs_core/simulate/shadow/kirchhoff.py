@@ -25,6 +25,7 @@ from rfgs_core.simulate.shadow.fresnel import FRESNEL, screen_factors
 from rfgs_core.simulate.shadow.lattice import MOST_PLACES, lattice_factors, places_needed
 from rfgs_core.simulate.shadow.near import FAR, near_segments, reach, relative_amplitude
 from rfgs_core.simulate.shadow.outline import Outline
+from rfgs_core.simulate.shadow.projection import project
 from rfgs_core.simulate.shadow.unfold import unfold
 
 Shadow = Literal["kirchhoff", "hard"]
@@ -123,7 +124,7 @@ def _shade(
                 continue
             way = corners[p, i + 1] - corners[p, i]
             length = np.sqrt((way * way).sum())
-            xy, plane, scale, axes = silhouette.project(
+            xy, plane, scale, axes = project(
                 vertices, corners[p, i], corners[p, i + 1], before[p, i], after[p, i]
             )
             if scale == 0.0:
@@ -141,9 +142,9 @@ def _shade(
                     out[p] = 0.0
                 continue
             d_1, d_2 = before[p, i] + plane, after[p, i] + length - plane
-            to_tx = (axes @ tx_turn[p, i]) * (d_2 / (d_1 + d_2))
-            to_rx = (axes @ rx_turn[p, i]) * (d_1 / (d_1 + d_2))
-            shifts = _shifts(to_tx, to_rx, tx_offset[p], rx_offset[p])
+            from_tx = _seen_offsets(axes, tx_turn[p, i], d_2 / (d_1 + d_2), tx_offset[p])
+            from_rx = _seen_offsets(axes, rx_turn[p, i], d_1 / (d_1 + d_2), rx_offset[p])
+            shifts = _shifts(from_tx, from_rx)
             # Seconds that the farthest edge answers later, by which its share turns.
             x_m, y_m, corner_m = silhouette.farthest(runs, heights, shifts)
             late = corner_m**2 * scale / (2.0 * SPEED_OF_LIGHT)
@@ -151,10 +152,8 @@ def _shade(
             first = nodes.counts[:rule].sum()
             count = nodes.counts[rule]
             per_m_at = np.sqrt(2.0 * scale * nodes.hz[first : first + count] / SPEED_OF_LIGHT)
-            factors = _of_pairs(table, runs, heights, shifts, (x_m, y_m), per_m_at)
-            weights, n_rx = nodes.weights[first : first + count], rx_offset.shape[1]
-            for e in range(shifts.shape[1]):
-                _times(out[p, e // n_rx, e % n_rx], factors[e], weights)
+            change = _of_pairs(table, runs, heights, shifts, (x_m, y_m), per_m_at)
+            _times(out[p], change, nodes.weights[first : first + count])
 
 
 @numba.njit(cache=True)
@@ -166,30 +165,59 @@ def _of_pairs(
     farthest_m: tuple[float, float],
     per_m: np.ndarray,
 ) -> np.ndarray:
-    """Factors at pairs of elements and frequencies, whichever way is less work, (pair, node)."""
+    """Factors less 1 at pairs of elements and frequencies, whichever way is less work.
+
+    Returns:
+        Real and imaginary, shape (2, frequency, pair).
+    """
     pairs, count = shifts.shape[1], len(per_m)
     n_x = places_needed(0.5 * np.ptp(shifts[0]), farthest_m[0], per_m.max())
     n_y = places_needed(0.5 * np.ptp(shifts[1]), farthest_m[1], per_m.max())
     if max(n_x, n_y) <= MOST_PLACES and LOOK_UP * (2 * n_x + n_y) + n_x * n_y < LOOK_UP * 3 * pairs:
-        return lattice_factors(table, runs, heights, shifts, (n_x, n_y), per_m)
+        return lattice_factors(runs, heights, shifts, (n_x, n_y), per_m)
     every, per_m_of = np.zeros((2, pairs * count)), np.zeros(pairs * count)
     for line in range(pairs * count):
-        every[:, line] = shifts[:, line // count]
-        per_m_of[line] = per_m[line % count]
-    return screen_factors(table, runs, heights, every, per_m_of).reshape(pairs, count)
+        every[:, line] = shifts[:, line % pairs]
+        per_m_of[line] = per_m[line // pairs]
+    factors = screen_factors(table, runs, heights, every, per_m_of)
+    change = np.zeros((2, count, pairs))
+    for line in range(pairs * count):
+        change[0, line // pairs, line % pairs] = factors[line].real - 1.0
+        change[1, line // pairs, line % pairs] = factors[line].imag
+    return change
 
 
 @numba.njit(cache=True)
-def _shifts(
-    to_tx: np.ndarray, to_rx: np.ndarray, tx_offset: np.ndarray, rx_offset: np.ndarray
+def _seen_offsets(
+    axes: np.ndarray, turn: np.ndarray, scale: float, offset: np.ndarray
 ) -> np.ndarray:
+    """Where elements of one end appear on the screen [m], shape (2, element).
+
+    Args:
+        axes: Axes of the screen, shape (2, 3).
+        turn: Takes offsets to the segment, shape (3, 3).
+        scale: How much of them is left at the screen.
+        offset: Elements from their centre [m], shape (element, 3).
+    """
+    out = np.zeros((2, len(offset)))
+    for axis in range(2):
+        for j in range(3):
+            part = axes[axis, 0] * turn[0, j] + axes[axis, 1] * turn[1, j]
+            part = scale * (part + axes[axis, 2] * turn[2, j])
+            for e in range(len(offset)):
+                out[axis, e] += part * offset[e, j]
+    return out
+
+
+@numba.njit(cache=True)
+def _shifts(from_tx: np.ndarray, from_rx: np.ndarray) -> np.ndarray:
     """Where the line of each pair of elements meets the screen [m], shape (2, tx * rx)."""
-    n_rx = len(rx_offset)
-    shifts = np.zeros((2, len(tx_offset) * n_rx))
-    for e in range(shifts.shape[1]):
-        for axis in range(2):
-            shifts[axis, e] = (to_tx[axis] * tx_offset[e // n_rx]).sum()
-            shifts[axis, e] += (to_rx[axis] * rx_offset[e % n_rx]).sum()
+    n_tx, n_rx = from_tx.shape[1], from_rx.shape[1]
+    shifts = np.zeros((2, n_tx * n_rx))
+    for axis in range(2):
+        for t in range(n_tx):
+            for r in range(n_rx):
+                shifts[axis, t * n_rx + r] = from_tx[axis, t] + from_rx[axis, r]
     return shifts
 
 
@@ -206,18 +234,29 @@ def _rule_of(counts: np.ndarray, degree: float) -> int:
     return rule
 
 
-@numba.njit(cache=True)
-def _times(out: np.ndarray, factors: np.ndarray, weights: np.ndarray) -> None:
-    """Multiplies into `out` the polynomial through some factors, or these where it has none."""
-    if not len(weights):
-        for g in range(len(out)):
-            out[g] *= factors[g]
-        return
-    real, imaginary = np.zeros(len(out)), np.zeros(len(out))
-    for n in range(len(factors)):
-        row, re, im = weights[n], factors[n].real, factors[n].imag
-        for g in range(len(row)):
-            real[g] += row[g] * re
-            imaginary[g] += row[g] * im
-    for g in range(len(out)):
-        out[g] *= complex(real[g], imaginary[g])
+@numba.njit(cache=True, fastmath={"contract", "nsz"})
+def _times(out: np.ndarray, change: np.ndarray, weights: np.ndarray) -> None:
+    """Multiplies factors into `out`, by the polynomials through them where there are any.
+
+    Args:
+        out: Changed, complex128, shape (tx, rx, grid).
+        change: Factors less 1, real and imaginary, shape (2, node, tx · rx).
+        weights: What the grid takes of each node, shape (node, grid); none where the nodes are
+            the grid.
+    """
+    n_tx, n_rx, grid = out.shape
+    real, imaginary = np.zeros(grid), np.zeros(grid)
+    for e in range(n_tx * n_rx):
+        row = out[e // n_rx, e % n_rx]
+        if len(weights):
+            real[:] = 1.0
+            imaginary[:] = 0.0
+        for n in range(len(weights)):
+            part, re, im = weights[n], change[0, n, e], change[1, n, e]
+            for g in range(grid):
+                real[g] += part[g] * re
+                imaginary[g] += part[g] * im
+        for g in range(grid if not len(weights) else 0):
+            real[g], imaginary[g] = 1.0 + change[0, g, e], change[1, g, e]
+        for g in range(grid):
+            row[g] *= complex(real[g], imaginary[g])

@@ -16,7 +16,7 @@ import math
 import numba
 import numpy as np
 
-from rfgs_core.simulate.shadow.fresnel import add_fresnel
+from rfgs_core.simulate.shadow.fresnel import fill_fresnel
 
 #: Places along one axis at most; beyond that elements are taken one by one.
 MOST_PLACES = 32
@@ -43,7 +43,6 @@ def places_needed(half_m: float, farthest_m: float, per_m: float) -> int:
 
 @numba.njit(cache=True)
 def lattice_factors(
-    table: np.ndarray,
     runs: np.ndarray,
     heights: np.ndarray,
     shifts: np.ndarray,
@@ -53,7 +52,6 @@ def lattice_factors(
     """Kirchhoff factors T of a silhouette for the elements of arrays at some frequencies.
 
     Args:
-        table: `FRESNEL`.
         runs: Runs of the silhouette [m], shape (N, 2).
         heights: Rows of the runs [m], shape (N, 2).
         shifts: Where the line of each pair of elements crosses the plane [m], rows x and y, shape
@@ -62,27 +60,43 @@ def lattice_factors(
         per_m: Fresnel coordinate per metre at each frequency, √(2 s/λ), shape (frequency,).
 
     Returns:
-        Factors on the amplitudes, complex128, shape (pair, frequency); 1 without a silhouette.
+        Factors on the amplitudes less 1, real and imaginary, shape (2, frequency, pair); 0 without
+        a silhouette.
     """
     at_x, of_x = _axis(shifts[0], counts[0])
     at_y, of_y = _axis(shifts[1], counts[1])
-    real, imaginary = _on_lattice(table, runs, heights, at_x, at_y, per_m)
-    factors = np.zeros((shifts.shape[1], len(per_m)), dtype=np.complex128)
-    for e in range(shifts.shape[1]):
-        for c in range(len(per_m)):
-            re, im = 0.0, 0.0
-            for y in range(len(at_y)):
-                row_re, row_im = 0.0, 0.0
-                for x in range(len(at_x)):
-                    row_re += of_x[e, x] * real[c, y, x]
-                    row_im += of_x[e, x] * imaginary[c, y, x]
-                re += of_y[e, y] * row_re
-                im += of_y[e, y] * row_im
-            factors[e, c] = 1.0 - 0.5j * complex(re, im)
-    return factors
+    lattice = _on_lattice(runs, heights, at_x, at_y, per_m)
+    change = np.zeros((2, len(per_m), shifts.shape[1]))
+    row = np.zeros((2, shifts.shape[1]))
+    for c in range(len(per_m)):
+        for y in range(len(at_y)):
+            row[:] = 0.0
+            for x in range(len(at_x)):
+                _add_scaled(of_x[x], lattice[0, c, y, x], lattice[1, c, y, x], row[0], row[1])
+            # −j/2 times the integral.
+            _add_product(of_y[y], row[1], 0.5, change[0, c])
+            _add_product(of_y[y], row[0], -0.5, change[1, c])
+    return change
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, fastmath={"contract", "nsz"})
+def _add_scaled(
+    weight: np.ndarray, re: float, im: float, real: np.ndarray, imaginary: np.ndarray
+) -> None:
+    """Adds a number, each pair with its weight."""
+    for e in range(len(weight)):
+        real[e] += weight[e] * re
+        imaginary[e] += weight[e] * im
+
+
+@numba.njit(cache=True, fastmath={"contract", "nsz"})
+def _add_product(weight: np.ndarray, row: np.ndarray, scale: float, out: np.ndarray) -> None:
+    """Adds rows times weights, pair by pair."""
+    for e in range(len(weight)):
+        out[e] += scale * weight[e] * row[e]
+
+
+@numba.njit(cache=True, error_model="numpy")
 def _axis(shift: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Chebyshev nodes over the range of some shifts, and what each shift takes of each node.
 
@@ -93,101 +107,97 @@ def _axis(shift: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
         count: Number of nodes.
 
     Returns:
-        Nodes [m], shape (node,), and weights, shape (pair, node).
+        Nodes [m], shape (node,), and weights, shape (node, pair).
     """
     low, high = shift.min(), shift.max()
     middle, half = 0.5 * (low + high), max(0.5 * (high - low), 1e-12)
-    at, sign = np.zeros(count), np.zeros(count)
+    at = np.zeros(count)
+    weights, total = np.zeros((count, len(shift))), np.zeros(len(shift))
     for n in range(count):
         angle = (2 * n + 1) * math.pi / (2 * count)
         at[n] = math.cos(angle)
-        sign[n] = math.sin(angle) * (1.0 if n % 2 == 0 else -1.0)
-    weights = np.zeros((len(shift), count))
+        sign = math.sin(angle) * (1.0 if n % 2 == 0 else -1.0)
+        row = weights[n]
+        for e in range(len(shift)):
+            away = (shift[e] - middle) / half - at[n]
+            # So near that nothing of the other nodes is left.
+            away = away if abs(away) > 1e-15 else 1e-15
+            row[e] = sign / away
+            total[e] += row[e]
     for e in range(len(shift)):
-        place = (shift[e] - middle) / half
-        total, node = 0.0, -1
-        for n in range(count):
-            away = place - at[n]
-            if abs(away) < 1e-13:
-                node = n
-                break
-            weights[e, n] = sign[n] / away
-            total += weights[e, n]
-        if node >= 0:
-            weights[e] = 0.0
-            weights[e, node] = 1.0
-        else:
-            weights[e] /= total
+        total[e] = 1.0 / total[e]
+    for n in range(count):
+        row = weights[n]
+        for e in range(len(shift)):
+            row[e] *= total[e]
     return middle + half * at, weights
 
 
 @numba.njit(cache=True)
 def _on_lattice(
-    table: np.ndarray,
     runs: np.ndarray,
     heights: np.ndarray,
     at_x: np.ndarray,
     at_y: np.ndarray,
     per_m: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """The double Fresnel integral over runs, real and imaginary, each (frequency, y, x)."""
-    n_x, n_y = len(at_x), len(at_y)
-    shift_x, per_m_x = _spread(at_x, per_m)
-    shift_y, per_m_y = _spread(at_y, per_m)
-    real = np.zeros((len(per_m), n_y, n_x))
-    imaginary = np.zeros_like(real)
-    across, before = np.zeros((2, len(shift_x))), np.zeros((2, len(shift_x)))
-    along = np.zeros((2, len(shift_y)))
-    for i in range(len(runs) + 1):
-        ended = i == len(runs)
-        if i > 0 and (ended or heights[i, 0] != heights[i - 1, 0]):
-            # The integral over y of each row is a difference of two values, so that a boundary
-            # between rows takes one value, times how the rows differ.
-            _add_boundary(
-                table, heights[i - 1, 0], shift_y, per_m_y, before - across, along, real, imaginary
-            )
-            before[:] = across
-            across[:] = 0.0
-            if ended or heights[i, 0] != heights[i - 1, 1]:
-                _add_boundary(
-                    table, heights[i - 1, 1], shift_y, per_m_y, before, along, real, imaginary
-                )
-                before[:] = 0.0
-        if not ended:
-            add_fresnel(table, runs[i, 1], shift_x, per_m_x, 1.0, across)
-            add_fresnel(table, runs[i, 0], shift_x, per_m_x, -1.0, across)
-    return real, imaginary
+) -> np.ndarray:
+    """The double Fresnel integral over runs, real and imaginary, shape (2, frequency, y, x).
+
+    The integral over y of each row is a difference of two values, so that each level between rows
+    takes one value, times what the runs below it have more than those above.
+    """
+    levels, lower, upper = _levels_of(heights)
+    starts, ends = runs[:, 0].astype(np.float32), runs[:, 1].astype(np.float32)
+    out = np.zeros((2, len(per_m), len(at_y), len(at_x)))
+    from_start = np.zeros((2, len(runs)), dtype=np.float32)
+    to_end = np.zeros_like(from_start)
+    along = np.zeros((2, len(levels)), dtype=np.float32)
+    more = np.zeros((len(at_x), 2, len(levels)), dtype=np.float32)
+    for c in range(len(per_m)):
+        more[:] = 0.0
+        for x in range(len(at_x)):
+            fill_fresnel(starts, at_x[x], per_m[c], from_start)
+            fill_fresnel(ends, at_x[x], per_m[c], to_end)
+            for i in range(len(runs)):
+                re, im = to_end[0, i] - from_start[0, i], to_end[1, i] - from_start[1, i]
+                more[x, 0, upper[i]] += re
+                more[x, 1, upper[i]] += im
+                more[x, 0, lower[i]] -= re
+                more[x, 1, lower[i]] -= im
+        for y in range(len(at_y)):
+            fill_fresnel(levels, at_y[y], per_m[c], along)
+            for x in range(len(at_x)):
+                out[0, c, y, x], out[1, c, y, x] = _product_sum(along, more[x])
+    return out
 
 
 @numba.njit(cache=True)
-def _spread(at: np.ndarray, per_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Every place at every frequency: shifts and Fresnel coordinates per metre, frequency first."""
-    shift, scale = np.zeros(len(at) * len(per_m)), np.zeros(len(at) * len(per_m))
-    for line in range(len(shift)):
-        shift[line] = at[line % len(at)]
-        scale[line] = per_m[line // len(at)]
-    return shift, scale
+def _levels_of(heights: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Levels at which rows of runs end [m], float32, and which lies below and above each run.
+
+    Args:
+        heights: Rows of the runs, from the lowest [m], shape (N, 2).
+    """
+    levels = np.zeros(2 * len(heights), dtype=np.float32)
+    lower, upper = np.zeros(len(heights), np.uint64), np.zeros(len(heights), np.uint64)
+    count = 0
+    for i in range(len(heights)):
+        if i == 0 or heights[i, 0] != heights[i - 1, 0]:
+            if i == 0 or heights[i, 0] != heights[i - 1, 1]:
+                levels[count] = heights[i, 0]
+                count += 1
+            levels[count] = heights[i, 1]
+            count += 1
+        lower[i], upper[i] = count - 2, count - 1
+    return levels[:count], lower, upper
 
 
-@numba.njit(cache=True, fastmath={"contract", "nsz"})
-def _add_boundary(
-    table: np.ndarray,
-    edge: float,
-    shift_y: np.ndarray,
-    per_m_y: np.ndarray,
-    more: np.ndarray,
-    along: np.ndarray,
-    real: np.ndarray,
-    imaginary: np.ndarray,
-) -> None:
-    """Adds F at the boundary of two rows times what the lower one has more; `along` is scratch."""
-    along[:] = 0.0
-    add_fresnel(table, edge, shift_y, per_m_y, 1.0, along)
-    n_y, n_x = real.shape[1], real.shape[2]
-    for c in range(real.shape[0]):
-        for y in range(n_y):
-            a, b = along[0, c * n_y + y], along[1, c * n_y + y]
-            for x in range(n_x):
-                re, im = more[0, c * n_x + x], more[1, c * n_x + x]
-                real[c, y, x] += a * re - b * im
-                imaginary[c, y, x] += a * im + b * re
+@numba.njit(cache=True, fastmath={"contract", "nsz", "reassoc"})
+def _product_sum(a: np.ndarray, b: np.ndarray) -> tuple[np.float32, np.float32]:
+    """Sum of products of complex numbers, given as rows real and imaginary."""
+    a_re, a_im, b_re, b_im = a[0], a[1], b[0], b[1]
+    re, im = np.float32(0.0), np.float32(0.0)
+    for i in range(len(a_re)):
+        re += a_re[i] * b_re[i] - a_im[i] * b_im[i]
+        im += a_re[i] * b_im[i] + a_im[i] * b_re[i]
+    return re, im

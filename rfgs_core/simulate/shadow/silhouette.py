@@ -15,84 +15,6 @@ ROW = 0.02
 LEAST_ROWS, MOST_ROWS = 40, 2048
 #: Beyond this coordinate a silhouette counts as unbounded.
 WINDOW = 20.0
-#: Vertices nearer to the ends of a segment than this are not between them [m].
-_MARGIN_M = 1e-3
-
-
-@numba.njit(cache=True)
-def project(
-    vertices: np.ndarray, start: np.ndarray, end: np.ndarray, before_m: float, after_m: float
-) -> tuple[np.ndarray, float, float, np.ndarray]:
-    """Flattens a mesh onto the plane across a segment, each vertex at its own Fresnel scale.
-
-    Args:
-        vertices: Vertices [m], shape (3, V), for vector code.
-        start: Start of the segment [m].
-        end: End of the segment [m].
-        before_m: Length of the unfolded path before the segment [m].
-        after_m: Length after the segment [m].
-
-    Returns:
-        Plane coordinates at the mean depth [m], no numbers where a vertex does not lie between the
-        ends, shape (2, V); the depth of the plane from the segment's start [m]; 1/d_1 + 1/d_2
-        there, 0 if no vertex lies between [1/m]; and the two axes of the plane, shape (2, 3).
-    """
-    way = end - start
-    length = math.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
-    u = way / length
-    axes = np.zeros((2, 3))
-    # Horizontal first axis, so that rows of a standing person are level; any if u is vertical.
-    flat = math.sqrt(u[0] * u[0] + u[1] * u[1])
-    if flat > 1e-6:
-        axes[0, 0], axes[0, 1] = -u[1] / flat, u[0] / flat
-    else:
-        axes[0, 0] = 1.0
-    axes[1, 0] = u[1] * axes[0, 2] - u[2] * axes[0, 1]
-    axes[1, 1] = u[2] * axes[0, 0] - u[0] * axes[0, 2]
-    axes[1, 2] = u[0] * axes[0, 1] - u[1] * axes[0, 0]
-    xy = np.zeros((2, vertices.shape[1]))
-    depths = (before_m, length, after_m)
-    depth_sum, count = _flatten(
-        vertices,
-        (start[0], start[1], start[2]),
-        ((axes[0, 0], axes[0, 1], axes[0, 2]), (axes[1, 0], axes[1, 1], axes[1, 2])),
-        (u[0], u[1], u[2]),
-        depths,
-        xy,
-    )
-    if count == 0.0:
-        return xy, 0.0, 0.0, axes
-    plane = depth_sum / count
-    at_plane = 1.0 / (before_m + plane) + 1.0 / (after_m + length - plane)
-    xy *= 1.0 / math.sqrt(at_plane)
-    return xy, plane, at_plane, axes
-
-
-@numba.njit(cache=True, fastmath={"contract", "reassoc"})
-def _flatten(
-    vertices: np.ndarray,
-    start: tuple[float, float, float],
-    axes: tuple[tuple[float, float, float], tuple[float, float, float]],
-    u: tuple[float, float, float],
-    depths: tuple[float, float, float],
-    xy: np.ndarray,
-) -> tuple[float, float]:
-    """Fills in plane coordinates times √(1/d_1 + 1/d_2) of each vertex; sum and count of depths."""
-    (ax, ay, az), (bx, by, bz), (ux, uy, uz) = axes[0], axes[1], u
-    before_m, length, after_m = depths
-    low, high = _MARGIN_M, length - _MARGIN_M
-    depth_sum, count = 0.0, 0.0
-    for i in range(vertices.shape[1]):
-        x, y, z = vertices[0, i] - start[0], vertices[1, i] - start[1], vertices[2, i] - start[2]
-        depth = x * ux + y * uy + z * uz
-        between = (depth > low) & (depth < high)
-        inside = depth if between else 0.5 * length
-        scale = math.sqrt(1.0 / (before_m + inside) + 1.0 / (after_m + length - inside))
-        depth_sum += depth if between else 0.0
-        count += 1.0 if between else 0.0
-        xy[0, i] = (x * ax + y * ay + z * az) * scale if between else np.nan
-        xy[1, i] = (x * bx + y * by + z * bz) * scale if between else np.nan
-    return depth_sum, count
 
 
 @numba.njit(cache=True)
@@ -141,7 +63,7 @@ def _contour(
     return some, more[:count]
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _crossings(
     xy: np.ndarray, edges: np.ndarray, more: np.ndarray, y0: float, pitch: float, rows: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -155,30 +77,51 @@ def _crossings(
         pitch: Their height [m].
         rows: Their number.
     """
+    per_m = 1.0 / pitch
+    begin, end = _rows_of(xy[1], edges, (y0, per_m), rows)
     offsets = np.zeros(rows + 1, dtype=np.int64)
-    for filling in range(2):
-        if filling:
-            x = np.zeros(offsets[rows])
-            entered = np.zeros(offsets[rows], dtype=np.int64)
-            filled = offsets[:-1].copy()
-        for e in range(len(edges)):
-            a, b = edges[e, 0], edges[e, 1]
-            ya, yb = (xy[1, a] - y0) / pitch - 0.5, (xy[1, b] - y0) / pitch - 0.5
-            first = max(math.ceil(min(ya, yb)), 0)
-            # An edge that ends at the middle of a row is left to the one that begins there.
-            last = min(math.ceil(max(ya, yb)) - 1, rows - 1)
-            for row in range(first, last + 1):
-                if not filling:
-                    offsets[row + 1] += 1
-                    continue
-                at = filled[row]
-                x[at] = xy[0, a] + (row - ya) / (yb - ya) * (xy[0, b] - xy[0, a])
-                entered[at] = more[e] if yb < ya else -more[e]
-                filled[row] += 1
-        if not filling:
-            for row in range(rows):
-                offsets[row + 1] += offsets[row]
+    for e in range(len(edges)):
+        for row in range(begin[e], end[e]):
+            offsets[row + 1] += 1
+    for row in range(rows):
+        offsets[row + 1] += offsets[row]
+    x, entered = np.zeros(offsets[rows]), np.zeros(offsets[rows], dtype=np.int64)
+    filled = offsets[:-1].copy()
+    for e in range(len(edges)):
+        if begin[e] >= end[e]:
+            continue
+        a, b = edges[e, 0], edges[e, 1]
+        ya, yb = (xy[1, a] - y0) * per_m - 0.5, (xy[1, b] - y0) * per_m - 0.5
+        slope = (xy[0, b] - xy[0, a]) / (yb - ya)
+        for row in range(begin[e], end[e]):
+            at = filled[row]
+            x[at] = xy[0, a] + (row - ya) * slope
+            entered[at] = more[e] if yb < ya else -more[e]
+            filled[row] += 1
     return offsets, x, entered
+
+
+@numba.njit(cache=True)
+def _rows_of(
+    y: np.ndarray, edges: np.ndarray, lines: tuple[float, float], rows: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """First row whose middle each edge crosses and the one after the last, int32, (edge,) each.
+
+    Args:
+        y: Heights of the vertices [m], shape (V,).
+        edges: Vertices of the edges, shape (edge, 2).
+        lines: Lower end of the rows [m] and rows per metre.
+        rows: Number of rows.
+    """
+    y0, per_m = lines
+    begin, end = np.zeros(len(edges), dtype=np.int32), np.zeros(len(edges), dtype=np.int32)
+    for e in range(len(edges)):
+        a, b = (y[edges[e, 0]] - y0) * per_m - 0.5, (y[edges[e, 1]] - y0) * per_m - 0.5
+        # An edge that ends at the middle of a row is left to the one that begins there.
+        low, high = np.ceil(a if a < b else b), np.ceil(b if a < b else a)
+        begin[e] = np.int32(low if low > 0.0 else 0.0)
+        end[e] = np.int32(high if high < rows else rows)
+    return begin, end
 
 
 @numba.njit(cache=True)

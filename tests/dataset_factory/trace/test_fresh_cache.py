@@ -14,7 +14,8 @@ _DIGESTS = """
 import hashlib, os, sys
 os.environ["NUMBA_CACHE_DIR"] = sys.argv[1]
 import numpy as np, torch
-from rfgs_core.simulate.shadow import silhouette
+from rfgs_core.simulate.shadow.fresnel import FRESNEL
+from rfgs_core.simulate.shadow.outline import ShadowMesh
 from rfgs_core.simulate.surface.facets import facet_sum
 from rfgs_core.simulate.shadow.frequencies import nodes_for
 from rfgs_core.simulate.shadow.kirchhoff import _shade
@@ -40,7 +41,7 @@ show("facets", [facet_sum(points, normals, area, tx_xyz, rx_xyz, weight, freq_hz
 count, nodes = 300, 5
 complex_ones = rng.normal(size=(count, nodes)) + 1j * rng.normal(size=(count, nodes))
 steered = _steer(
-    (complex_ones, np.ones((0, 0, 0, 0), dtype=np.complex128)),
+    complex_ones, (np.ones((0, 0, 0, 0), dtype=np.complex128), np.arange(count), 0.0),
     rng.uniform(size=count) < 0.5,
     (points[:count], points[-count:], rng.uniform(size=count)),
     rng.normal(size=(count, links, 3)), np.stack([tx_xyz[0], rx_xyz[0]]), tx_xyz, rx_xyz,
@@ -52,13 +53,14 @@ show("steering", [steered])
 corners = np.stack([rng.normal(size=(20, 3)) * 0.4, rng.normal(size=(20, 3)) * 0.4 + [4, 4, 2]], 1)
 body = np.concatenate([points[:200] + 0.1 * rng.normal(size=(200, 3)) for _ in range(3)])
 still, turn = np.zeros((20, 1)), np.broadcast_to(np.eye(3), (20, 1, 3, 3)).copy()
+mesh = ShadowMesh.of(np.arange(600).reshape(3, 200).T)
 past = np.ones((20, 4, 8, 5), dtype=np.complex128)
 _shade(
     corners, np.ones((20, 1), dtype=bool),
     (still, still, turn, turn, np.ones(20)),
     (rng.normal(size=(20, 4, 3)) * 0.1, rng.normal(size=(20, 8, 3)) * 0.1),
-    body, np.arange(600).reshape(3, 200).T.copy(), nodes_for(np.linspace(5.7e9, 5.9e9, 5)),
-    silhouette.FRESNEL, False, past,
+    body.T.copy(), (mesh.faces, mesh.edges, mesh.sides), nodes_for(np.linspace(5.7e9, 5.9e9, 5)),
+    FRESNEL, False, past,
 )
 assert np.abs(past - 1).max() > 0.1, "expected a shadow"
 show("silhouettes", [past])

@@ -17,7 +17,7 @@ from rfgs_core.simulate.paths.path_set import PathSet
 from rfgs_core.simulate.shadow import silhouette
 from rfgs_core.simulate.shadow.environment import environment_channel, node_frequencies
 from rfgs_core.simulate.shadow.frequencies import COUNTS, fine_grid, nodes_for
-from rfgs_core.simulate.shadow.fresnel import FRESNEL, screen_factors
+from rfgs_core.simulate.shadow.fresnel import FRESNEL, fill_fresnel, screen_factors
 from rfgs_core.simulate.shadow.kirchhoff import transmission
 from rfgs_core.simulate.shadow.lattice import lattice_factors, places_needed
 from rfgs_core.simulate.shadow.outline import Outline, ShadowMesh
@@ -209,6 +209,23 @@ def test_a_figure_is_shaded_as_a_sum_over_its_picture_says(name: str, side) -> N
     assert np.abs(found[chosen] - expected).max() < limit, (found[chosen], expected)
 
 
+def one_plus(change: np.ndarray) -> np.ndarray:
+    """Factors from what is changed, real and imaginary (2, frequency, pair), (pair, frequency)."""
+    return (1.0 + change[0] + 1j * change[1]).T
+
+
+def test_polynomials_tell_the_fresnel_integral() -> None:
+    shift, per_m = 0.1, 5.6
+    nu = np.concatenate([np.linspace(-40.0, 40.0, 20001), [-np.inf, np.inf]])
+    edges = (nu / per_m + shift).astype(np.float32)
+    found = np.zeros((2, len(edges)), dtype=np.float32)
+    fill_fresnel(edges, shift, per_m, found)
+    # Beyond 30 the limit is taken: the rest is at most 1/πν.
+    limit = np.where(np.abs(nu) < 29.9, 2e-5, 1.01 / (np.pi * np.maximum(np.abs(nu), 1.0)))
+    assert (np.abs(found[0] + 1j * found[1] - fresnel_integral(nu)) <= limit + 1e-6).all()
+    assert found[:, -1].tolist() == [0.5, -0.5]
+
+
 @pytest.mark.parametrize("name", ["wifi24", "wifi", "mmwave"])
 @pytest.mark.parametrize("tilt_deg", [0.0, 35.0])
 def test_an_array_sees_from_a_lattice_what_each_element_sees(name: str, tilt_deg: float) -> None:
@@ -234,13 +251,13 @@ def test_an_array_sees_from_a_lattice_what_each_element_sees(name: str, tilt_deg
         places_needed(half, far, per_m_at.max())
         for half, far in zip(halves, farthest_m, strict=True)
     )
-    found = lattice_factors(FRESNEL, runs, heights, shifts, counts, per_m_at)
+    found = one_plus(lattice_factors(runs, heights, shifts, counts, per_m_at))
     alone = screen_factors(
         FRESNEL, runs, heights, np.repeat(shifts, 3, axis=1), np.tile(per_m_at, 64)
     ).reshape(64, 3)
     assert np.ptp(np.abs(alone), axis=0).min() > 0.01
     assert np.abs(found - alone).max() < 2e-3
-    few = lattice_factors(FRESNEL, runs, heights, shifts, (2, 2), per_m_at)
+    few = one_plus(lattice_factors(runs, heights, shifts, (2, 2), per_m_at))
     assert np.abs(few - alone).max() > 5e-3
 
 

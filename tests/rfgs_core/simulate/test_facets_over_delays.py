@@ -56,7 +56,7 @@ def _spread(points, normals, areas, tx, rx, grid) -> np.ndarray:
         Patches(points, normals, areas, ones, material),
         np.arange(len(points)),
         fields[0],
-        (fields, np.zeros(1, dtype=np.int64)),
+        (fields, np.ones(fields.shape[:2], dtype=np.bool_), np.zeros(1, dtype=np.int64)),
         Arrays(tx_centre[None], tx_offset[None], rx_centre, rx_offset, size_m),
         (grid.cell_m, grid.centre_k, grid.node_k),
         np.ones(1, dtype=bool),

@@ -132,7 +132,7 @@ def _generate(args: DemoArgs, dataset: Path) -> None:
 def _inspect(args: DemoArgs, run: Path) -> None:
     target = args.out / "inspect.blend"
     call(
-        "addon_rfgs", "--blend", _scene_file(args.scene), "import", run,
+        "addon_rfgs", "--blend", _scene_file(args.scene), "import", run, "--samples", "8",
         "--out", target, "--picture", args.out / "inspect.png",
     )  # fmt: skip
 

@@ -48,6 +48,12 @@ class _Listener:
 _listener: _Listener | None = None
 
 
+def note(line: str) -> None:
+    """Tells a command's user something before its work is done; an operator's user is not told."""
+    if _listener is not None:
+        _listener.say(f"note: {line}")
+
+
 def call(operator: str, out: TextIO, **values: Any) -> str:
     """Runs an operator for a command.
 

@@ -193,6 +193,13 @@ def can_denoise() -> bool:
     return bool(getattr(_cycles, "with_openimagedenoise", False))
 
 
+def noise_note() -> str:
+    """What to say of pictures that nothing denoises; empty where something does."""
+    if can_denoise():
+        return ""
+    return "this Blender has no denoiser, so pictures are noisy; more samples make them less so"
+
+
 def _render(scene: bpy.types.Scene, stem: Path, samples: int, passes: bool) -> None:
     with kept_sampling() as keeper:
         keeper.set(scene.cycles, "samples", samples)

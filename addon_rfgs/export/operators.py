@@ -5,10 +5,10 @@ import bpy
 
 from ..command import Command
 from ..errors import AddonError
-from ..reporting import Progress, Reporting, chosen_path
+from ..reporting import Progress, Reporting, chosen_path, note
 from ..scene_choice import chosen_overrides
 from .bundle import export_bundle
-from .groundtruth import render_groundtruth
+from .groundtruth import noise_note, render_groundtruth
 
 _BOTH = ("frames", "overrides", "cameras", "resolution")
 
@@ -62,6 +62,9 @@ class RFGS_OT_render_groundtruth(Reporting, bpy.types.Operator):
         """Renders with the panel's settings."""
         settings = context.scene.rfgs.export
         folder = chosen_path(settings.pictures_folder)
+        noise = "" if settings.empty else noise_note()
+        if noise:
+            note(noise)
         count = render_groundtruth(
             context.scene,
             folder,
@@ -74,7 +77,7 @@ class RFGS_OT_render_groundtruth(Reporting, bpy.types.Operator):
             progress,
             chosen_overrides(settings),
         )
-        return f"Wrote {folder}: {count} pictures"
+        return f"Wrote {folder}: {count} pictures" + (f"; {noise}" if noise else "")
 
 
 def _seconds(text: str) -> list[float]:

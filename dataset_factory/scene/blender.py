@@ -18,6 +18,8 @@ from rfgs_core.errors import MissingToolError, RfgsError
 Progress = Callable[[int, int], None]
 
 _PROGRESS = re.compile(r"progress (\d+) (\d+)")
+#: Begins what the add-on wants its user to know.
+_NOTE = "note: "
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,7 @@ class Blender:
         return [*start, "--command", "rfgs", name, *arguments]
 
     def run(self, name: str, *arguments: str, progress: Progress | None = None) -> None:
-        """Runs one of the add-on's commands to its end.
+        """Runs one of the add-on's commands to its end; what it notes goes to standard error.
 
         Args:
             name: `check`, `export` or `groundtruth`.
@@ -59,6 +61,8 @@ class Blender:
                     match = _PROGRESS.match(line)
                     if match and progress:
                         progress(int(match[1]), int(match[2]))
+                    elif line.startswith(_NOTE):
+                        sys.stderr.write(line)
                     elif not match:
                         said = [*said[-19:], line]
                 code = process.wait()

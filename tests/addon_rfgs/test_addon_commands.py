@@ -326,3 +326,14 @@ def test_joints_project_into_the_person_in_every_camera(addon, python, tmp_path:
             assert (index[~hidden] == 1).all(), (camera["name"], frame)
             checked += int((~hidden).sum())
     assert checked > 100
+
+
+def test_pictures_that_nothing_denoises_are_said_to_be_noisy(
+    scenes: Path, python, tmp_path: Path
+) -> None:
+    """As in Debian's Blender, which is built without a denoiser."""
+    asked = ("--blend", scenes / "room.blend", "groundtruth", "--out", tmp_path / "truth")
+    few = ("--frames", "1:1", "--cameras", "1", "--resolution", "16", "--samples", "1")
+    said = python("-c", _NOISY, *asked, *few, must_work=True).stdout
+    note = "this Blender has no denoiser, so pictures are noisy"
+    assert f"note: {note}" in said and f"1 pictures; {note}" in said

@@ -12,6 +12,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from tqdm import tqdm
+
 from rfgs_core.children import child_environment, end_with_parent
 from rfgs_core.errors import MissingToolError, RfgsError
 
@@ -62,7 +64,8 @@ class Blender:
                     if match and progress:
                         progress(int(match[1]), int(match[2]))
                     elif line.startswith(_NOTE):
-                        sys.stderr.write(line)
+                        # A bar may stand on the last line.
+                        tqdm.write(line, file=sys.stderr, end="")
                     elif not match:
                         said = [*said[-19:], line]
                 code = process.wait()

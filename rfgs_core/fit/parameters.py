@@ -142,9 +142,9 @@ class TrainableGaussians:
             for name, leaf in result.leaves.items():
                 if f"{name}.step" in arrays:
                     kept = {key: torch.from_numpy(arrays[f"{name}.{key}"].copy()) for key in _KEPT}
-                    # Adam counts steps on the CPU.
-                    moments = {key: kept[key].to(device) for key in MOMENTS}
-                    result.optimiser.state[leaf] = {**moments, "step": kept["step"]}
+                    result.optimiser.state[leaf] = {
+                        key: value.to(device) for key, value in kept.items()
+                    }
                     if any(
                         result.optimiser.state[leaf][key].shape != leaf.shape for key in MOMENTS
                     ):

@@ -16,6 +16,11 @@ from rfgs_core.limbs.tokens import Packed, Tokens, relative_power, tokens
 _ONE_SILENT, _TWO_SILENT = 0.5, 0.1
 #: Noise below the peak of a pair, log10: quietest, and how much louder it may be.
 _QUIET, _LOUDER = -3.2, 2.0
+#: Share of frames whose packets were filtered against thermal noise, and that noise below the peak
+#: of the pair that hears the body best, log10: loudest, and how much quieter it may be.
+_FILTERED, _LOUD, _QUIETER = 0.3, -0.5, 3.0
+#: A filter drops what is less than this over the noise.
+_DROPPED = 2.0
 #: Samples of noise that are kept.
 _POOL = 2**22
 #: Deviation of a pair's gain, log10 of power.
@@ -30,12 +35,35 @@ def disturbed(packed: Packed, generator: torch.Generator) -> tuple[Tokens, Bool[
     power = relative_power(packed)
     noise = draw(count, pairs, 1, 1, 1) * _LOUDER + _QUIET
     power = power + _speckle(power.shape, generator) * 10.0**noise
+    power = filtered(power, packed, generator)
+    packed = packed._replace(there=packed.there & (power.amax((2, 3, 4)) > 0.0))
     gain = torch.randn(packed.level.shape, generator=generator, device=device)
     packed = packed._replace(level=packed.level + _GAIN * gain)
     there = _heard(packed, generator)
     order = torch.where(there, draw(count, pairs), -1.0)
     mirror = draw(count) < 0.5
     return tokens(packed, power, there, order.argmax(1), mirror), mirror
+
+
+def filtered(
+    power: Float[Tensor, "frame pair elevation azimuth range"],
+    packed: Packed,
+    generator: torch.Generator,
+) -> Float[Tensor, "frame pair elevation azimuth range"]:
+    """Power after a Wiener filter of packets, in some frames; see `measure.packets`.
+
+    Thermal noise is the same in all channels, and grows by (d_t d_r)² in maps, as echoes are.
+    """
+    count = len(power)
+    draw = functools.partial(torch.rand, generator=generator, device=power.device)
+    heard = 10.0**packed.level / packed.vectors[:, :, :2].norm(dim=-1).prod(-1).square()
+    heard = torch.where(packed.there, heard, 0.0)
+    loudness = 10.0 ** (_LOUD - _QUIETER * draw(count, 1)) * (draw(count, 1) < _FILTERED)
+    noise = heard.amax(1, keepdim=True) * loudness / heard.clamp_min(1e-30)
+    noise = noise.clamp_max(1e6)[:, :, None, None, None]
+    total = power + noise * (0.9 + 0.1 * _speckle(power.shape, generator))
+    kept = (1.0 - noise / total.clamp_min(1e-30)).clamp_min(0.0)
+    return torch.where(total > _DROPPED * noise, total * kept.square(), 0.0)
 
 
 def _speckle(shape: torch.Size, generator: torch.Generator) -> Tensor:

@@ -104,6 +104,7 @@ def learn(
     worlds = sub_seed(config.seed, "from", progress.frames)
     begun, owed, words, unseen = time.monotonic() - progress.spent_s, 0.0, "", math.nan
     errors: list[torch.Tensor] = []
+    recorded = config.device == "cpu"
     looked = progress.frames
     for chunk in chunks(radio, worlds, config.device, config.workers):
         kept.add(chunk)
@@ -114,6 +115,9 @@ def learn(
         owed += config.passes * count / config.batch
         while owed >= 1.0 and kept.seen >= min(_FIRST, config.kept):
             batch = kept.draw(config.batch, generator)
+            if not recorded:
+                _record(network, batch, generator)
+                recorded = True
             errors = [*errors[1 - _TOLD :], _step(network, optimiser, batch, generator)]
             owed -= 1.0
         if progress.frames - looked >= _OFTEN * max(config.batch // 64, 1) or share >= 1.0:
@@ -128,6 +132,15 @@ def learn(
             break
     network.eval()
     return Learned(network.cpu(), unseen, progress)
+
+
+def _record(network: LimbNetwork, chunk: Chunk, generator: torch.Generator) -> None:
+    """Lets a GPU replay the network's kernels in steps, since to start them takes longer than they.
+
+    Products of matrices are in TF32 from here on.
+    """
+    torch.set_float32_matmul_precision("high")
+    torch.cuda.make_graphed_callables(network.train(), (disturbed(chunk.packed, generator)[0],))
 
 
 def _judged(radio: Radio, config: LearnConfig) -> Chunk:

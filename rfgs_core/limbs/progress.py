@@ -59,10 +59,7 @@ def resume(path: Path, network: nn.Module, optimiser: Adam) -> Progress:
     refuse_misfit(path, state, wanted, _REMEDY)
     network.load_state_dict({name: state[f"weight.{name}"] for name in weights})
     for name, parameter in parameters.items():
-        moments = {moment: state[f"{moment}.{name}"] for moment in _MOMENTS}
-        # The count of steps stays where the optimiser keeps it.
         optimiser.state[parameter] = {
-            moment: value if moment == "step" else value.to(parameter.device)
-            for moment, value in moments.items()
+            moment: state[f"{moment}.{name}"].to(parameter.device) for moment in _MOMENTS
         }
     return Progress(int(told["frames"]), float(told["spent_s"]))

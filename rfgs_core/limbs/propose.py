@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 import torch
 from jaxtyping import Float, Float64
 
-from rfgs_core.encode.body_maps import CENTRE_HEIGHT_M, body_maps, views_of
+from rfgs_core.encode.body_maps import CENTRE_HEIGHT_M, View, body_maps, views_of
 from rfgs_core.limbs.network import LimbNetwork
 from rfgs_core.limbs.tokens import (
     MIRRORED,
@@ -28,6 +29,11 @@ SMOOTH_S, DEGREE = 0.4, 2
 #: both are expected to be off, is more than this: 0.6 to 1.9 where a walk is right, and 4 to 11
 #: where none is or the person is a child (random worlds and recorded motions).
 _CONTRADICTION = 3.0
+#: Places around a body from which the network is asked [m].
+_SIDES_M = 0.06 * np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
+#: A filter of packets leaves holes where it heard noise, and the network has seen maps with noise:
+#: noise that is put back, below each pair's peak, log10, and how often each is drawn.
+_PUT_BACK, _DRAWS = (-2.0, -1.5, -1.0), 4
 #: No joint is surer than this where joints are smoothed [m].
 _SUREST_M = 0.01
 
@@ -46,43 +52,95 @@ def propose(
 ) -> Joints:
     """What the network makes of one frame.
 
-    Every device pair's receiver gives the direction of the x axis once, with and without a
-    mirror; what comes out is the mean.
+    It is asked where a body is said to be, and then from four places around where it finds the
+    joints, each time with the x axis towards another receiver, and with and without a mirror. What
+    comes out is the mean of these four by 1/σ². Where packets were filtered, so much noise is put
+    back that the network is surest.
 
     Args:
         network: The network of this kind of radio.
         observations: The frame.
         axes_xy: Where bodies are [m].
     """
-    floor_m = float(observations.bounds_m[0, 2])
     views = views_of(observations.layout, observations.links)
     found, sigma = [], []
-    for x, y in axes_xy:
-        centre = np.array([x, y, floor_m + CENTRE_HEIGHT_M])
-        maps = body_maps(
-            observations.delta, observations.layout, observations.links,
-            observations.freq_hz, observations.subcarriers, centre,
-        )  # fmt: skip
-        joints, sure = _asked(network, pack([(views, maps, centre)], len(views)))
-        found.append(joints + centre)
-        sigma.append(sure)
+    for place in np.asarray(axes_xy, dtype=np.float64):
+        middle = _asked_at(network, observations, views, place, 0)[0][:, :2].mean(axis=0)
+        told = [
+            _asked_at(network, observations, views, middle + side, turn)
+            for turn, side in enumerate(_SIDES_M)
+        ]
+        joints, sure = (np.array(values) for values in zip(*told, strict=True))
+        weight = sure[..., None] ** -2.0
+        found.append((weight * joints).sum(axis=0) / weight.sum(axis=0))
+        sigma.append(sure.mean(axis=0))
     return Joints(np.array(found).reshape(-1, 17, 3), np.array(sigma).reshape(-1, 17))
 
 
-def _asked(
-    network: LimbNetwork, packed: Packed
+def _asked_at(
+    network: LimbNetwork,
+    observations: Observations,
+    views: list[View],
+    place_xy: Float64[np.ndarray, "2"],
+    turn: int,
 ) -> tuple[Float64[np.ndarray, "17 3"], Float64[np.ndarray, "17"]]:
-    """Mean joints around the centre, and σ, of one packed frame."""
+    """Joints in the world and σ, from maps around a place; see `_asked`."""
+    floor_m = float(observations.bounds_m[0, 2])
+    centre = np.array([*place_xy, floor_m + CENTRE_HEIGHT_M])
+    maps = body_maps(
+        observations.delta, observations.layout, observations.links,
+        observations.freq_hz, observations.subcarriers, centre,
+    )  # fmt: skip
+
+    def said(maps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return _asked(network, pack([(views, maps, centre)], len(views)), turn)
+
+    filtered = observations.packets is not None
+    joints, sigma = with_noise(said, maps) if filtered else said(maps)
+    return joints + centre, sigma
+
+
+def with_noise(
+    said: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
+    maps: Float[np.ndarray, "pair elevation azimuth range"],
+) -> tuple[Float64[np.ndarray, "17 3"], Float64[np.ndarray, "17"]]:
+    """Mean joints and σ at the level of noise at which the network is surest."""
+    rng = np.random.default_rng(0)
+    peak = maps.max(axis=(1, 2, 3), keepdims=True)
+    means = []
+    for level in _PUT_BACK:
+        noise = peak * 10.0**level * rng.exponential(size=(_DRAWS, *maps.shape))
+        joints, sigma = zip(
+            *(said(each) for each in (maps + noise).astype(np.float32)), strict=True
+        )
+        means.append((np.mean(joints, axis=0), np.mean(sigma, axis=0)))
+    return min(means, key=lambda mean: float(mean[1].mean()))
+
+
+def _asked(
+    network: LimbNetwork, packed: Packed, turn: int
+) -> tuple[Float64[np.ndarray, "17 3"], Float64[np.ndarray, "17"]]:
+    """Mean joints around the centre, and σ, of one packed frame as it is and in a mirror.
+
+    Args:
+        network: The network.
+        packed: The frame.
+        turn: Which of the receivers, counted around and around, gives the x axis.
+
+    Returns:
+        The centre, give or take a metre, where no pair hears anything.
+    """
     pairs = np.flatnonzero(packed.there[0].numpy())
+    if not len(pairs):
+        return np.zeros((17, 3)), np.ones(17)
     receivers = packed.vectors[0, pairs, 1].numpy()
-    # One reference per receiving device.
     _, first = np.unique(np.round(receivers, 3), axis=0, return_index=True)
-    references = np.repeat(pairs[np.sort(first)], 2)
-    many = Packed(*(values.repeat_interleave(len(references), 0) for values in packed))
-    mirror = torch.arange(len(references)) % 2 == 1
+    reference = torch.tensor(pairs[np.sort(first)][turn % len(first)]).repeat(2)
+    both = Packed(*(values.repeat_interleave(2, 0) for values in packed))
+    mirror = torch.tensor([False, True])
     network.eval()
     with torch.no_grad():
-        seen = tokens(many, relative_power(many), many.there, torch.from_numpy(references), mirror)
+        seen = tokens(both, relative_power(both), both.there, reference, mirror)
         joints, log_sigma = network(seen)
         straight = mirrored_joints(joints, mirror)
         sigma = torch.where(mirror[:, None], log_sigma[:, MIRRORED], log_sigma).exp()

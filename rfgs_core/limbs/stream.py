@@ -60,7 +60,7 @@ class _Worlds(IterableDataset):
     def __init__(self, radio: Radio, seed: int, device: Device, moments: int) -> None:
         self.radio, self.seed, self.device, self.moments = radio, seed, device, moments
 
-    def __iter__(self) -> Iterator[Chunk | Batch]:
+    def __iter__(self) -> Iterator[Chunk | tuple[np.ndarray, ...]]:
         torch.set_num_threads(1)
         info = get_worker_info()
         seed = sub_seed(self.seed, 0 if info is None else info.id)
@@ -70,7 +70,9 @@ class _Worlds(IterableDataset):
                 yield next_chunk(stream, CHUNK, pairs_of(self.radio))
         for done in acted(self.radio, seed, self.moments):
             if done.moments:
-                yield batch_of(self.radio, done, pairs_of(self.radio))
+                # By value through the pipe: tensors would each be shared memory to be opened.
+                drawn = batch_of(self.radio, done, pairs_of(self.radio))
+                yield tuple(value.numpy() for value in drawn)
 
 
 def chunks(
@@ -89,14 +91,20 @@ def chunks(
         _Worlds(radio, seed, device, moments), batch_size=None, num_workers=workers,
         multiprocessing_context="spawn" if workers else None,
         prefetch_factor=8 if workers else None, worker_init_fn=_end_with_parent,
+        collate_fn=_as_it_is,
     )  # fmt: skip
     if device == "cpu":
         yield from loader
         return
     echoes = BatchedEchoes(radio, device)
     for drawn in loader:
-        batch = Batch(*(value.to(device, non_blocking=True) for value in drawn))
+        batch = Batch(*(torch.from_numpy(value).to(device) for value in drawn))
         yield heard_chunk(echoes, batch)
+
+
+def _as_it_is(drawn: Chunk | tuple[np.ndarray, ...]) -> Chunk | tuple[np.ndarray, ...]:
+    """What a worker made, which is a batch already."""
+    return drawn
 
 
 def heard_chunk(echoes: BatchedEchoes, batch: Batch) -> Chunk:

@@ -20,7 +20,7 @@ from rfgs_core.worlds.motion.curves import Z, about
 from rfgs_core.worlds.room import Room, Sight
 
 #: The centre of the maps is off the body's own by a deviation between these [m].
-_OFF_CENTRE_M = (0.01, 0.08)
+_OFF_CENTRE_M = (0.01, 0.12)
 #: Bodies that are made ready at a time, and motions until others take their place.
 _CAST, _MOTIONS_PER_CAST = 24, 120
 #: Where the sides of one room are that many clips share [m], and how many people visit it in turn.

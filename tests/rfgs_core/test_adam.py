@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import pytest
 import torch
 
 from rfgs_core.adam import Adam
@@ -14,11 +15,14 @@ Make = Callable[[dict[torch.Tensor, float]], Any]
 
 
 def descend(
-    make: Make, before_step: Callable[[Any, int], None] = lambda optimiser, step: None
+    make: Make,
+    before_step: Callable[[Any, int], None] = lambda optimiser, step: None,
+    device: str = "cpu",
 ) -> list[torch.Tensor]:
     """Where two tensors go, the second without a gradient in the second step."""
     generator = torch.Generator().manual_seed(1)
-    leaves = [torch.randn(4, 3, generator=generator).requires_grad_() for _ in range(2)]
+    first = [torch.randn(4, 3, generator=generator).to(device) for _ in range(2)]
+    leaves = [value.requires_grad_() for value in first]
     optimiser = make(dict(zip(leaves, (0.1, 0.003), strict=True)))
     for step, moving in enumerate((2, 1, 2)):
         before_step(optimiser, step)
@@ -65,3 +69,13 @@ def test_a_step_leaves_torchs_compiler_unimported(python) -> None:
         "assert leaf[0] < 1 and 'torch._dynamo' not in sys.modules",
     )
     python("-c", "; ".join(steps), must_work=True)
+
+
+@pytest.mark.gpu
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="no GPU")
+def test_a_gpu_steps_as_the_processor_does() -> None:
+    places = [
+        descend(lambda rates: Adam(rates, decay=0.02), device=device) for device in ("cpu", "cuda")
+    ]
+    for ours, theirs in zip(*places, strict=True):
+        torch.testing.assert_close(ours, theirs.cpu(), atol=1e-6, rtol=1e-5)

@@ -172,20 +172,33 @@ def smoothed(joints: Joints, time_s: Float64[np.ndarray, "frame"]) -> Joints:
     return Joints(xyz, sigma)
 
 
-def contradict(one: Joints, other: Joints) -> bool:
-    """Whether two ways cannot both be right, for how far off they say that they are."""
+def contradiction(one: Joints, other: Joints) -> Float64[np.ndarray, "frame"]:
+    """Mean square of how far two ways are apart, for how far off they say that they are."""
     apart_m = np.linalg.norm(one.xyz - other.xyz, axis=-1)
     expected_m = np.hypot(one.sigma_m, other.sigma_m)
-    return float(np.mean((apart_m / expected_m) ** 2)) > _CONTRADICTION
+    return np.mean((apart_m / expected_m) ** 2, axis=(1, 2))
 
 
 def of_walk_and_network(walk: Joints, network: Joints) -> Joints:
     """Joints told by evidence of a walk and by the network: of both, as long as they agree.
 
     Evidence finds the likeliest walk of a mean body on the floor, whoever it is; the network
-    assumes neither. Where they contradict each other, it alone counts.
+    assumes neither. Where they contradict each other in all frames together, it alone counts. If
+    they do in single ones only, the walk does there: it is one walk for all frames, while the
+    network is asked for each by itself and takes a back for a front now and then.
+
+    Args:
+        walk: Of all frames, shape (frame, body, 17, ·).
+        network: The same.
     """
-    return network if contradict(walk, network) else combined(walk, network)
+    apart = contradiction(walk, network)
+    if apart.mean() > _CONTRADICTION:
+        return network
+    both, lonely = combined(walk, network), (apart > _CONTRADICTION)[:, None, None]
+    return Joints(
+        np.where(lonely[..., None], walk.xyz, both.xyz),
+        np.where(lonely, walk.sigma_m, both.sigma_m),
+    )
 
 
 def combined(one: Joints, other: Joints) -> Joints:

@@ -31,6 +31,8 @@ SMOOTH_S, DEGREE = 0.4, 2
 _CONTRADICTION = 3.0
 #: Places around a body from which the network is asked [m].
 _SIDES_M = 0.06 * np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
+#: How often it is asked so, as long as the joints move by more than this [m].
+_ROUNDS, _SETTLED_M = 3, 0.1
 #: A filter of packets leaves holes where it heard noise, and the network has seen maps with noise:
 #: noise that is put back, below each pair's peak, log10, and how often each is drawn.
 _PUT_BACK, _DRAWS = (-2.0, -1.5, -1.0), 4
@@ -54,7 +56,8 @@ def propose(
 
     It is asked where a body is said to be, and then from four places around where it finds the
     joints, each time with the x axis towards another receiver, and with and without a mirror. What
-    comes out is the mean of these four by 1/σ². Where packets were filtered, so much noise is put
+    comes out is the mean of these four by 1/σ². Where that is elsewhere, as of somebody who lies,
+    it is asked around there, up to three times. Where packets were filtered, so much noise is put
     back that the network is surest.
 
     Args:
@@ -65,16 +68,31 @@ def propose(
     views = views_of(observations.layout, observations.links)
     found, sigma = [], []
     for place in np.asarray(axes_xy, dtype=np.float64):
-        middle = _asked_at(network, observations, views, place, 0)[0][:, :2].mean(axis=0)
-        told = [
-            _asked_at(network, observations, views, middle + side, turn)
-            for turn, side in enumerate(_SIDES_M)
-        ]
-        joints, sure = (np.array(values) for values in zip(*told, strict=True))
-        weight = sure[..., None] ** -2.0
-        found.append((weight * joints).sum(axis=0) / weight.sum(axis=0))
-        sigma.append(sure.mean(axis=0))
+        joints = _asked_at(network, observations, views, place, 0)[0]
+        for _ in range(_ROUNDS):
+            middle = joints[:, :2].mean(axis=0)
+            joints, sure = _asked_around(network, observations, views, middle)
+            if np.linalg.norm(joints[:, :2].mean(axis=0) - middle) < _SETTLED_M:
+                break
+        found.append(joints)
+        sigma.append(sure)
     return Joints(np.array(found).reshape(-1, 17, 3), np.array(sigma).reshape(-1, 17))
+
+
+def _asked_around(
+    network: LimbNetwork,
+    observations: Observations,
+    views: list[View],
+    middle_xy: Float64[np.ndarray, "2"],
+) -> tuple[Float64[np.ndarray, "17 3"], Float64[np.ndarray, "17"]]:
+    """Mean joints in the world by 1/σ², and mean σ, from four places around a middle."""
+    told = [
+        _asked_at(network, observations, views, middle_xy + side, turn)
+        for turn, side in enumerate(_SIDES_M)
+    ]
+    joints, sigma = (np.array(values) for values in zip(*told, strict=True))
+    weight = sigma[..., None] ** -2.0
+    return (weight * joints).sum(axis=0) / weight.sum(axis=0), sigma.mean(axis=0)
 
 
 def _asked_at(

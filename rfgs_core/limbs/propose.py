@@ -25,10 +25,12 @@ from rfgs_core.measure.observations import Observations
 
 #: Frames this far apart smooth each other [s], and the degree of the curve through them.
 SMOOTH_S, DEGREE = 0.4, 2
-#: Two ways contradict each other if the mean square of how far they are apart, in units of what
-#: both are expected to be off, is more than this: 0.6 to 1.9 where a walk is right, and 4 to 11
-#: where none is or the person is a child (random worlds and recorded motions).
+#: Two ways contradict each other in a frame if the mean square of how far they are apart, in units
+#: of what both are expected to be off, is more than this: on average it is 0.4 to 1.9 where a walk
+#: is right, 4 to 11 where none is or the person is a child (random worlds and recorded motions).
 _CONTRADICTION = 3.0
+#: Who walks is not contradicted in more than this share of the frames.
+_TURNED_AROUND = 0.25
 #: Places around a body from which the network is asked [m].
 _SIDES_M = 0.06 * np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
 #: How often it is asked so, as long as the joints move by more than this [m].
@@ -201,18 +203,18 @@ def of_walk_and_network(walk: Joints, network: Joints) -> Joints:
     """Joints told by evidence of a walk and by the network: of both, as long as they agree.
 
     Evidence finds the likeliest walk of a mean body on the floor, whoever it is; the network
-    assumes neither. Where they contradict each other in all frames together, it alone counts. If
-    they do in single ones only, the walk does there: it is one walk for all frames, while the
-    network is asked for each by itself and takes a back for a front now and then.
+    assumes neither. Where they contradict each other in more than a quarter of the frames, it alone
+    counts. If they do in single ones only, the walk does there: it is one walk for all frames,
+    while the network is asked for each by itself and takes a back for a front now and then.
 
     Args:
         walk: Of all frames, shape (frame, body, 17, ·).
         network: The same.
     """
-    apart = contradiction(walk, network)
-    if apart.mean() > _CONTRADICTION:
+    contradicted = contradiction(walk, network) > _CONTRADICTION
+    if contradicted.mean() > _TURNED_AROUND:
         return network
-    both, lonely = combined(walk, network), (apart > _CONTRADICTION)[:, None, None]
+    both, lonely = combined(walk, network), contradicted[:, None, None]
     return Joints(
         np.where(lonely[..., None], walk.xyz, both.xyz),
         np.where(lonely, walk.sigma_m, both.sigma_m),

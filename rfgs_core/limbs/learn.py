@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import torch
 
@@ -140,7 +140,9 @@ def _record(network: LimbNetwork, chunk: Chunk, generator: torch.Generator) -> N
     Products of matrices are in TF32 from here on.
     """
     torch.set_float32_matmul_precision("high")
-    torch.cuda.make_graphed_callables(network.train(), (disturbed(chunk.packed, generator)[0],))
+    # Declared for tensors, made for trees of them.
+    like: Any = disturbed(chunk.packed, generator)[0]
+    torch.cuda.make_graphed_callables(network.train(), (like,))
 
 
 def _judged(radio: Radio, config: LearnConfig) -> Chunk:

@@ -13,7 +13,8 @@ import pytest
 from rfgs_core.articulated import Body, Pose, people
 from rfgs_core.limbs.evidence.library import Stride, about_z, strides
 from rfgs_core.measure.observations import Observations
-from rfgs_core.radio import layout
+from rfgs_core.radio import Radio, layout
+from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.placement import place_devices
 from rfgs_core.radio.presets import preset
 from rfgs_core.simulate.surface.facets import facet_sum
@@ -24,17 +25,14 @@ WAVELENGTH_M = 0.05
 
 
 @cache
-def _walker() -> tuple[Figure, Stride]:
+def _walker(wavelength_m: float = WAVELENGTH_M) -> tuple[Figure, Stride]:
     """Another body in clothes than the one that explains it, its facets, and its stride."""
     body = people().random(np.random.default_rng(11))
-    return Figure.of(body, WAVELENGTH_M), strides(body, 0.9, 1, seed=4)[0]
+    return Figure.of(body, wavelength_m), strides(body, 0.9, 1, seed=4)[0]
 
 
-def _heard(pose: Pose) -> Observations:
-    """What a Wi-Fi radio hears of the walker's direct echoes in a pose."""
-    figure = _walker()[0]
-    radio = preset("wifi")
-    radio = replace(radio, rx_rows=2, rx_cols=3)
+def _heard(pose: Pose, radio: Radio, figure: Figure) -> Observations:
+    """What a radio hears of the walker's direct echoes in a pose."""
     placed = layout(radio, place_devices(radio, BOUNDS_M))
     posed = figure.posed(pose)
     csi = np.zeros((len(placed.tx_xyz), len(placed.rx_xyz), radio.num_subcarriers), complex)
@@ -78,9 +76,21 @@ def walker_joints() -> Callable[[Pose], np.ndarray]:
 
 @pytest.fixture(scope="session")
 def heard() -> Callable[[Pose, float, np.ndarray], Observations]:
-    """What is heard of the walker in a pose that is turned [rad] and moved to a place [m]."""
+    """What Wi-Fi hears of the walker in a pose that is turned [rad] and moved to a place [m]."""
+    radio = replace(preset("wifi"), rx_rows=2, rx_cols=3)
 
     def hear(pose: Pose, heading: float, place: np.ndarray) -> Observations:
-        return _heard(pose.turned(about_z(heading)).moved(place))
+        return _heard(pose.turned(about_z(heading)).moved(place), radio, _walker()[0])
 
     return hear
+
+
+@pytest.fixture(scope="session")
+def heard_by_radars() -> tuple[Observations, np.ndarray]:
+    """What mmWave radars hear of the walker at some moment of a step, and where joints are [m]."""
+    # So few subcarriers tell delays apart up to 20 ns, more than the room is long.
+    radio = replace(preset("mmwave"), num_subcarriers=80)
+    # Facets of two wavelengths are fine enough for powers of beams.
+    figure, stride = _walker(2.0 * SPEED_OF_LIGHT / radio.centre_hz)
+    pose = stride.poses[3].turned(about_z(0.7)).moved(np.array([0.4, -0.3, 0.0]))
+    return _heard(pose, radio, figure), figure.body.joints17(pose)

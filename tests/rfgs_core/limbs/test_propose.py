@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the network that comes along says of somebody whom radars hear, from where it is asked."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rfgs_core.limbs.propose import Joints, propose
+from rfgs_core.limbs.weights import own_network
+from rfgs_core.measure.observations import Observations
+
+
+def said(observations: Observations, place_xy: np.ndarray) -> Joints:
+    trained = own_network(observations.freq_hz)
+    assert trained is not None
+    return propose(trained.network, observations, place_xy[None])
+
+
+@pytest.mark.parametrize("off_m", [0.0, 0.25, 0.4])
+def test_joints_are_found_from_places_beside_the_body(
+    heard_by_radars: tuple[Observations, np.ndarray], off_m: float
+) -> None:
+    """A body that it has not seen, whose echoes are summed facet by facet."""
+    observations, joints = heard_by_radars
+    found = said(observations, joints[:, :2].mean(axis=0) + off_m * np.array([0.6, -0.8]))
+    error_m = np.linalg.norm(found.xyz[0] - joints, axis=1)
+    assert error_m.mean() < 0.08
+    assert 0.3 < error_m.mean() / found.sigma_m.mean() < 1.5
+
+
+def test_where_nothing_is_heard_joints_are_anywhere_within_a_metre(
+    heard_by_radars: tuple[Observations, np.ndarray],
+) -> None:
+    observations, _ = heard_by_radars
+    silent = replace(observations, delta=np.zeros_like(observations.delta))
+    found = said(silent, np.array([0.5, 0.2]))
+    np.testing.assert_allclose(found.xyz[0], np.broadcast_to([0.5, 0.2, 0.95], (17, 3)), atol=0.1)
+    assert (found.sigma_m == 1.0).all()

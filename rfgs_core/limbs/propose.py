@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -36,8 +37,9 @@ _SIDES_M = 0.06 * np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
 #: How often it is asked so, as long as the joints move by more than this [m].
 _ROUNDS, _SETTLED_M = 3, 0.1
 #: A filter of packets leaves holes where it heard noise, and the network has seen maps with noise:
-#: noise that is put back, below each pair's peak, log10, and how often each is drawn.
-_PUT_BACK, _DRAWS = (-2.0, -1.5, -1.0), 4
+#: noise that is put back, below each pair's peak, log10, how often each is drawn, and how sure the
+#: network must be without any to be asked no more [m].
+_PUT_BACK, _DRAWS, _SURE_M = (-2.0, -1.5, -1.0), 4, 0.1
 #: No joint is surer than this where joints are smoothed [m].
 _SUREST_M = 0.01
 
@@ -59,8 +61,8 @@ def propose(
     It is asked where a body is said to be, and then from four places around where it finds the
     joints, each time with the x axis towards another receiver, and with and without a mirror. What
     comes out is the mean of these four by 1/σ². Where that is elsewhere, as of somebody who lies,
-    it is asked around there, up to three times. Where packets were filtered, so much noise is put
-    back that the network is surest.
+    it is asked around there, up to three times. Where packets were filtered and it is unsure, so
+    much noise is put back that it is surest.
 
     Args:
         network: The network of this kind of radio.
@@ -79,6 +81,25 @@ def propose(
         found.append(joints)
         sigma.append(sure)
     return Joints(np.array(found).reshape(-1, 17, 3), np.array(sigma).reshape(-1, 17))
+
+
+def glimpse(
+    network: LimbNetwork,
+    observations: Observations,
+    axes_xy: Float[np.ndarray, "body 2"],
+) -> Joints:
+    """What the network makes of one of many windows that are averaged: it is asked but once.
+
+    Args:
+        network: The network of this kind of radio.
+        observations: The window.
+        axes_xy: Where bodies are [m].
+    """
+    views = views_of(observations.layout, observations.links)
+    one = replace(observations, packets=None)
+    said = [_asked_at(network, one, views, place, 0) for place in np.asarray(axes_xy, np.float64)]
+    xyz, sigma = zip(*said, strict=True) if said else ((), ())
+    return Joints(np.array(xyz).reshape(-1, 17, 3), np.array(sigma).reshape(-1, 17))
 
 
 def _asked_around(
@@ -124,10 +145,12 @@ def with_noise(
     said: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
     maps: Float[np.ndarray, "pair elevation azimuth range"],
 ) -> tuple[Float64[np.ndarray, "17 3"], Float64[np.ndarray, "17"]]:
-    """Mean joints and σ at the level of noise at which the network is surest."""
+    """Mean joints and σ at the level of noise, or none, at which the network is surest."""
+    means = [said(maps)]
+    if means[0][1].mean() < _SURE_M:
+        return means[0]
     rng = np.random.default_rng(0)
     peak = maps.max(axis=(1, 2, 3), keepdims=True)
-    means = []
     for level in _PUT_BACK:
         noise = peak * 10.0**level * rng.exponential(size=(_DRAWS, *maps.shape))
         joints, sigma = zip(

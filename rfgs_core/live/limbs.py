@@ -12,7 +12,7 @@ import numpy as np
 from rfgs_core.articulated import Pose, fit_pose, people
 from rfgs_core.bodies.tracks import Tracks
 from rfgs_core.limbs.network import LimbNetwork
-from rfgs_core.limbs.propose import propose
+from rfgs_core.limbs.propose import glimpse
 from rfgs_core.limbs.skins import OnSkin, PosedPeople, pulls
 from rfgs_core.measure.observations import Observations
 
@@ -49,7 +49,7 @@ class LiveLimbs:
             observations: The window.
             tracks: Where the bodies are in it.
         """
-        said = propose(self._network, observations, tracks.axes_xy)
+        said = glimpse(self._network, observations, tracks.axes_xy)
         ground = np.zeros((len(tracks.axes_xy), 1, 3))
         ground[:, 0, :2] = tracks.axes_xy
         around = said.xyz - ground

@@ -70,10 +70,24 @@ def test_as_much_noise_is_put_back_as_makes_the_network_surest() -> None:
     maps[0, 3, 2, 1] = 1.0
 
     def said(noisy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        level = np.log10(noisy.mean() - 1.0 / maps.size)
+        level = np.log10(max(noisy.mean() - 1.0 / maps.size, 1e-6))
         return np.full((17, 3), level), np.full(17, 0.05 + abs(level + 1.5))
 
     joints, sigma = with_noise(said, maps)
     assert joints.mean() == pytest.approx(-1.5, abs=0.1)
     assert sigma.shape == (17,)
     assert sigma.mean() < 0.15
+
+
+@pytest.mark.parametrize("sigma_m, asked", [(0.09, 1), (0.11, 13)])
+def test_a_network_that_is_sure_is_asked_without_noise(sigma_m: float, asked: int) -> None:
+    maps = np.ones((1, 7, 5, 4), dtype=np.float32)
+    heard = []
+
+    def said(noisy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        heard.append(noisy)
+        return np.zeros((17, 3)), np.full(17, sigma_m)
+
+    with_noise(said, maps)
+    assert len(heard) == asked
+    np.testing.assert_array_equal(heard[0], maps)

@@ -114,8 +114,15 @@ def _asked_around(
         for turn, side in enumerate(_SIDES_M)
     ]
     joints, sigma = (np.array(values) for values in zip(*told, strict=True))
-    weight = sigma[..., None] ** -2.0
-    return (weight * joints).sum(axis=0) / weight.sum(axis=0), sigma.mean(axis=0)
+    return _weighed(joints, sigma), sigma.mean(axis=0)
+
+
+def _weighed(
+    xyz: Float64[np.ndarray, "way *more 3"], sigma_m: Float64[np.ndarray, "way *more"]
+) -> Float64[np.ndarray, "*more 3"]:
+    """Mean over ways of which each weighs 1/σ²."""
+    weight = sigma_m**-2.0
+    return np.einsum("w...,w...x->...x", weight / weight.sum(axis=0), xyz)
 
 
 def _asked_at(
@@ -249,6 +256,5 @@ def combined(one: Joints, other: Joints) -> Joints:
 
     Each way weighs 1/σ², as the product of two Gaussian densities does.
     """
-    weights = [joints.sigma_m**-2.0 for joints in (one, other)]
-    share = (weights[0] / (weights[0] + weights[1]))[..., None]
-    return Joints(share * one.xyz + (1.0 - share) * other.xyz, sum(weights) ** -0.5)
+    xyz, sigma_m = np.stack([one.xyz, other.xyz]), np.stack([one.sigma_m, other.sigma_m])
+    return Joints(_weighed(xyz, sigma_m), (sigma_m**-2.0).sum(axis=0) ** -0.5)

@@ -17,6 +17,7 @@ import rfgs_core
 
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text("utf-8")
+RESULTS = sorted((ROOT / "docs" / "results").glob("*.md"))
 
 
 def build(folder: Path, site: Path) -> subprocess.CompletedProcess[str]:
@@ -65,14 +66,33 @@ def test_a_broken_link_ends_the_build(tmp_path: Path, link: str) -> None:
 
 def test_every_page_is_in_the_menu() -> None:
     settings = yaml.safe_load((ROOT / "mkdocs.yml").read_text("utf-8"))
-    menu = set(re.findall(r"[\w]+\.(?:md|ipynb)", str(settings["nav"])))
-    assert menu == {
-        file.name for file in (ROOT / "docs").iterdir() if file.suffix in (".md", ".ipynb")
-    }
+    menu = set(re.findall(r"[\w/]+\.(?:md|ipynb)", str(settings["nav"])))
+    docs = ROOT / "docs"
+    pages = [file for file in docs.rglob("*") if file.suffix in (".md", ".ipynb")]
+    assert menu == {file.relative_to(docs).as_posix() for file in pages}
+
+
+def test_results_are_short_and_their_summary_leads_to_every_page() -> None:
+    summary = (ROOT / "docs" / "results.md").read_text("utf-8")
+    assert len(summary.splitlines()) <= 120
+    assert RESULTS
+    for page in RESULTS:
+        assert f"(results/{page.name}" in summary, page.name
+        text = page.read_text("utf-8")
+        assert len(text.splitlines()) <= 250, page.name
+        prose = [x for x in text.splitlines() if not x.startswith(("|", "    ", "!["))]
+        assert max(map(len, prose)) <= 120, page.name
 
 
 @pytest.mark.parametrize(
-    "page", ["README.md", "DEVELOPMENT.md", "docs/method.md", "docs/results.md"]
+    "page",
+    [
+        "README.md",
+        "DEVELOPMENT.md",
+        "docs/method.md",
+        "docs/results.md",
+        *(f"docs/results/{page.name}" for page in RESULTS),
+    ],
 )
 def test_links_lead_somewhere(page: str) -> None:
     file = ROOT / page
@@ -99,7 +119,7 @@ def test_measurements_stay_out_of_the_method() -> None:
 
 
 def test_words_are_those_of_the_field() -> None:
-    pages = [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]
+    pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
     for page in pages:
         text = page.read_text("utf-8")
         assert not re.findall(r"\b[Tt]ones?\b|told apart|own links|\brivals?\b", text), page

@@ -251,6 +251,8 @@ def _growths(growths: Sequence[Growth]) -> str:
             f"{each.sizes[0]:,} to {each.sizes[-1]:,}",
             f"{each.seconds[0]:.3g} s to {each.seconds[-1]:.3g} s",
             f"{each.exponent:.2f}",
+            f"{each.law[0]:.3g} s",
+            f"{each.law[1]:.2f}",
         )
         for each in growths
     ]
@@ -258,9 +260,10 @@ def _growths(growths: Sequence[Growth]) -> str:
     said = (
         f"More than linear: {', '.join(steep)}."
         if steep
-        else "Nothing grows more than linearly; below 1, part of the work does not grow."
+        else "Nothing grows more than linearly. Below 1, part of the work does not grow: time is "
+        "that part\nand a power of what grows."
     )
-    heads = ("what grows", "sizes", "CPU time", "exponent")
+    heads = ("what grows", "sizes", "CPU time", "exponent", "does not grow", "exponent of the rest")
     return f"## How cost grows\n\n{_table(heads, rows)}\n{said}\n"
 
 

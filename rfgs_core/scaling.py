@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """How cost grows with size: CPU time over two decades, and the exponent of its power law.
 
-An exponent of 1 is linear; below it, part of the work does not depend on what grows.
+An exponent of 1 is linear; below it, part of the work does not depend on what grows. That part,
+and how the rest grows, are fitted too.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from scipy.optimize import nnls
 
 from rfgs_core.articulated import people
 from rfgs_core.bench import PropagationBench, cloud_and_links, hardware, with_gradients
@@ -33,6 +35,8 @@ ARRAYS = ((1, 1), (1, 3), (3, 3), (4, 8), (10, 10))
 SUBCARRIERS = (16, 50, 160, 500, 1600)
 GAUSSIANS = (1000, 3200, 10_000, 32_000, 100_000)
 LINKS = (4, 13, 40, 130, 400)
+#: Exponents that are tried of what grows.
+_EXPONENTS = np.arange(30, 251) / 100
 #: Runs of each size; the quickest counts.
 _RUNS = 3
 #: The room [m], and where somebody stands in it.
@@ -55,6 +59,22 @@ class Growth:
     def exponent(self) -> float:
         """Slope of the logarithm of time over that of size, by least squares."""
         return float(np.polyfit(np.log(self.sizes), np.log(self.seconds), 1)[0])
+
+    @property
+    def law(self) -> tuple[float, float]:
+        """CPU time that does not grow [s], and the exponent of the rest, 0 where nothing grows.
+
+        Time is fixed + c · size^exponent, no part below 0, by least squares of relative errors.
+        """
+        sizes, seconds = np.array(self.sizes, dtype=np.float64), np.array(self.seconds)
+
+        def fit(exponent: float) -> tuple[float, float, np.ndarray]:
+            terms = np.stack([np.ones(len(sizes)), (sizes / sizes[-1]) ** exponent], axis=1)
+            parts, off = nnls(terms / seconds[:, None], np.ones(len(sizes)))
+            return float(off), exponent, parts
+
+        _, exponent, (fixed_s, grows) = min(map(fit, _EXPONENTS), key=lambda tried: tried[0])
+        return float(fixed_s), float(exponent) if grows > 0.0 else 0.0
 
 
 def growths(on_size: Callable[[str], None] = lambda words: None) -> tuple[Growth, ...]:
@@ -81,7 +101,10 @@ def bench_scaling(on_size: Callable[[str], None] = lambda words: None) -> dict[s
     """
     flat: dict[str, float | str] = {}
     for growth in growths(on_size):
+        fixed_s, rest = growth.law
         flat[f"{growth.name}: exponent"] = growth.exponent
+        flat[f"{growth.name}: fixed [s]"] = fixed_s
+        flat[f"{growth.name}: exponent of the rest"] = rest
         flat |= {
             f"{growth.name}: {size} [s]": seconds
             for size, seconds in zip(growth.sizes, growth.seconds, strict=True)

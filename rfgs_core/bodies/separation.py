@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from jaxtyping import Complex64, Float64
+from jaxtyping import Complex64, Float64, Int64
 
 from rfgs_core.bodies.body_prior import Bodies, nearest_axis, outward_normals
 from rfgs_core.bodies.localise import NEAR_M, SEPARATION_M, PairMaps, locate_bodies, pair_maps
@@ -26,8 +26,9 @@ from rfgs_core.settings import TrainConfig
 
 #: Gaussians that stand for each body.
 GAUSSIANS_PER_BODY = 1500
-#: Conjugate-gradient steps of the fit of all echoes.
-SOLVER_STEPS = 6
+#: Conjugate-gradient steps of the fit of all echoes: of bodies that stand, and of posed ones, whose
+#: skins are near enough to the true ones for it to be worth while.
+SOLVER_STEPS, POSED_STEPS = 6, 40
 #: Times that every body is sought anew.
 ROUNDS = 2
 
@@ -89,6 +90,27 @@ def each_alone(
     return [_without(observations, part) for part in others]
 
 
+def each_alone_posed(
+    observations: Observations,
+    points: Float64[np.ndarray, "M 3"],
+    normals: Float64[np.ndarray, "M 3"],
+    body: Int64[np.ndarray, "M"],
+    config: TrainConfig,
+) -> list[Observations]:
+    """The frame once for each body, without the echoes of all others, whose poses are known.
+
+    Args:
+        observations: The frame.
+        points: Places on the skins [m].
+        normals: Where these face.
+        body: Whose skin each is on, counted from 0.
+        config: How reflectivities are fitted.
+    """
+    echoes = _echoes_of(observations, points, normals, body, config, POSED_STEPS)
+    others = echoes.sum(axis=0) - echoes
+    return [_without(observations, part) for part in others]
+
+
 def residual_of_bodies(
     observations: Observations,
     maps: PairMaps,
@@ -141,17 +163,30 @@ def _echoes(
     rng = np.random.default_rng(sub_seed(seed, "apart"))
     density = StartDensity.of(maps, bodies, observations.bounds_m)
     points = density.draw(GAUSSIANS_PER_BODY * len(bodies), rng)
-    gaussians = gaussians_at(points, outward_normals(points, bodies))
+    body = nearest_axis(points, bodies.axes_xy)
+    normals = outward_normals(points, bodies)
+    return _echoes_of(observations, points, normals, body, config, SOLVER_STEPS)
+
+
+def _echoes_of(
+    observations: Observations,
+    points: Float64[np.ndarray, "M 3"],
+    normals: Float64[np.ndarray, "M 3"],
+    body: Int64[np.ndarray, "M"],
+    config: TrainConfig,
+    steps: int,
+) -> Complex64[np.ndarray, "body tx rx subcarrier"]:
+    """The same by Gaussians at given places, facing given ways, each of one body."""
+    gaussians = gaussians_at(points, normals)
     power = fit_power(observations, gaussians)
     head = new_head(observations, config, power)
     channel = Channel.of(observations, observations.links, observations.subcarriers)
     target = comparison_of(observations).measured()
     noise = noise_per_link(observations, target, config.unexplained)
-    gamma = posterior_mean(channel, head, gaussians, target, noise, power, SOLVER_STEPS)
-    body = nearest_axis(points, bodies.axes_xy)
+    gamma = posterior_mean(channel, head, gaussians, target, noise, power, steps)
     echoes = []
     with torch.no_grad():
-        for index in range(len(bodies)):
+        for index in range(int(body.max()) + 1):
             own = torch.from_numpy(body == index)
             part = channel.scattered(head, gaussians.select(own), gamma[own])
             echoes.append(observations.with_entries(part.numpy()).delta)

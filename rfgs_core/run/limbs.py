@@ -1,43 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-"""People of a run with their limbs: followed through all frames, posed, and kept in a file."""
+"""People of a run with their limbs, as they are kept in its folder."""
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float64
 
 from rfgs_core.arrays import load_arrays, save_arrays
 from rfgs_core.articulated import BONES
-from rfgs_core.bodies.localise import pair_maps
-from rfgs_core.bodies.separation import each_alone
 from rfgs_core.bodies.tracks import Tracks
 from rfgs_core.errors import RfgsFormatError
-from rfgs_core.fit.frame import OnSkins, followed
-from rfgs_core.limbs.evidence.tell import long_enough, looks, stands, tell
-from rfgs_core.limbs.postures.tell import can_tell
-from rfgs_core.limbs.postures.tell import looks as posture_looks
-from rfgs_core.limbs.postures.tell import tell as tell_posture
-from rfgs_core.limbs.propose import SMOOTH_S, Joints, of_walk_and_network, propose, smoothed
+from rfgs_core.fit.frame import OnSkins
+from rfgs_core.limbs.propose import Joints
 from rfgs_core.limbs.skins import PosedPeople
-from rfgs_core.limbs.weights import Trained, own_network
-from rfgs_core.measure.observations import Observations
-from rfgs_core.run.folder import LIMBS_FILE, Run
-from rfgs_core.run.people import known_people
-from rfgs_core.seeds import sub_seed
+from rfgs_core.run.folder import LIMBS_FILE
 from rfgs_core.settings import TrainConfig
 
-_LOG = logging.getLogger(__name__)
-#: Limbs that are expected to be further off on average than this are left alone: joints of a
-#: standing body at the right place are 0.11 m off those of one who walks. But not those that are
-#: so many times further from a standing body than they are expected to be off: it is further off.
-_UNSURE_M, _FAR = 0.15, 1.2
-_REMEDY = "delete it and run the same `rfgs train` again"
+REMEDY = "delete it and run the same `rfgs train` again"
 _SHAPES = {
     "frames": ("frame",),
     "axes_xy": ("frame", "body", 2),
@@ -86,205 +68,8 @@ class Limbs:
         return {"bone": drawn.bone, "sigma_m": sigma_m.astype(np.float32)}
 
 
-def limbs_wanted(run: Run, config: TrainConfig) -> bool:
-    """Whether limbs are asked for and the radio's report may tell them."""
-    if config.limbs == "off" or config.observe != "complex" or config.recipe == "paper":
-        return False
-    if config.density not in (None, "none") or config.calibrate != "none":
-        return False
-    return not run.sequence.radio_spec(run.config.radio).antennas_move
-
-
-def limbs_network(run: Run) -> Trained | None:
-    """The network for a run's radio; None where there is none, and evidence alone may tell."""
-    coordinates = run.sequence.coordinates(run.config.radio)
-    return own_network(np.asarray(coordinates["freq_hz"].values, dtype=np.float64))
-
-
-def find_limbs(
-    run: Run,
-    config: TrainConfig,
-    trained: Trained | None,
-    on_frame: Callable[[], Any] = lambda: None,
-    seeking: Callable[[int], Callable[[], Any]] = lambda _: lambda: None,
-) -> Limbs | None:
-    """Follows people through a run's frames and poses them; what is kept is read.
-
-    Evidence tells those of people who walk, or else whatever they do; the network tells those of
-    everybody: both together count where both tell. Where neither does for some, these stand.
-    Frames of the sequence beside those of the run, near enough to smooth them, are read as well.
-
-    Args:
-        run: The run.
-        config: Its settings.
-        trained: The network for its radio; None where there is none.
-        on_frame: Called as frames are read and looked at; see `looks_at`.
-        seeking: Told how many looks it takes to seek other postures than walks, if it is done;
-            what it gives is called at each.
-
-    Returns:
-        None where nothing can be told, or nothing that would be of use.
-    """
-    kept = read_limbs(run.path)
-    if kept is not None:
-        if not set(run.frames) <= set(kept.frames):
-            raise RfgsFormatError(
-                f"{run.path / LIMBS_FILE}: frames of the run are missing; {_REMEDY}"
-            )
-        return kept
-    frames = frames_read(run)
-    tracks: list[Tracks] = []
-    seen: list[Observations] = []
-    seeds = [
-        sub_seed(config.seed, run.config.sequence, run.config.radio, frame, "fit")
-        for frame in frames
-    ]
-    for frame, seed in zip(frames, seeds, strict=True):
-        seen.append(run.observations(frame))
-        tracks.append(followed(tracks[-1] if tracks else None, seen[-1], config, seed))
-        on_frame()
-    # A vehicle is a body too, and does not walk.
-    walks = evidence_tells(run, frames) and len(tracks[0].axes_xy) == known_people(run)
-    alone = [
-        _alone(observations, track.axes_xy, config, seed)
-        for observations, track, seed in zip(seen, tracks, seeds, strict=True)
-    ]
-    told: list[Joints | None] = [None] * len(alone[0])
-    if walks:
-        told = _by_evidence(alone, tracks, config.seed, on_frame)
-        told = _by_postures(told, alone, tracks, config.seed, seeking)
-    if trained is not None:
-        said = _by_network(trained, alone, tracks)
-        told = [
-            other if one is None else of_walk_and_network(one, other)
-            for one, other in zip(told, said, strict=True)
-        ]
-    if not any(told):
-        return None
-    joints = _together(told, alone, tracks)
-    own = [frames.index(frame) for frame in run.frames]
-    joints = Joints(joints.xyz[own], joints.sigma_m[own])
-    if not _of_use(joints, [alone[k] for k in own], [tracks[k] for k in own]):
-        _LOG.warning(
-            "limbs are expected to be %.2f m off, more than %.2f m: bodies stay without",
-            joints.sigma_m.mean(),
-            _UNSURE_M,
-        )
-        return None
-    limbs = Limbs(list(run.frames), [tracks[k] for k in own], joints, PosedPeople.through(joints))
-    _store(run.path, limbs)
-    return limbs
-
-
-def evidence_tells(run: Run, frames: list[int]) -> bool:
-    """Whether frames are those of people and show enough of a walk."""
-    sequence = run.sequence
-    time_s = np.array([sequence.time_s(frame) for frame in frames])
-    return known_people(run) > 0 and long_enough(time_s)
-
-
-def looks_at(run: Run) -> int:
-    """How often `find_limbs` calls `on_frame`, if somebody walks wherever evidence may tell."""
-    frames = frames_read(run)
-    people = known_people(run) if evidence_tells(run, frames) else 0
-    return len(frames) + people * looks(len(frames))
-
-
-def _alone(
-    observations: Observations,
-    axes_xy: Float64[np.ndarray, "body 2"],
-    config: TrainConfig,
-    seed: int,
-) -> list[Observations]:
-    """A frame once for each body, without the echoes of the others."""
-    if len(axes_xy) == 1:
-        return [observations]
-    return each_alone(observations, pair_maps(observations), axes_xy, config, seed)
-
-
-def _by_evidence(
-    alone: list[list[Observations]], tracks: list[Tracks], seed: int, on_frame: Callable[[], Any]
-) -> list[Joints | None]:
-    """Joints of each person in all frames; None of somebody of whom evidence tells nothing."""
-    axes_xy = np.array([track.axes_xy for track in tracks])
-    found = []
-    for body in range(axes_xy.shape[1]):
-        told = tell([frame[body] for frame in alone], axes_xy[:, body], seed, on_frame)
-        found.append(None if told is None else told.joints)
-    return found
-
-
-def _by_postures(
-    told: list[Joints | None],
-    alone: list[list[Observations]],
-    tracks: list[Tracks],
-    seed: int,
-    seeking: Callable[[int], Callable[[], Any]],
-) -> list[Joints | None]:
-    """Joints in all frames, as `told` where a walk is; None of whom nothing is.
-
-    Of several people nobody is posed this way: what is left of the others' echoes poses them
-    worse than the prior has them (`two_crossing`).
-    """
-    if len(told) > 1 or told[0] is not None or not can_tell(alone[0][0]):
-        return told
-    on_frame = seeking(posture_looks(len(alone)))
-    axes_xy = np.array([track.axes_xy[0] for track in tracks])
-    one = tell_posture([frame[0] for frame in alone], axes_xy, seed, on_frame)
-    return [None if one is None else one.joints]
-
-
-def _by_network(
-    trained: Trained, alone: list[list[Observations]], tracks: list[Tracks]
-) -> list[Joints]:
-    """Joints of each person in all frames, on curves through them."""
-    time_s = np.array([track.time_s for track in tracks])
-    found = []
-    for body in range(len(alone[0])):
-        said = [
-            propose(trained.network, frame[body], track.axes_xy[[body]])
-            for frame, track in zip(alone, tracks, strict=True)
-        ]
-        joints = Joints(*(np.array(values) for values in zip(*said, strict=True)))
-        found.append(smoothed(joints, time_s))
-    return found
-
-
-def _together(
-    told: list[Joints | None], alone: list[list[Observations]], tracks: list[Tracks]
-) -> Joints:
-    """Everybody's joints, standing where nothing is known of somebody."""
-    whole = []
-    for body, joints in enumerate(told):
-        axes_xy = np.array([track.axes_xy[body] for track in tracks])
-        whole.append(joints or stands([frame[body] for frame in alone], axes_xy))
-    return Joints(*(np.concatenate(values, axis=1) for values in zip(*whole, strict=True)))
-
-
-def _of_use(joints: Joints, alone: list[list[Observations]], tracks: list[Tracks]) -> bool:
-    """Whether joints say more than that somebody stands, or lies as was found."""
-    expected_m = float(joints.sigma_m.mean())
-    if expected_m <= _UNSURE_M:
-        return True
-    if any(track.bodies.lies.any() for track in tracks):
-        return False
-    standing = _together([None] * joints.xyz.shape[1], alone, tracks)
-    apart_m = np.linalg.norm(joints.xyz - standing.xyz, axis=-1).mean()
-    return float(apart_m) > _FAR * expected_m
-
-
-def frames_read(run: Run) -> list[int]:
-    """Frames of the run, and those of its sequence that smooth them."""
-    sequence = run.sequence
-    own = np.array([sequence.time_s(frame) for frame in run.frames])
-    return [
-        frame
-        for frame in sequence.frames
-        if np.abs(own - sequence.time_s(frame)).min() <= SMOOTH_S + 1e-6
-    ]
-
-
-def _store(run: Path, limbs: Limbs) -> None:
+def store_limbs(run: Path, limbs: Limbs) -> None:
+    """Writes them into a run's folder."""
     save_arrays(
         run / LIMBS_FILE,
         {
@@ -310,11 +95,11 @@ def read_limbs(run: Path) -> Limbs | None:
     path = run / LIMBS_FILE
     if not path.exists():
         return None
-    stored = load_arrays(path, _REMEDY, _SHAPES, ("velocity_xy",), types=_TYPES)
+    stored = load_arrays(path, REMEDY, _SHAPES, ("velocity_xy",), types=_TYPES)
     frames = [int(frame) for frame in stored["frames"]]
     if not frames or sorted(set(frames)) != frames or not (stored["sigma_m"] > 0.0).all():
         raise RfgsFormatError(
-            f"{path}: expected ascending frames and deviations above zero; {_REMEDY}"
+            f"{path}: expected ascending frames and deviations above zero; {REMEDY}"
         )
     standing: Float64[np.ndarray, "body"] = np.full(stored["axes_xy"].shape[1], np.nan)
     tracks = [

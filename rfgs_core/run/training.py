@@ -49,13 +49,7 @@ from rfgs_core.run.encoders import (
     run_encoder,
 )
 from rfgs_core.run.excess import ExcessPath
-from rfgs_core.run.folder import (
-    BACKGROUND_FILE,
-    Run,
-    open_run,
-)
-from rfgs_core.run.limbs import (
-    Limbs,
+from rfgs_core.run.find_limbs import (
     evidence_tells,
     find_limbs,
     frames_read,
@@ -63,6 +57,12 @@ from rfgs_core.run.limbs import (
     limbs_wanted,
     looks_at,
 )
+from rfgs_core.run.folder import (
+    BACKGROUND_FILE,
+    Run,
+    open_run,
+)
+from rfgs_core.run.limbs import Limbs
 from rfgs_core.run.log import Scalars, TrainingLog
 from rfgs_core.run.people import People, need_no_people
 from rfgs_core.run.static import (
@@ -178,7 +178,7 @@ def _fit_frames(run: Run, config: TrainConfig, log: bool) -> float:
     trained = limbs_network(run) if limbs_wanted(run, config) else None
     # What is told of limbs is not kept where it is of no use, and a finished run needs none of it.
     left = [frame for frame in run.frames if not checkpoint_path(run.path, frame).exists()]
-    looks = looks_at(run) if left and (trained or _evidence(run, config)) else 0
+    looks = looks_at(run, trained) if left and (trained or _evidence(run, config)) else 0
     can = resolving(run.sequence, run.config.radio, config.num_gaussians, config.observe)
     sys.stderr.write("".join(f"{line}\n" for line in [*can.lines(), price_line(run, looks)]))
     limbs = _limbs(run, config, trained, looks) if looks else None

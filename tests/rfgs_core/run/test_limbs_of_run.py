@@ -26,9 +26,10 @@ from rfgs_core.limbs.propose import Joints
 from rfgs_core.limbs.weights import save_network
 from rfgs_core.radio.presets import preset
 from rfgs_core.run import Run
-from rfgs_core.run import limbs as limbs_of_run
+from rfgs_core.run import find_limbs as limbs_of_run
+from rfgs_core.run.find_limbs import frames_read
 from rfgs_core.run.folder import LIMBS_FILE
-from rfgs_core.run.limbs import frames_read, read_limbs
+from rfgs_core.run.limbs import read_limbs
 from rfgs_core.run.training import train_sequence
 from rfgs_core.settings import TrainConfig
 

@@ -64,7 +64,7 @@ def run(args: PoseArgs) -> int:
             break
         sys.stdout.write(
             f"{name:<9} joints {own['mpjpe_m']:.3f} m, with the pelvis in place "
-            f"{own['aligned_m']:.3f} m\n"
+            f"{own['aligned_m']:.3f} m{_each(own['people_m'])}\n"
         )
     else:
         sys.stdout.write(
@@ -74,3 +74,10 @@ def run(args: PoseArgs) -> int:
         )
     sys.stdout.write(f"{args.run / 'pose.png'} written\n")
     return 0
+
+
+def _each(people_m: list[float]) -> str:
+    """Errors of single people, where there are several [m]."""
+    if len(people_m) < 2:
+        return ""
+    return "; each person " + ", ".join(f"{error:.3f}" for error in people_m) + " m"

@@ -21,7 +21,8 @@ def score_poses(estimate: PoseEstimate, sequence: Sequence) -> dict[str, Any]:
     """Errors of joints and tracks, beside the standing baseline.
 
     Bodies are matched to people frame by frame by the distance on the ground between pelvis and
-    pelvis. `mpjpe_m` is the mean distance per joint, `aligned_m` the same with pelvis on pelvis;
+    pelvis. `mpjpe_m` is the mean distance per joint, `aligned_m` the same with pelvis on pelvis,
+    `people_m` that of each person who was matched, in the sequence's order;
     `identity_kept` is the share of matches with the person that a body had at first, and
     `tracked` the share of people with their body within half a metre. `posture_right` is the share
     of matches of which the run says rightly whether they sit or lie, `seated` the number who do.
@@ -66,19 +67,20 @@ def _errors(
     truth: list[Float64[np.ndarray, "person 17 3"]],
     matches: list[Int64[np.ndarray, "match 2"]],
 ) -> dict[str, Any]:
-    """Mean joint errors, as they are and with the pelvis in place, and those of each joint."""
+    """Mean errors, as they are and with the pelvis in place, of each joint and of each person."""
     offsets = [
         joints[k, body] - truth[k][person] for k, row in enumerate(matches) for body, person in row
     ]
     if not offsets:
-        return {"mpjpe_m": None, "aligned_m": None, "joints_m": None}
-    offset = np.array(offsets)
+        return {"mpjpe_m": None, "aligned_m": None, "joints_m": None, "people_m": None}
+    offset, whose = np.array(offsets), np.concatenate(matches)[:, 1]
     each = np.linalg.norm(offset, axis=2)
     aligned = np.linalg.norm(offset - offset[:, :1], axis=2)
     return {
         "mpjpe_m": float(each.mean()),
         "aligned_m": float(aligned.mean()),
         "joints_m": {name: float(each[:, j].mean()) for j, name in enumerate(JOINTS)},
+        "people_m": [float(each[whose == person].mean()) for person in np.unique(whose)],
     }
 
 

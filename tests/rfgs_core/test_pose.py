@@ -167,6 +167,12 @@ def test_scores_of_shifted_and_swapped_people() -> None:
     assert shifted["fit"]["aligned_m"] == pytest.approx(0.0, abs=1e-6)
     assert shifted["fit"]["joints_m"]["left_wrist"] == pytest.approx(0.05, abs=1e-6)
     assert shifted["standing"]["mpjpe_m"] > 0.4
+    one_off = truth.copy()
+    one_off[:, 1, :, 2] += 0.07
+    # Of the second person, whichever body it is.
+    assert scored(one_off[:, ::-1], truth)["fit"]["people_m"] == pytest.approx(
+        [0.0, 0.07], abs=1e-6
+    )
     assert shifted["tracked"] == 1.0 and shifted["identity_kept"] == 1.0
     swapped = truth.copy()
     swapped[2] = truth[2, ::-1]

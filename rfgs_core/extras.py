@@ -9,18 +9,10 @@ from rfgs_core.errors import MissingToolError
 
 #: Package as it is imported → extra of pyproject.toml.
 EXTRA_OF = {
-    "sionna": "factory",
-    "mitsuba": "factory",
-    "drjit": "factory",
-    "bpy": "blender",
-    "anny": "scenes",
-    "distributed": "factory",
-    "dask": "factory",
-    "triton": "gpu",
-    "gsplat": "gpu",
-    "playwright": "picture",
-    "imageio_ffmpeg": "video",
-}
+    "sionna": "factory", "mitsuba": "factory", "drjit": "factory", "bpy": "blender",
+    "anny": "scenes", "distributed": "factory", "dask": "factory", "triton": "gpu", "gsplat": "gpu",
+    "playwright": "picture", "imageio_ffmpeg": "video",
+}  # fmt: skip
 
 
 def how_to_install(package: str) -> str | None:

@@ -118,19 +118,11 @@ RANDOM_GAUSSIANS = 100_000
 
 #: What numbers may be; beyond these something else was meant.
 _LIMITS: dict[str, tuple[float, float]] = {
-    "seed": (-(2**63), 2**64),
-    "static_set": (0, 10**7),
-    "num_gaussians": (1, 10**7),
-    "iterations": (0, 10**9),
-    "bodies": (1, 10**4),
-    "excess_m": (0.0, 20.0),
-    "solver_steps": (0, 10**6),
-    "batch_entries": (1, 2**31),
-    "batch_points": (1, 2**31),
-    "grid_side": (1, 1024),
-    "refine_levels": (0, 64),
-    "unexplained": (0.0, 1.0),
-}
+    "seed": (-(2**63), 2**64), "static_set": (0, 10**7), "num_gaussians": (1, 10**7),
+    "iterations": (0, 10**9), "bodies": (1, 10**4), "excess_m": (0.0, 20.0),
+    "solver_steps": (0, 10**6), "batch_entries": (1, 2**31), "batch_points": (1, 2**31),
+    "grid_side": (1, 1024), "refine_levels": (0, 64), "unexplained": (0.0, 1.0),
+}  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)

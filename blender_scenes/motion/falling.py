@@ -29,54 +29,30 @@ _DIRECTIONS = {"back": np.pi, "left": 0.5 * np.pi, "right": -0.5 * np.pi, "front
 #: who lies on one.
 _Bends = dict[str, tuple[float, float]]
 _GIVING_WAY: _Bends = {
-    "upperleg01": (-0.85, 0.0),
-    "lowerleg01": (1.25, 0.0),
-    "foot": (-0.35, 0.0),
-    "spine05": (0.10, 0.0),
-    "spine03": (0.18, 0.0),
-    "spine01": (0.18, 0.0),
-    "neck01": (0.20, 0.0),
-    "head": (0.15, 0.0),
-    "upperarm01": (-0.75, 0.45),
-    "lowerarm01": (-0.55, 0.0),
-}
+    "upperleg01": (-0.85, 0.0), "lowerleg01": (1.25, 0.0), "foot": (-0.35, 0.0),
+    "spine05": (0.10, 0.0), "spine03": (0.18, 0.0), "spine01": (0.18, 0.0), "neck01": (0.20, 0.0),
+    "head": (0.15, 0.0), "upperarm01": (-0.75, 0.45), "lowerarm01": (-0.55, 0.0),
+}  # fmt: skip
 _LYING: dict[str, _Bends] = {
     "back": {
-        "upperleg01": (-0.10, 0.10),
-        "lowerleg01": (0.30, 0.0),
-        "foot": (0.25, 0.0),
-        "neck01": (0.08, 0.0),
-        "head": (0.10, 0.0),
-        "upperarm01": (0.10, 0.10),
+        "upperleg01": (-0.10, 0.10), "lowerleg01": (0.30, 0.0), "foot": (0.25, 0.0),
+        "neck01": (0.08, 0.0), "head": (0.10, 0.0), "upperarm01": (0.10, 0.10),
         "lowerarm01": (0.85, 0.0),
     },
     "front": {
-        "upperleg01": (-0.05, 0.12),
-        "lowerleg01": (0.20, 0.0),
-        "foot": (0.65, 0.0),
-        "spine03": (-0.05, 0.0),
-        "neck01": (-0.15, 0.0),
-        "head": (-0.20, 0.0),
-        "upperarm01": (0.0, 0.9),
-        "lowerarm01": (0.97, 1.6),
+        "upperleg01": (-0.05, 0.12), "lowerleg01": (0.20, 0.0), "foot": (0.65, 0.0),
+        "spine03": (-0.05, 0.0), "neck01": (-0.15, 0.0), "head": (-0.20, 0.0),
+        "upperarm01": (0.0, 0.9), "lowerarm01": (0.97, 1.6),
     },
     "side": {
-        "upperleg01.under": (-0.55, 0.0),
-        "upperleg01.over": (-0.95, -0.45),
-        "lowerleg01.under": (0.85, 0.0),
-        "lowerleg01.over": (1.25, 0.0),
-        "foot": (0.15, 0.0),
-        "spine05": (0.08, 0.0),
-        "spine03": (0.14, -0.08),
-        "spine01": (0.12, 0.0),
-        "neck01": (0.15, -0.22),
-        "head": (0.08, -0.18),
-        "upperarm01.under": (-1.25, -1.60),
-        "upperarm01.over": (-1.00, -2.05),
-        "lowerarm01.under": (0.55, -0.25),
+        "upperleg01.under": (-0.55, 0.0), "upperleg01.over": (-0.95, -0.45),
+        "lowerleg01.under": (0.85, 0.0), "lowerleg01.over": (1.25, 0.0), "foot": (0.15, 0.0),
+        "spine05": (0.08, 0.0), "spine03": (0.14, -0.08), "spine01": (0.12, 0.0),
+        "neck01": (0.15, -0.22), "head": (0.08, -0.18), "upperarm01.under": (-1.25, -1.60),
+        "upperarm01.over": (-1.00, -2.05), "lowerarm01.under": (0.55, -0.25),
         "lowerarm01.over": (0.35, 0.0),
     },
-}
+}  # fmt: skip
 #: An arm under the body gives way instead of propping it up.
 _GIVING_WAY_ASIDE: _Bends = {
     **_GIVING_WAY,

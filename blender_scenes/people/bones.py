@@ -7,21 +7,11 @@ from rfgs_core.articulated.bones import BONES
 
 #: Bone of anny at whose head each bone begins, without side.
 _START = {
-    "pelvis": "root",
-    "spine_lower": "spine04",
-    "spine_middle": "spine02",
-    "spine_upper": "spine01",
-    "neck": "neck01",
-    "head": "head",
-    "clavicle": "clavicle",
-    "upperarm": "upperarm01",
-    "lowerarm": "lowerarm01",
-    "hand": "wrist",
-    "upperleg": "upperleg01",
-    "lowerleg": "lowerleg01",
-    "foot": "foot",
-    "toe": "toe1-1",
-}
+    "pelvis": "root", "spine_lower": "spine04", "spine_middle": "spine02", "spine_upper": "spine01",
+    "neck": "neck01", "head": "head", "clavicle": "clavicle", "upperarm": "upperarm01",
+    "lowerarm": "lowerarm01", "hand": "wrist", "upperleg": "upperleg01", "lowerleg": "lowerleg01",
+    "foot": "foot", "toe": "toe1-1",
+}  # fmt: skip
 #: Bones that motion capture may have.
 RECORDED = (*BONES, "toe_left", "toe_right")
 

@@ -17,17 +17,9 @@ from rfgs_core.errors import RfgsError
 
 #: Modules of this package by their names on the command line, and about how long each takes [s].
 GROUPS: dict[str, float] = {
-    "friis": 11.0,
-    "box": 16.0,
-    "reciprocity": 9.0,
-    "targets": 12.0,
-    "shadow": 35.0,
-    "doppler": 16.0,
-    "delay": 6.0,
-    "energy": 3.0,
-    "pictures": 5.0,
-    "convergence": 17.0,
-}
+    "friis": 11.0, "box": 16.0, "reciprocity": 9.0, "targets": 12.0, "shadow": 35.0,
+    "doppler": 16.0, "delay": 6.0, "energy": 3.0, "pictures": 5.0, "convergence": 17.0,
+}  # fmt: skip
 
 
 def chosen_groups(only: Sequence[str]) -> list[str]:

@@ -7,27 +7,11 @@ import numpy as np
 
 #: Bones, parents before children.
 BONES = (
-    "pelvis",
-    "spine_lower",
-    "spine_middle",
-    "spine_upper",
-    "neck",
-    "head",
-    "clavicle_left",
-    "upperarm_left",
-    "lowerarm_left",
-    "hand_left",
-    "clavicle_right",
-    "upperarm_right",
-    "lowerarm_right",
-    "hand_right",
-    "upperleg_left",
-    "lowerleg_left",
-    "foot_left",
-    "upperleg_right",
-    "lowerleg_right",
-    "foot_right",
-)
+    "pelvis", "spine_lower", "spine_middle", "spine_upper", "neck", "head", "clavicle_left",
+    "upperarm_left", "lowerarm_left", "hand_left", "clavicle_right", "upperarm_right",
+    "lowerarm_right", "hand_right", "upperleg_left", "lowerleg_left", "foot_left", "upperleg_right",
+    "lowerleg_right", "foot_right",
+)  # fmt: skip
 
 #: Parent of each bone; the pelvis is the root.
 PARENTS = (-1, 0, 1, 2, 3, 4, 3, 6, 7, 8, 3, 10, 11, 12, 0, 14, 15, 0, 17, 18)

@@ -25,23 +25,12 @@ INK = "#848b95"
 METHOD, TRUTH, BASELINE = "#e4572e", "#8d99a6", "#3f88c5"
 
 _STYLE: dict[Any, Any] = {
-    "font.size": 9.0,
-    "axes.edgecolor": INK,
-    "axes.labelcolor": INK,
-    "axes.titlecolor": INK,
-    "axes.titlesize": 9.5,
-    "axes.linewidth": 0.7,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "xtick.color": INK,
-    "ytick.color": INK,
-    "text.color": INK,
-    "legend.frameon": False,
-    "legend.labelcolor": INK,
-    "figure.facecolor": "none",
-    "axes.facecolor": "none",
-    "savefig.facecolor": "none",
-}
+    "font.size": 9.0, "axes.edgecolor": INK, "axes.labelcolor": INK, "axes.titlecolor": INK,
+    "axes.titlesize": 9.5, "axes.linewidth": 0.7, "axes.spines.top": False,
+    "axes.spines.right": False, "xtick.color": INK, "ytick.color": INK, "text.color": INK,
+    "legend.frameon": False, "legend.labelcolor": INK, "figure.facecolor": "none",
+    "axes.facecolor": "none", "savefig.facecolor": "none",
+}  # fmt: skip
 
 
 @contextmanager

@@ -33,21 +33,10 @@ _RANGES, _ANGLES, _FIRST_BIN = 64, 64, 94
 RANGE_BIN_M = 0.043
 #: Rows of the 14 joints.
 _ORDER = {
-    "right_hip": 0,
-    "right_knee": 1,
-    "right_ankle": 2,
-    "left_hip": 3,
-    "left_knee": 4,
-    "left_ankle": 5,
-    "thorax": 6,
-    "head": 7,
-    "left_shoulder": 8,
-    "left_elbow": 9,
-    "left_wrist": 10,
-    "right_shoulder": 11,
-    "right_elbow": 12,
-    "right_wrist": 13,
-}
+    "right_hip": 0, "right_knee": 1, "right_ankle": 2, "left_hip": 3, "left_knee": 4,
+    "left_ankle": 5, "thorax": 6, "head": 7, "left_shoulder": 8, "left_elbow": 9, "left_wrist": 10,
+    "right_shoulder": 11, "right_elbow": 12, "right_wrist": 13,
+}  # fmt: skip
 #: Sequences of `hrnet_annot_test.json`, in its order (the authors' mscsa_prgcn.yaml).
 TEST = (
     *(15, 16, 38, 40, 41, 42, 17, 39, 244, 245, 246, 249, 250, 251, 252, 253, 254),

@@ -25,23 +25,10 @@ from rfgs_core.people_sets.model import Claim, Found, HeardFrame, joints_of
 
 #: Rows of the first 22 joints of SMPL-X; its head is where the skull begins, which is our neck.
 SMPLX = {
-    "pelvis": 0,
-    "left_hip": 1,
-    "right_hip": 2,
-    "left_knee": 4,
-    "right_knee": 5,
-    "spine": 6,
-    "left_ankle": 7,
-    "right_ankle": 8,
-    "thorax": 12,
-    "neck": 15,
-    "left_shoulder": 16,
-    "right_shoulder": 17,
-    "left_elbow": 18,
-    "right_elbow": 19,
-    "left_wrist": 20,
-    "right_wrist": 21,
-}
+    "pelvis": 0, "left_hip": 1, "right_hip": 2, "left_knee": 4, "right_knee": 5, "spine": 6,
+    "left_ankle": 7, "right_ankle": 8, "thorax": 12, "neck": 15, "left_shoulder": 16,
+    "right_shoulder": 17, "left_elbow": 18, "right_elbow": 19, "left_wrist": 20, "right_wrist": 21,
+}  # fmt: skip
 _REMEDY = "expected mmBody as it is published (sequence_0/radar/frame_0.npy and mesh/frame_0.npz)"
 _MOST_BYTES = 2**27
 

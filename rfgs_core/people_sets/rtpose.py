@@ -43,22 +43,10 @@ _LOW_M, _HIGH_M = np.array([-1.0875, -5.025, 0.7703]), np.array([4.7125, 5.025, 
 _LABELS = ("Train.json", "Test.json")
 #: Rows of the 15 joints.
 _ORDER = {
-    "pelvis": 0,
-    "right_hip": 1,
-    "right_knee": 2,
-    "right_ankle": 3,
-    "left_hip": 4,
-    "left_knee": 5,
-    "left_ankle": 6,
-    "thorax": 7,
-    "head": 8,
-    "left_shoulder": 9,
-    "left_elbow": 10,
-    "left_wrist": 11,
-    "right_shoulder": 12,
-    "right_elbow": 13,
-    "right_wrist": 14,
-}
+    "pelvis": 0, "right_hip": 1, "right_knee": 2, "right_ankle": 3, "left_hip": 4, "left_knee": 5,
+    "left_ankle": 6, "thorax": 7, "head": 8, "left_shoulder": 9, "left_elbow": 10, "left_wrist": 11,
+    "right_shoulder": 12, "right_elbow": 13, "right_wrist": 14,
+}  # fmt: skip
 _REMEDY = "expected RT-Pose as its loader reads it (Train.json, SEQUENCE/DZYX_npy_f16/000000.npy)"
 _MOST_BYTES = 2**29
 #: Names of sequences and frames; nothing else becomes part of a path.

@@ -14,22 +14,9 @@ from rfgs_core.skeleton import JOINTS, PARENTS
 
 #: Parameters in their order; lengths in metres, angles in radians.
 PARAMETERS: tuple[str, ...] = (
-    "x",
-    "y",
-    "height",
-    "heading",
-    "sink",
-    "pitch",
-    "roll",
-    "left_hip",
-    "right_hip",
-    "left_knee",
-    "right_knee",
-    "left_shoulder",
-    "right_shoulder",
-    "left_elbow",
-    "right_elbow",
-)
+    "x", "y", "height", "heading", "sink", "pitch", "roll", "left_hip", "right_hip", "left_knee",
+    "right_knee", "left_shoulder", "right_shoulder", "left_elbow", "right_elbow",
+)  # fmt: skip
 
 #: Heights above the floor and half widths of a standing body, shares of its height.
 HIP, KNEE, ANKLE, SHOULDER, NECK, HEAD = 0.530, 0.285, 0.039, 0.818, 0.870, 0.936

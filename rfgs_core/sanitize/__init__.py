@@ -27,24 +27,8 @@ from rfgs_core.sanitize.products import (
 )
 
 __all__ = [
-    "adjust_amplitudes",
-    "common_clock",
-    "conjugate_product",
-    "csi_ratio",
-    "doppler_band",
-    "doppler_spectrum",
-    "fill_gaps",
-    "first_component",
-    "hampel",
-    "normalise_power",
-    "reference_antenna",
-    "remove_linear_phase",
-    "resample",
-    "scale_intel5300",
-    "scale_to_rssi",
-    "undo_gain",
-    "undo_quarter_turns",
-    "undo_rotations",
-    "unwrap",
-    "windowed_profile",
-]
+    "adjust_amplitudes", "common_clock", "conjugate_product", "csi_ratio", "doppler_band",
+    "doppler_spectrum", "fill_gaps", "first_component", "hampel", "normalise_power",
+    "reference_antenna", "remove_linear_phase", "resample", "scale_intel5300", "scale_to_rssi",
+    "undo_gain", "undo_quarter_turns", "undo_rotations", "unwrap", "windowed_profile",
+]  # fmt: skip

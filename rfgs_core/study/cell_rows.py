@@ -44,23 +44,14 @@ CLAIMED_DB = {
     ("rfgs", "mmwave"): 31.4,
 }
 _LABELS = {
-    "rfgs": "RF-GS",
-    "rfgs_no_limbs": "RF-GS without limbs",
-    GAUSSIANS_ALONE: "RF-GS, its Gaussians alone",
-    "paper": "paper's recipe",
+    "rfgs": "RF-GS", "rfgs_no_limbs": "RF-GS without limbs",
+    GAUSSIANS_ALONE: "RF-GS, its Gaussians alone", "paper": "paper's recipe",
     "paper_prior": "paper's recipe, from our start",
     **{row.method: f"paper's recipe, from our start, {row.label}" for row in VARIANTS[1:]},
-    "clean": "CLEAN",
-    "omp": "OMP",
-    "fista": "FISTA",
-    "nnls": "NNLS of powers",
-    "music": "MUSIC",
-    "nerf": "RF-NeRF",
-    "mip": "RF-MipNeRF",
-    "ngp": "RF-InstantNGP",
-    "ngrf": "direct sum, as nGRF",
+    "clean": "CLEAN", "omp": "OMP", "fista": "FISTA", "nnls": "NNLS of powers", "music": "MUSIC",
+    "nerf": "RF-NeRF", "mip": "RF-MipNeRF", "ngp": "RF-InstantNGP", "ngrf": "direct sum, as nGRF",
     "wrfgs": "splatted signals, as WRF-GS",
-}
+}  # fmt: skip
 
 
 @dataclass(frozen=True)

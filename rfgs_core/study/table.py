@@ -9,28 +9,11 @@ from rfgs_core.study.cases import CONDITIONS
 from rfgs_core.study.summary import INTERPOLATORS, Row
 
 _HEAD = (
-    "scene",
-    "radio",
-    "condition",
-    "seeds",
-    "F5",
-    "F10",
-    "± seeds",
-    "best baseline F10",
-    "error cut",
-    "gap closed",
-    "template F5/F10",
-    "prior F10",
-    "ceiling F10",
-    "centroid [m]",
-    "found",
-    "identity",
-    "elements [dB]",
-    "linear/GP/spectrum [dB]",
-    "pair level [dB]",
-    "profiles",
+    "scene", "radio", "condition", "seeds", "F5", "F10", "± seeds", "best baseline F10",
+    "error cut", "gap closed", "template F5/F10", "prior F10", "ceiling F10", "centroid [m]",
+    "found", "identity", "elements [dB]", "linear/GP/spectrum [dB]", "pair level [dB]", "profiles",
     "missed",
-)
+)  # fmt: skip
 
 _NOTES = """\
 F5, F10: F-score at 5 and 10 cm, mean over frames and seeds. Best baseline: the best of matched

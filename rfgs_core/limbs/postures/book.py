@@ -16,17 +16,9 @@ from rfgs_core.worlds.motion import random_motion
 
 #: Moments of each family. Those that differ most from each other have most.
 SHARES = {
-    "walk": 40,
-    "stand": 8,
-    "gesture": 10,
-    "reach_high": 12,
-    "sit": 80,
-    "squat": 24,
-    "lie": 50,
-    "fall": 50,
-    "crawl": 16,
-    "stairs": 10,
-}
+    "walk": 40, "stand": 8, "gesture": 10, "reach_high": 12, "sit": 80, "squat": 24, "lie": 50,
+    "fall": 50, "crawl": 16, "stairs": 10,
+}  # fmt: skip
 #: So many of the others count as like a pose.
 ALIKE = 12
 

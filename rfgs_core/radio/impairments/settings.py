@@ -66,21 +66,13 @@ class Impairments:
 
 
 _LIMITS: dict[str, tuple[float, float]] = {
-    "cfo_std_hz": (0.0, 1e9),
-    "sfo_std_ppm": (0.0, 1e3),
-    "sto_std_s": (0.0, 1.0),
-    "phase_noise_rms_deg": (0.0, 1e3),
-    "phase_noise_bandwidth_hz": (1e-3, 1e12),
-    "noise_figure_db": (0.0, 60.0),
-    "power_dbm": (-100.0, 100.0),
-    "training_symbols": (1, 1_000_000),
-    "agc_step_db": (1e-6, 40.0),
-    "headroom_db": (0.0, 60.0),
-    "adc_bits": (0, 24),
-    "loss_rate": (0.0, 0.99),
-    "loss_burst": (1.0, 1e6),
+    "cfo_std_hz": (0.0, 1e9), "sfo_std_ppm": (0.0, 1e3), "sto_std_s": (0.0, 1.0),
+    "phase_noise_rms_deg": (0.0, 1e3), "phase_noise_bandwidth_hz": (1e-3, 1e12),
+    "noise_figure_db": (0.0, 60.0), "power_dbm": (-100.0, 100.0),
+    "training_symbols": (1, 1_000_000), "agc_step_db": (1e-6, 40.0), "headroom_db": (0.0, 60.0),
+    "adc_bits": (0, 24), "loss_rate": (0.0, 0.99), "loss_burst": (1.0, 1e6),
     "timestamp_step_s": (0.0, 1.0),
-}
+}  # fmt: skip
 
 #: Settings that can be asked for by name.
 IMPAIRMENT_PRESETS: dict[str, Impairments] = {

@@ -10,17 +10,10 @@ from .removal.stored import prune_properties
 
 #: Modules that hold classes for Blender; panels appear in this order.
 _MODULES = (
-    *(
-        "channels.settings",
-        "check.settings",
-        "coverage.settings",
-        "devices.properties",
-        "devices.settings",
-    ),
-    *("export.settings", "gaussians.settings", "jobs.settings", "live.settings"),
-    *("materials.properties", "paths.settings", "steps", "properties"),
-    *("devices.operators", "devices.chosen_operators", "devices.recorded"),
-    *("devices.captured", "devices.panel"),
+    *("channels.settings", "check.settings", "coverage.settings", "devices.properties"),
+    *("devices.settings", "export.settings", "gaussians.settings", "jobs.settings"),
+    *("live.settings", "materials.properties", "paths.settings", "steps", "properties"),
+    *("devices.operators", "devices.chosen_operators", "devices.captured", "devices.panel"),
     *("check.operators", "check.panel", "materials.operators", "materials.panel"),
     *("jobs.preferences", "jobs.operators", "jobs.panel", "export.operators", "export.panel"),
     *("gaussians.operators", "gaussians.file_menu", "gaussians.view_operators", "gaussians.panel"),

@@ -24,7 +24,6 @@ from ..scene.people import action_label, joints, segments
 from ..scene.state import kept
 from ..scene.survey import Surface, positions
 from ..seals import write_sealed_json
-from .mesh_ply import write_mesh
 from .poses import at_offsets, pose_offsets, pose_table
 from .velocities import SegmentVelocities, vertex_velocity
 
@@ -229,3 +228,23 @@ def _save_arrays(path: Path, **arrays: np.ndarray) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as temporary, temporary.open("wb") as stream:
         np.savez(stream, **arrays)
+
+
+_FACE = np.dtype([("count", "u1"), ("corners", "<i4", 3)])
+
+
+def write_mesh(path: Path, vertices: np.ndarray, faces: np.ndarray) -> None:
+    """Writes vertices [V, 3] in metres and triangles [T, 3]."""
+    header = (
+        "ply\nformat binary_little_endian 1.0\n"
+        f"element vertex {len(vertices)}\n"
+        "property float x\nproperty float y\nproperty float z\n"
+        f"element face {len(faces)}\n"
+        "property list uchar int vertex_indices\nend_header\n"
+    )
+    rows = np.zeros(len(faces), _FACE)
+    rows["count"], rows["corners"] = 3, faces
+    with replacing(path) as temporary, temporary.open("wb") as stream:
+        stream.write(header.encode("ascii"))
+        stream.write(np.ascontiguousarray(vertices, "<f4").tobytes())
+        stream.write(rows.tobytes())

@@ -7,6 +7,7 @@ render of one sample through each pixel's centre, because averages over a silhou
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -26,7 +27,6 @@ from ..scene.outlines import give_to_renders
 from ..scene.overrides import Overrides
 from ..scene.state import Keeper
 from .exr import read_exr, write_exr
-from .png import strip_metadata
 
 #: Depths above this are misses; Cycles writes 1e10 [Blender units].
 _MISS = 1e9
@@ -254,3 +254,26 @@ def _fixed_channels(found: dict[str, np.ndarray], unit: float) -> dict[str, np.n
     out["ViewLayer.Depth.Z"] = np.where(depth > _MISS, np.inf, depth * unit)
     out["ViewLayer.IndexOB.X"] = np.where(depth > _MISS, 0, index)
     return out
+
+
+_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+
+
+def strip_metadata(path: Path) -> None:
+    """Keeps only the chunks that hold the picture, so equal pictures are equal bytes.
+
+    Chunks are critical if their name starts with a capital (PNG specification, 5.4).
+
+    Raises:
+        AddonError: The file is not a whole PNG.
+    """
+    data = path.read_bytes()
+    kept, at, name = [_SIGNATURE], len(_SIGNATURE), b""
+    while data.startswith(_SIGNATURE) and at + 12 <= len(data):
+        size, name = struct.unpack_from(">I4s", data, at)
+        if name[:1].isupper():
+            kept.append(data[at : at + size + 12])
+        at += size + 12
+    if name != b"IEND":
+        raise AddonError(f"{path}: expected a whole PNG; is the disk full?")
+    path.write_bytes(b"".join(kept))

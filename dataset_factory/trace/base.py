@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every tracer has: a scene, a radio, what moves, and the time each stage takes."""
+"""What every tracer has: a scene, a radio, what moves, what it knows of an instant, times."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import drjit as dr
+import numpy as np
 
 from dataset_factory.scene.bundle import Bundle
 from dataset_factory.scene.radios import refuse_trace
@@ -12,9 +15,12 @@ from dataset_factory.trace.people.bodies import Bodies
 from rfgs_core.radio import Radio
 from rfgs_core.radio.layout import DevicePose
 from rfgs_core.seeds import sub_seed
+from rfgs_core.simulate.paths.path_set import PathSet
 from rfgs_core.simulate.shadow.environment import node_frequencies
 from rfgs_core.simulate.shadow.frequencies import fine_grid
 from rfgs_core.simulate.shadow.kirchhoff import Shadow
+from rfgs_core.simulate.shadow.outline import Outline
+from rfgs_core.simulate.surface.direct import PosedPoints
 from rfgs_core.timings import Timings
 
 #: Dr.Jit keeps kernels and memory of every frame; they are dropped this often [frames].
@@ -66,3 +72,27 @@ class BaseTracer:
         if self._frames_done % FLUSH_EVERY == 0:
             dr.flush_kernel_cache()
             dr.flush_malloc_cache()
+
+
+@dataclass(frozen=True)
+class Trace:
+    """What needs rays, at one instant."""
+
+    environment: np.ndarray
+    """Channel of the environment, shadows included, shape (tx, rx, subcarrier)."""
+    paths: PathSet
+    """Paths of the environment, without shadows."""
+    outlines: list[Outline]
+    """What shades those paths."""
+    points: PosedPoints | None = None
+    """Scattering points; None if there are none."""
+    seen: np.ndarray | None = None
+    """Which points pairs of sites see, shape (tx site, rx site, point)."""
+    bounced: PathSet | None = None
+    """Paths by way of points and walls, of unit cross-section; None if not traced."""
+
+
+def mixed(weighted: list[tuple[np.ndarray | None, float]]) -> np.ndarray:
+    """Weighted sum of what several traces hold."""
+    parts = [share * value for value, share in weighted if value is not None]
+    return sum(parts[1:], start=parts[0])

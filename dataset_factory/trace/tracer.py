@@ -9,12 +9,11 @@ import numpy as np
 
 from dataset_factory.scene.bundle import Bundle, BundleFrame
 from dataset_factory.scene.motion import read_motion, read_velocity
-from dataset_factory.trace.base import BaseTracer
+from dataset_factory.trace.base import BaseTracer, Trace, mixed
 from dataset_factory.trace.bounces.follow import follow
 from dataset_factory.trace.bounces.solver import Bounces, with_facets
 from dataset_factory.trace.bounces.walls import Walls
 from dataset_factory.trace.environment import Environment
-from dataset_factory.trace.instant import Trace, mixed
 from dataset_factory.trace.people.sight import in_sight
 from dataset_factory.trace.table.corners import CornerObjects
 from dataset_factory.trace.table.maker import TableMaker

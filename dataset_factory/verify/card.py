@@ -10,8 +10,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from dataset_factory.verify.text import number
-
 
 @dataclass(frozen=True)
 class Row:
@@ -161,3 +159,17 @@ def _plot_json(plot: Plot) -> dict[str, Any]:
 
 def _finite(values: Iterable[float]) -> list[float | None]:
     return [float(value) if math.isfinite(value) else None for value in values]
+
+
+def number(value: float) -> str:
+    """Four significant digits, without a trailing exponent where none is needed.
+
+    Example:
+        >>> number(-62.34567), number(0.00012345), number(0.0)
+        ('-62.35', '0.0001234', '0')
+    """
+    if not math.isfinite(value):
+        return str(value)
+    if value and not 1e-4 <= abs(value) < 1e5:
+        return f"{value:.3g}"
+    return f"{value:.4g}"

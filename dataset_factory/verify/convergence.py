@@ -11,11 +11,10 @@ from itertools import pairwise
 import numpy as np
 
 from dataset_factory.scene.bundle import Bundle
-from dataset_factory.verify.card import Group, Row, within
+from dataset_factory.verify.card import Group, Row, number, within
 from dataset_factory.verify.closed_forms import error_db
 from dataset_factory.verify.reciprocity import FURNISHED
 from dataset_factory.verify.targets import ball_sections
-from dataset_factory.verify.text import number
 from dataset_factory.verify.tracing import monostatic, single
 from dataset_factory.verify.workshop import Workshop, devices_of
 from rfgs_core.radio import layout, preset

@@ -19,7 +19,7 @@ from rfgs_core.background.static_set import StaticSet
 from rfgs_core.dataset.sequence import Sequence
 from rfgs_core.evaluate.baselines.gaussian_process import krige, krige_level
 from rfgs_core.evaluate.baselines.interpolation import completed, fill
-from rfgs_core.evaluate.baselines.linear import inverse_distance, linear
+from rfgs_core.evaluate.baselines.plain import inverse_distance, linear
 from rfgs_core.evaluate.baselines.spectrum import spectral
 from rfgs_core.evaluate.evidence import Evidence
 from rfgs_core.evaluate.geometry import reference_points

@@ -15,7 +15,7 @@ from plyfile import PlyData
 import addon_rfgs
 from addon_rfgs import naming, tables
 from addon_rfgs.errors import AddonError
-from addon_rfgs.export import exr, mesh_ply
+from addon_rfgs.export import bundle, exr
 from addon_rfgs.scene import rig, survey
 from addon_rfgs.scene.frames import chosen_frames
 from addon_rfgs.scene.override_file import read_overrides
@@ -25,7 +25,7 @@ from addon_rfgs.scene.overrides import RadioMaterial, first_match
 def test_mesh_is_read_back_by_plyfile(tmp_path: Path) -> None:
     vertices = np.arange(12, dtype=np.float32).reshape(4, 3)
     faces = np.array([[0, 1, 2], [2, 1, 3]], np.int32)
-    mesh_ply.write_mesh(tmp_path / "m.ply", vertices, faces)
+    bundle.write_mesh(tmp_path / "m.ply", vertices, faces)
     data = PlyData.read(str(tmp_path / "m.ply"))
     np.testing.assert_array_equal(np.stack([data["vertex"][axis] for axis in "xyz"], 1), vertices)
     np.testing.assert_array_equal(np.vstack(data["face"]["vertex_indices"]), faces)

@@ -14,7 +14,7 @@ from mathutils import Vector
 from addon_rfgs.check import repairs, scene_repairs
 from addon_rfgs.cli import open_blend, run
 from addon_rfgs.errors import AddonError
-from addon_rfgs.scene import weight
+from addon_rfgs.scene import check
 from addon_rfgs.scene.bodies import inside_out, seams, welded
 from addon_rfgs.scene.findings import Finding
 
@@ -243,8 +243,8 @@ def test_devices_of_one_radio_become_alike() -> None:
 
 def test_too_many_faces(monkeypatch: pytest.MonkeyPatch) -> None:
     assert not found("many_faces")
-    monkeypatch.setattr(weight, "MOST_MOVING", 100)
-    monkeypatch.setattr(weight, "MOST_STATIC", 20)
+    monkeypatch.setattr(check, "MOST_MOVING", 100)
+    monkeypatch.setattr(check, "MOST_STATIC", 20)
     assert {row.object for row in found("many_faces")} == {"body", "crate"}
 
 

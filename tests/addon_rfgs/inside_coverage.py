@@ -16,7 +16,7 @@ from addon_rfgs.coverage.surface import read_map
 from addon_rfgs.errors import AddonError
 from addon_rfgs.gaussians.coloring import Scale
 from addon_rfgs.gaussians.legend import legend_of
-from addon_rfgs.removal.contents import remove_data
+from addon_rfgs.removal.operators import remove_data
 from addon_rfgs.scene.survey import survey
 
 #: Two transmitters over 2 × 3 cells; the first is not heard in one corner.

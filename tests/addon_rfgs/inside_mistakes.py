@@ -25,7 +25,7 @@ from addon_rfgs.jobs.plans import TrainPlan
 from addon_rfgs.jobs.preferences import ADDON
 from addon_rfgs.jobs.queue import DONE, Job, Queue
 from addon_rfgs.jobs.record import Record, write_record
-from addon_rfgs.removal.contents import remove_data
+from addon_rfgs.removal.operators import remove_data
 
 pytestmark = pytest.mark.usefixtures("registered")
 

@@ -17,7 +17,7 @@ from blank_file import open_blank_file
 from addon_rfgs.cli import open_blend, run
 from addon_rfgs.errors import AddonError
 from addon_rfgs.paths import dataset as ours
-from addon_rfgs.removal.contents import remove_data
+from addon_rfgs.removal.operators import remove_data
 from addon_rfgs.scene.absences import absences
 from addon_rfgs.scene.survey import survey
 from rfgs_core.dataset.path_store import read_paths, write_paths

@@ -25,7 +25,7 @@ from splat_files import (
 )
 
 from addon_rfgs.errors import AddonError
-from addon_rfgs.gaussians import cloud_mesh, features, ply, splats
+from addon_rfgs.gaussians import cloud_mesh, clouds, ply, splats
 from addon_rfgs.gaussians.clouds import Inspection, import_gaussians
 from addon_rfgs.seals import BLANK, sealed
 
@@ -217,18 +217,18 @@ def test_500_mutated_plys_import_or_are_refused(tmp_path: Path) -> None:
 def test_features_are_read_and_damaged_ones_refused(tmp_path: Path) -> None:
     folder = write_run(tmp_path / "run", (7,)) / "gaussians"
     path, cloud = folder / "000007.features.npz", folder / "000007.ply"
-    good = features.read_features(cloud, 40)
+    good = clouds.read_features(cloud, 40)
     with np.load(path) as stored:
         assert set(good) == set(stored.files)
         for name in good:
             np.testing.assert_array_equal(good[name], stored[name])
     with pytest.raises(AddonError, match="the PLY holds 39 Gaussians"):
-        features.read_features(cloud, 39)
+        clouds.read_features(cloud, 39)
     data = path.read_bytes()
     for index in range(200):
         path.write_bytes(mutated(data, np.random.default_rng([6, index])))
         try:
-            features.read_features(cloud, 40)
+            clouds.read_features(cloud, 40)
         except AddonError as error:
             assert "\n" not in str(error) and str(path) in str(error)
 
@@ -237,7 +237,7 @@ def test_hostile_features_run_nothing_and_allocate_nothing(tmp_path: Path) -> No
     cloud = write_sealed(tmp_path / "a.ply", rows_of(COLUMNS, 3))
     path = save_sealed(tmp_path / "a.features.npz", track_id=np.array([print] * 3, dtype=object))
     with pytest.raises(AddonError, match="track_id"):
-        features.read_features(cloud, 3)
+        clouds.read_features(cloud, 3)
     header = np.lib.format.header_data_from_array_1_0(np.zeros((1, 1), np.float32))
     header["shape"] = (3, 2**40)
     with zipfile.ZipFile(path, "w") as archive, archive.open("features.npy", "w") as stream:
@@ -246,4 +246,4 @@ def test_hostile_features_run_nothing_and_allocate_nothing(tmp_path: Path) -> No
         archive.comment = BLANK.encode()
     path.write_bytes(sealed(path.read_bytes()))
     with pytest.raises(AddonError, match="features has shape"):
-        features.read_features(cloud, 3)
+        clouds.read_features(cloud, 3)

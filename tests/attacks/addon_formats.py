@@ -14,8 +14,8 @@ import numpy as np
 from formats import Format, add_path_table
 from tiny_dataset import write_tiny_dataset
 
-from addon_rfgs.devices.recorded import FORM, recorded_devices
-from addon_rfgs.gaussians.features import read_features
+from addon_rfgs.devices.captured import FORM, recorded_devices
+from addon_rfgs.gaussians.clouds import read_features
 from addon_rfgs.gaussians.ply import read_columns, write_columns
 from addon_rfgs.jobs.plans import GeneratePlan
 from addon_rfgs.jobs.record import Record, read_record, record_file, write_record

@@ -27,7 +27,7 @@ from rfgs_core.motion_capture.clip import read_clip
 from rfgs_core.radio import preset
 from rfgs_core.run.limbs import LIMBS_FILE, read_limbs
 from rfgs_core.run.people import PEOPLE_FILE, HeadCount
-from rfgs_core.view.skeletons import POSE_FILE, fitted_bones
+from rfgs_core.view.frames import POSE_FILE, fitted_bones
 
 RECORDING = """HIERARCHY
 ROOT Hips

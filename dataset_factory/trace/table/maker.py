@@ -7,9 +7,9 @@ from dataclasses import fields, replace
 
 import numpy as np
 
+from dataset_factory.trace.base import Trace
 from dataset_factory.trace.bounces.solver import with_facets
 from dataset_factory.trace.bounces.walls import Walls
-from dataset_factory.trace.instant import Trace
 from dataset_factory.trace.people.bodies import Bodies
 from dataset_factory.trace.table.corners import CornerObjects, doppler_hz
 from dataset_factory.trace.table.patches import (

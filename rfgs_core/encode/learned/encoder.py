@@ -11,7 +11,6 @@ from jaxtyping import Complex, Float, Float32, Float64
 from torch import Tensor, nn
 
 from rfgs_core.encode.back_projection import POINTS, back_project, oversampled_profiles
-from rfgs_core.encode.learned.attention import PairAttention
 from rfgs_core.encode.learned.blocks import Blocks
 from rfgs_core.encode.learned.networks import NETWORKS, NetworkKind
 from rfgs_core.encode.learned.signature import RadioSignature
@@ -158,3 +157,37 @@ def _per_link(
     links = np.zeros((len(of_pair), FEATURES, len(blocks.freq_hz)), dtype=np.complex64)
     links[row[blocks.tx[of_pair, t], blocks.rx[of_pair, r]]] = weighed[of_pair, :, t, r].numpy()
     return links
+
+
+#: Added to powers before their logarithm; pairs have a mean power of one per entry.
+_FLOOR = 1e-3
+_HIDDEN = 32
+
+
+class PairAttention(nn.Module):
+    """Weights of device pairs from what each says at a point and how far away it stands.
+
+    Every feature has a head of its own. Over a narrow band all windows hear nearly the same; what
+    then tells features apart is whom they listen to.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.first = nn.Linear(FEATURES + 2, _HIDDEN)
+        self.last = nn.Linear(_HIDDEN, FEATURES)
+        nn.init.normal_(self.last.weight)
+
+    def forward(
+        self, power: Float[Tensor, "pair N 32"], legs_m: Float[Tensor, "pair N 2"]
+    ) -> Float[Tensor, "N 32"]:
+        """Root of the attended mean power over pairs; untrained, heads differ at random.
+
+        Args:
+            power: |y|² of each pair, point and feature.
+            legs_m: Distances from the transmitting and the receiving device [m].
+        """
+        tokens = torch.cat([torch.log(power + _FLOOR), torch.log(legs_m + _FLOOR)], dim=-1)
+        score = self.last(torch.relu(self.first(tokens)))
+        weight = torch.softmax(score, dim=0)
+        # The root has no slope at zero.
+        return torch.sqrt((weight * power).sum(dim=0) + 1e-12)

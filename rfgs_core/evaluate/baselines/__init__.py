@@ -3,37 +3,37 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from rfgs_core.evaluate.baselines import (
     body_prior,
     clean,
-    empty_room,
     fista,
     gaussian_process,
-    linear,
     matched_filter,
     music,
-    nearest_element,
     nonnegative,
     omp,
+    plain,
     spectrum,
     template,
-    zero,
 )
+from rfgs_core.evaluate.baselines.matched_filter import variant
 from rfgs_core.evaluate.evidence import Baseline, BaselineResult, Evidence
 
 #: Baselines that look at one frame's evidence, by the name they have in `metrics.json`.
 BASELINES: dict[str, Baseline] = {
-    "zero": zero.baseline,
-    "nearest_element": nearest_element.baseline,
-    "linear": linear.baseline,
+    "zero": plain.zero,
+    "nearest_element": plain.nearest_element,
+    "linear": plain.lines,
     "gaussian_process": gaussian_process.baseline,
     "spectrum": spectrum.baseline,
-    "empty_room": empty_room.baseline,
+    "empty_room": plain.empty_room,
     "matched_filter": matched_filter.baseline,
-    "matched_filter_all_sum": matched_filter.all_sum,
-    "matched_filter_all_log_mean": matched_filter.all_log_mean,
-    "matched_filter_different_sum": matched_filter.different_sum,
-    "matched_filter_different_log_mean": matched_filter.different_log_mean,
+    "matched_filter_all_sum": partial(variant, different_only=False, log_mean=False),
+    "matched_filter_all_log_mean": partial(variant, different_only=False, log_mean=True),
+    "matched_filter_different_sum": partial(variant, different_only=True, log_mean=False),
+    "matched_filter_different_log_mean": partial(variant, different_only=True, log_mean=True),
     "clean": clean.baseline,
     "omp": omp.baseline,
     "fista": fista.baseline,

@@ -59,23 +59,3 @@ def default_score(evidence: Evidence) -> Float32[np.ndarray, "x y z"]:
 def baseline(evidence: Evidence) -> BaselineResult:
     """The default variant."""
     return BaselineResult(score=default_score(evidence), reason=WHY_NO_CHANNEL)
-
-
-def all_sum(evidence: Evidence) -> BaselineResult:
-    """Sum over all pairs."""
-    return variant(evidence, different_only=False, log_mean=False)
-
-
-def all_log_mean(evidence: Evidence) -> BaselineResult:
-    """Log-mean over all pairs."""
-    return variant(evidence, different_only=False, log_mean=True)
-
-
-def different_sum(evidence: Evidence) -> BaselineResult:
-    """Sum over pairs of different devices."""
-    return variant(evidence, different_only=True, log_mean=False)
-
-
-def different_log_mean(evidence: Evidence) -> BaselineResult:
-    """Log-mean over pairs of different devices."""
-    return variant(evidence, different_only=True, log_mean=True)

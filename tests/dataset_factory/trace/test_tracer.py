@@ -29,7 +29,7 @@ def posed_body(bundle: Bundle, radio: Radio, devices: list[DevicePose]) -> tuple
 
 def bounced(tracer, points) -> np.ndarray:
     """Channel of the points by way of walls."""
-    from dataset_factory.trace.instant import Trace
+    from dataset_factory.trace.base import Trace
 
     found = tracer._bounces.paths(points, tracer._environment.around)
     return tracer._bounced(points, Trace(np.zeros(0), None, [], points, None, found))

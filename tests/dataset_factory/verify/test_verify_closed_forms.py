@@ -10,7 +10,15 @@ from dataset_factory.verify.box import CONCRETE
 from dataset_factory.verify.closed_forms import C, friis, sphere_path_m
 from dataset_factory.verify.description import Camera
 from dataset_factory.verify.energy import exponent
-from dataset_factory.verify.images import Box, box_channel, delays_s, image_paths
+from dataset_factory.verify.images import (
+    Box,
+    box_channel,
+    delays_s,
+    half_space,
+    image_paths,
+    permittivity,
+    slab,
+)
 from dataset_factory.verify.physical_optics import (
     cross_section,
     cuboid,
@@ -19,7 +27,6 @@ from dataset_factory.verify.physical_optics import (
 )
 from dataset_factory.verify.rasteriser import raster
 from dataset_factory.verify.shadow import knife_edge, strip
-from dataset_factory.verify.slabs import half_space, permittivity, slab
 from rfgs_core.radio.reflection import material_permittivity
 
 FREQ_HZ = np.array([2.4e9, 5.8e9, 62e9])

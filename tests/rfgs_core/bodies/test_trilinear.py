@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import map_coordinates
 
-from rfgs_core.bodies.trilinear import read_grids
+from rfgs_core.bodies.localise import read_grids
 
 
 @pytest.mark.parametrize("kind", [np.float32, np.float64])

@@ -12,8 +12,7 @@ from rfgs_core.encode.peaks import separated_peaks
 from rfgs_core.evaluate.baselines import BASELINES
 from rfgs_core.evaluate.baselines.clean import SEPARATION_M
 from rfgs_core.evaluate.baselines.gaussian_process import krige
-from rfgs_core.evaluate.baselines.linear import linear
-from rfgs_core.evaluate.baselines.nearest_element import nearest
+from rfgs_core.evaluate.baselines.plain import linear, nearest
 from rfgs_core.evaluate.baselines.spectrum import _like, _likeliest, spectral
 from rfgs_core.evaluate.evidence import Evidence
 from rfgs_core.evaluate.geometry import best_voxels

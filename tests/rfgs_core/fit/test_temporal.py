@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import torch
 
-from rfgs_core.fit.temporal import STEP_M, Continuity
+from rfgs_core.fit.refine import STEP_M, Continuity
 
 
 def test_only_those_that_go_on_are_held(make_gaussians) -> None:

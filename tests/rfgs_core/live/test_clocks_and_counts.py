@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rfgs_core.live.clocks import DeviceClock
 from rfgs_core.live.counts import Counts, Times
+from rfgs_core.live.records import DeviceClock
 
 
 def test_a_clock_that_wraps_goes_on() -> None:

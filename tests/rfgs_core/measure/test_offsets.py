@@ -15,7 +15,7 @@ from rfgs_core.measure.observations import Observations
 from rfgs_core.measure.offsets import CrossSpectra, Offsets, estimate_offsets
 from rfgs_core.radio import preset
 from rfgs_core.radio.impairments import Draw
-from rfgs_core.radio.impairments.oscillators import oscillator_turn
+from rfgs_core.radio.impairments.apply import oscillator_turn
 
 PHASE_RAD = np.array([0.0, 2.5, -1.2, 0.7])
 DELAY_S = np.array([0.0, 4e-9, -7e-9, 1.5e-9])

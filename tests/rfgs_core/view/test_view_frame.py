@@ -17,12 +17,11 @@ from rfgs_core.render.side_by_side import WIDTH_PX
 from rfgs_core.render.view import fitted_shader
 from rfgs_core.run import Run
 from rfgs_core.view.frame import Mesh, ShownFrame, distance_m, load_frame
-from rfgs_core.view.frames import Frames, finished_frames, where_people_are
-from rfgs_core.view.outline import level_lines
+from rfgs_core.view.frames import Frames, finished_frames, fitted_bones, where_people_are
 from rfgs_core.view.pictures import rendered_and_true
 from rfgs_core.view.radios import radio_shapes
 from rfgs_core.view.room import cut_open, room_of
-from rfgs_core.view.skeletons import fitted_bones
+from rfgs_core.view.stage import level_lines
 
 
 @pytest.fixture(scope="module")

@@ -4,13 +4,12 @@
 from __future__ import annotations
 
 import argparse
-import importlib
 import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from blender_scenes.catalogue import scenes
+from blender_scenes.catalogue import Scene, scenes
 
 #: Larger descriptions are refused [bytes].
 _LARGEST_JSON = 4_000_000
@@ -74,7 +73,7 @@ def main(arguments: list[str] | None = None) -> int:
     if args.name not in known:
         sys.stderr.write(f"error: no scene {args.name!r}; there are: {', '.join(known)}\n")
         return 2
-    return _build(known[args.name].name, args.out or known[args.name].path)
+    return _build(known[args.name], args.out)
 
 
 def _shapes(description: Path, out: Path) -> int:
@@ -159,8 +158,13 @@ def _bodies(out: Path | None) -> int:
     return _write(lambda path: sys.stdout.write(f"{write_shape_space(path)}\n"), out or SHAPE_SPACE)
 
 
-def _build(name: str, out: Path) -> int:
-    return _write(lambda path: importlib.import_module(f"blender_scenes.{name}").build(path), out)
+def _build(scene: Scene, out: Path | None) -> int:
+    def work(path: Path) -> None:
+        from blender_scenes.assemble import build_scene
+
+        build_scene(scene, path)
+
+    return _write(work, out or scene.path)
 
 
 def _write(build: Callable[[Path], object], out: Path) -> int:

@@ -4,13 +4,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from pathlib import Path
 
 import bpy
 import numpy as np
 
 import addon_rfgs
-from blender_scenes.stage import Point, add_cameras, set_render, show_first_camera
+from blender_scenes.catalogue import Scene
+from blender_scenes.stage import (
+    Point,
+    add_access_points,
+    add_cameras,
+    around_room,
+    corners,
+    set_render,
+    show_first_camera,
+)
 
 #: Where the parts of a scene go, in the order of the outliner.
 Folders = dict[str, bpy.types.Collection]
@@ -45,6 +55,24 @@ def save_scene(
         bpy.ops.wm.save_as_mainfile(filepath=str(out.resolve()), compress=True)
     finally:
         addon_rfgs.unregister()
+
+
+def build_scene(wanted: Scene, out: Path) -> None:
+    """Builds a scene of the catalogue as `out`; the module of its name tells what is in it."""
+    fill = import_module(f"blender_scenes.{wanted.name}").fill
+    save_scene(out, wanted.name, wanted.frame_end, wanted.fps, fill)
+
+
+def set_up(
+    scene: bpy.types.Scene,
+    folders: Folders,
+    half_m: tuple[float, float],
+    people: Sequence[bpy.types.Object],
+    cameras: Sequence[Point] = (),
+) -> None:
+    """Access points in a room's corners, and cameras, by default all around, to `watch` people."""
+    add_access_points(corners(half_m), (0.0, 0.0), folders["Stage"])
+    watch(scene, cameras or around_room(half_m), people, folders["Stage"])
 
 
 def watch(

@@ -4,11 +4,10 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import bpy
 
-from blender_scenes.assemble import Folders, save_scene, watch
+from blender_scenes.assemble import Folders, set_up
 from blender_scenes.motion.falling import Fall
 from blender_scenes.motion.going import Stay, Walk
 from blender_scenes.motion.score import Posture
@@ -18,7 +17,6 @@ from blender_scenes.sets.decoration import picture, plant
 from blender_scenes.sets.lighting import WARM, bulb, soft_light
 from blender_scenes.sets.room import Room, put
 from blender_scenes.sets.shell import Shell, Wall, door, window
-from blender_scenes.stage import add_access_points, around_room, corners
 
 
 def _furnish(to: bpy.types.Collection) -> None:
@@ -50,18 +48,11 @@ ROOM = Room(
     _light,
 )
 
-FRAMES, FPS = 70, 10
 
-
-def build(out: Path) -> None:
-    """Builds the scene from nothing and saves it, compressed, as `out`."""
-    save_scene(out, "bedroom_fall", FRAMES, FPS, _fill)
-
-
-def _fill(scene: bpy.types.Scene, folders: Folders) -> None:
+def fill(scene: bpy.types.Scene, folders: Folders) -> None:
+    """Puts everything into the scene."""
     ROOM.build(folders)
     georg = cast(PEOPLE["georg"], folders["Person"])
     pieces = [Walk([(0.85, 0.2)], 0.6, open_start=True), Stay(0.4), Fall("front"), Stay(3.0)]
-    perform(georg, pieces, Posture((0.85, 1.0), -math.pi / 2), FPS, frame_end=FRAMES)
-    add_access_points(corners(ROOM.shell.half_m), (0.0, 0.0), folders["Stage"])
-    watch(scene, around_room(ROOM.shell.half_m), [georg.armature], folders["Stage"])
+    perform(georg, pieces, Posture((0.85, 1.0), -math.pi / 2), scene)
+    set_up(scene, folders, ROOM.shell.half_m, [georg.armature])

@@ -3,11 +3,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import bpy
 
-from blender_scenes.assemble import Folders, save_scene, watch
+from blender_scenes.assemble import Folders, set_up
 from blender_scenes.motion.going import Walk
 from blender_scenes.motion.score import Posture
 from blender_scenes.people.cast import PEOPLE, cast, perform
@@ -16,7 +14,6 @@ from blender_scenes.sets.decoration import picture
 from blender_scenes.sets.lighting import COOL, NEUTRAL, ceiling_row, soft_light
 from blender_scenes.sets.room import Room, put
 from blender_scenes.sets.shell import Shell, Wall, door, window
-from blender_scenes.stage import add_access_points, corners
 
 
 def _furnish(to: bpy.types.Collection) -> None:
@@ -56,7 +53,6 @@ ROOM = Room(
     _light,
 )
 
-FRAMES, FPS = 60, 10
 #: At both ends: from the south-west, lockers would hide the person.
 CAMERAS = (
     (-4.1, 0.9, 2.35), (4.1, 0.9, 2.35), (4.1, -0.9, 1.6), (-4.1, 0.6, 1.6), (-4.1, 0.2, 2.2),
@@ -65,15 +61,10 @@ CAMERAS = (
 )  # fmt: skip
 
 
-def build(out: Path) -> None:
-    """Builds the scene from nothing and saves it, compressed, as `out`."""
-    save_scene(out, "corridor", FRAMES, FPS, _fill)
-
-
-def _fill(scene: bpy.types.Scene, folders: Folders) -> None:
+def fill(scene: bpy.types.Scene, folders: Folders) -> None:
+    """Puts everything into the scene."""
     ROOM.build(folders)
     anna = cast(PEOPLE["anna"], folders["Person"])
     walk = Walk([(-0.2, -0.08), (3.4, 0.12)], 1.05, open_start=True, open_end=True)
-    perform(anna, [walk], Posture((-3.3, 0.15), 0.0), FPS, frame_end=FRAMES)
-    add_access_points(corners(ROOM.shell.half_m), (0.0, 0.0), folders["Stage"])
-    watch(scene, CAMERAS, [anna.armature], folders["Stage"])
+    perform(anna, [walk], Posture((-3.3, 0.15), 0.0), scene)
+    set_up(scene, folders, ROOM.shell.half_m, [anna.armature], CAMERAS)

@@ -4,11 +4,10 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import bpy
 
-from blender_scenes.assemble import Folders, save_scene, watch
+from blender_scenes.assemble import Folders, set_up
 from blender_scenes.motion.going import Stay, Turn, Walk
 from blender_scenes.motion.score import Posture
 from blender_scenes.people.cast import PEOPLE, cast, perform
@@ -18,7 +17,6 @@ from blender_scenes.sets.lighting import COOL, WARM, ceiling_row, soft_light
 from blender_scenes.sets.room import Room, put
 from blender_scenes.sets.seating import armchair
 from blender_scenes.sets.shell import Shell, Wall, door, window
-from blender_scenes.stage import add_access_points, around_room, corners
 
 
 def _furnish(to: bpy.types.Collection) -> None:
@@ -52,15 +50,9 @@ ROOM = Room(
     _light,
 )
 
-FRAMES, FPS = 80, 10
 
-
-def build(out: Path) -> None:
-    """Builds the scene from nothing and saves it, compressed, as `out`."""
-    save_scene(out, "crowd_of_four", FRAMES, FPS, _fill)
-
-
-def _fill(scene: bpy.types.Scene, folders: Folders) -> None:
+def fill(scene: bpy.types.Scene, folders: Folders) -> None:
+    """Puts everything into the scene."""
     ROOM.build(folders)
     to = folders["Person"]
     parts = {
@@ -75,7 +67,5 @@ def _fill(scene: bpy.types.Scene, folders: Folders) -> None:
     crowd = []
     for name, (start, pieces) in parts.items():
         crowd.append(cast(PEOPLE[name], to))
-        perform(crowd[-1], pieces, start, FPS, frame_end=FRAMES)
-    add_access_points(corners(ROOM.shell.half_m), (0.0, 0.0), folders["Stage"])
-    cameras = around_room(ROOM.shell.half_m)
-    watch(scene, cameras, [actor.armature for actor in crowd], folders["Stage"])
+        perform(crowd[-1], pieces, start, scene)
+    set_up(scene, folders, ROOM.shell.half_m, [actor.armature for actor in crowd])

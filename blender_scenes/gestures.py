@@ -3,11 +3,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import bpy
 
-from blender_scenes.assemble import Folders, save_scene, watch
+from blender_scenes.assemble import Folders, set_up
 from blender_scenes.motion.gestures import Gesture
 from blender_scenes.motion.going import Stay
 from blender_scenes.motion.score import Posture
@@ -16,7 +14,6 @@ from blender_scenes.sets import workplace
 from blender_scenes.sets.lighting import COOL, ceiling_row
 from blender_scenes.sets.room import Room, put
 from blender_scenes.sets.shell import Shell, Wall, door
-from blender_scenes.stage import add_access_points, around_room, corners
 
 
 def _furnish(to: bpy.types.Collection) -> None:
@@ -49,19 +46,13 @@ ROOM = Room(
     _light,
 )
 
-FRAMES, FPS = 190, 10
 KINDS = ("push_pull", "sweep", "clap", "slide", "draw_o", "draw_zigzag")
 
 
-def build(out: Path) -> None:
-    """Builds the scene from nothing and saves it, compressed, as `out`."""
-    save_scene(out, "gestures", FRAMES, FPS, _fill)
-
-
-def _fill(scene: bpy.types.Scene, folders: Folders) -> None:
+def fill(scene: bpy.types.Scene, folders: Folders) -> None:
+    """Puts everything into the scene."""
     ROOM.build(folders)
     emma = cast(PEOPLE["emma"], folders["Person"])
     pieces = [piece for kind in KINDS for piece in (Gesture(kind), Stay(0.3))]
-    perform(emma, pieces, Posture((0.0, 0.0), 0.0), FPS, frame_end=FRAMES)
-    add_access_points(corners(ROOM.shell.half_m), (0.0, 0.0), folders["Stage"])
-    watch(scene, around_room(ROOM.shell.half_m), [emma.armature], folders["Stage"])
+    perform(emma, pieces, Posture((0.0, 0.0), 0.0), scene)
+    set_up(scene, folders, ROOM.shell.half_m, [emma.armature])

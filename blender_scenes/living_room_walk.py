@@ -4,12 +4,11 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import bpy
 import numpy as np
 
-from blender_scenes.assemble import Folders, save_scene, watch
+from blender_scenes.assemble import Folders, set_up
 from blender_scenes.motion.footsteps import EndlessSteps
 from blender_scenes.motion.gait import Gait
 from blender_scenes.motion.path import ArcPath
@@ -22,9 +21,7 @@ from blender_scenes.people.clothes import dress
 from blender_scenes.sets.decoration import light_room
 from blender_scenes.sets.furniture import build_furniture
 from blender_scenes.sets.living_room import SHELL, build_room
-from blender_scenes.stage import add_access_points, corners
 
-FRAMES, FPS = 60, 10
 #: Through the middle of the room, between the rug and the television, past the dining table.
 PATH = ArcPath((0.0, 0.24), math.radians(-3), 4.0, -math.radians(46))
 #: The pelvis is at the path's beginning at this time of the gait [s].
@@ -37,21 +34,16 @@ CAMERAS = (
 )  # fmt: skip
 
 
-def build(out: Path) -> None:
-    """Builds the scene from nothing and saves it, compressed, as `out`."""
-    save_scene(out, "living_room_walk", FRAMES, FPS, _fill)
-
-
-def _fill(scene: bpy.types.Scene, folders: Folders) -> None:
+def fill(scene: bpy.types.Scene, folders: Folders) -> None:
+    """Puts everything into the scene."""
     build_room(folders["Room"])
     build_furniture(folders["Furniture"])
     body = dress(load_body())
     person = build_character("person", body, folders["Person"])
     gait, skeleton = Gait(), skeleton_of(body)
     steps = EndlessSteps(PATH, gait.step_m, gait.stance, gait.width_m, gait.toe_out_rad)
-    phases = (START_S + np.arange(FRAMES) / FPS) / gait.step_s
+    phases = (START_S + np.arange(scene.frame_end) / scene.render.fps) / gait.step_s
     poses = [walking_pose(gait, skeleton, steps, float(phase)) for phase in phases]
-    key_poses(person, poses, ["walk"] * FRAMES, first_frame=1, hold=False)
-    add_access_points(corners(SHELL.half_m), (0.0, 0.0), folders["Stage"])
-    watch(scene, CAMERAS, [person], folders["Stage"])
+    key_poses(person, poses, ["walk"] * scene.frame_end, first_frame=1, hold=False)
+    set_up(scene, folders, SHELL.half_m, [person], CAMERAS)
     light_room(folders["Stage"])

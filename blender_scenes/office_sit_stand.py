@@ -4,11 +4,10 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import bpy
 
-from blender_scenes.assemble import Folders, save_scene, watch
+from blender_scenes.assemble import Folders, set_up
 from blender_scenes.motion.going import Stay
 from blender_scenes.motion.seat import Rise, Sit, before_seat
 from blender_scenes.people.cast import PEOPLE, cast, perform
@@ -17,9 +16,7 @@ from blender_scenes.sets.decoration import ceiling_light, plant
 from blender_scenes.sets.lighting import COOL, NEUTRAL, ceiling_row, soft_light, sun
 from blender_scenes.sets.room import Room, put
 from blender_scenes.sets.shell import Shell, Wall, door, window
-from blender_scenes.stage import add_access_points, around_room, corners
 
-FRAMES, FPS = 90, 10
 #: Above the seat of the chair by more than a centimetre, so that the ray tracer keeps both.
 SEAT_M = 0.475
 CHAIR_M = (0.35, -0.20)
@@ -60,16 +57,11 @@ ROOM = Room(
 )
 
 
-def build(out: Path) -> None:
-    """Builds the scene from nothing and saves it, compressed, as `out`."""
-    save_scene(out, "office_sit_stand", FRAMES, FPS, _fill)
-
-
-def _fill(scene: bpy.types.Scene, folders: Folders) -> None:
+def fill(scene: bpy.types.Scene, folders: Folders) -> None:
+    """Puts everything into the scene."""
     ROOM.build(folders)
     david = cast(PEOPLE["david"], folders["Person"])
     start = before_seat(david.figure, CHAIR_M, -math.pi / 2, SEAT_M)
     again = [Stay(0.5), Sit(SEAT_M), Stay(2.2), Rise(SEAT_M), Stay(0.9), Sit(SEAT_M), Stay(2.0)]
-    perform(david, again, start, FPS, frame_end=FRAMES)
-    add_access_points(corners(ROOM.shell.half_m), (0.0, 0.0), folders["Stage"])
-    watch(scene, around_room(ROOM.shell.half_m), [david.armature], folders["Stage"])
+    perform(david, again, start, scene)
+    set_up(scene, folders, ROOM.shell.half_m, [david.armature])

@@ -5,12 +5,11 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from pathlib import Path
 
 import bpy
 import numpy as np
 
-from blender_scenes.assemble import Folders, save_scene, watch
+from blender_scenes.assemble import Folders, watch
 from blender_scenes.motion.going import Walk
 from blender_scenes.motion.score import Posture
 from blender_scenes.people.cast import PEOPLE, cast, perform
@@ -35,7 +34,6 @@ from blender_scenes.vehicles.cars import car_model
 from blender_scenes.vehicles.driving import Route, drive
 from blender_scenes.vehicles.rig import build_vehicle, key_drive, park
 
-FRAMES, FPS = 72, 10
 #: Edges of the radio scene [m]; beyond them everything is for the eye only.
 WEST_M, EAST_M, SOUTH_M, NORTH_M = -7.2, 7.2, -5.6, 6.2
 #: From the lawn over the aisle and the bays to the pavement before the shop [m].
@@ -53,11 +51,6 @@ CAMERAS = (
 )  # fmt: skip
 
 
-def build(out: Path) -> None:
-    """Builds the scene from nothing and saves it, compressed, as `out`."""
-    save_scene(out, "parking_lot", FRAMES, FPS, _fill)
-
-
 def hump(places: np.ndarray) -> np.ndarray:
     """Height of the aisle [m]: level but for one rounded hump across it; shape (..., 2) in."""
     off = np.clip((places[..., 0] - HUMP_X_M) / HUMP_HALF_M, -1.0, 1.0)
@@ -65,7 +58,8 @@ def hump(places: np.ndarray) -> np.ndarray:
     return np.where(inside, 0.5 * HUMP_M * (1.0 + np.cos(np.pi * off)), 0.0)
 
 
-def _fill(scene: bpy.types.Scene, folders: Folders) -> None:
+def fill(scene: bpy.types.Scene, folders: Folders) -> None:
+    """Puts everything into the scene."""
     _ground(folders["Room"])
     _shop(folders["Room"], folders["Furniture"])
     _surroundings(folders["Furniture"], folders["Room"])
@@ -79,10 +73,10 @@ def _fill(scene: bpy.types.Scene, folders: Folders) -> None:
         park(f"parked_{name}", car_model(colour, lit=False), place, BAY_RAD, folders["Furniture"])
     model = car_model("car_red")
     car = build_vehicle("car", model, folders["Person"])
-    key_drive(car, drive(ROUTE, model.chassis, FRAMES, FPS, SPEEDS, hump))
+    key_drive(car, drive(ROUTE, model.chassis, scene.frame_end, scene.render.fps, SPEEDS, hump))
     customer = cast(PEOPLE["hana"], folders["Person"])
     way = Walk([(2.4, -3.1), (-0.9, -2.5), (-2.2, -1.2)], 1.15, open_start=True, open_end=True)
-    perform(customer, [way], Posture((6.0, -2.9), math.radians(183)), FPS, frame_end=FRAMES)
+    perform(customer, [way], Posture((6.0, -2.9), math.radians(183)), scene)
     places = [(6.5, -5.0, 3.0), (6.5, 5.7, 2.2), (-6.5, 5.7, 3.4), (-6.5, -5.0, 2.2)]
     add_access_points(places, (0.0, 0.0), folders["Stage"])
     watch(scene, CAMERAS, [customer.armature, car.root], folders["Stage"])

@@ -8,14 +8,13 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from blender_scenes.assemble import Folders, save_scene, watch
+from blender_scenes.assemble import Folders, save_scene, set_up
 from blender_scenes.motion.recorded import Recorded, poses_of
 from blender_scenes.motion.score import Figure, Posture, Score, compose
 from blender_scenes.people.cast import PEOPLE, Actor, cast, key_score
 from blender_scenes.sets.lighting import COOL, ceiling_row
 from blender_scenes.sets.room import Room
 from blender_scenes.sets.shell import Shell, Wall, door
-from blender_scenes.stage import add_access_points, around_room, corners
 from rfgs_core.motion_capture import Recording, read_recording
 
 #: From what a joint reaches to the walls and to the ceiling [m].
@@ -112,5 +111,4 @@ def _surround(
         lambda to: ceiling_row(lamps, (1.2, 0.3), 26.0, COOL, to),
     )
     room.build(folders)
-    add_access_points(corners(room.shell.half_m), (0.0, 0.0), folders["Stage"])
-    watch(scene, around_room(room.shell.half_m), [actor.armature], folders["Stage"])
+    set_up(scene, folders, room.shell.half_m, [actor.armature])

@@ -3,11 +3,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import bpy
 
-from blender_scenes.assemble import Folders, save_scene, watch
+from blender_scenes.assemble import Folders, set_up
 from blender_scenes.motion.going import Walk
 from blender_scenes.motion.score import Posture
 from blender_scenes.motion.stairs import Climb
@@ -17,7 +15,6 @@ from blender_scenes.sets.decoration import picture
 from blender_scenes.sets.lighting import COOL, NEUTRAL, ceiling_row, soft_light, sun
 from blender_scenes.sets.room import Room, put
 from blender_scenes.sets.shell import Shell, Wall, door, window
-from blender_scenes.stage import add_access_points, around_room, corners
 
 #: Steps of `STAIRWAY`: how many, rise [m], run [m], y of the first edge [m].
 STEPS, RISE_M, RUN_M, FIRST_STEP_X_M = 3, 0.17, 0.30, 0.35
@@ -56,16 +53,11 @@ ROOM = Room(
     _light,
 )
 
-FRAMES, FPS = 80, 10
 TO_FIRST_M = 0.32
 
 
-def build(out: Path) -> None:
-    """Builds the scene from nothing and saves it, compressed, as `out`."""
-    save_scene(out, "stairs", FRAMES, FPS, _fill)
-
-
-def _fill(scene: bpy.types.Scene, folders: Folders) -> None:
+def fill(scene: bpy.types.Scene, folders: Folders) -> None:
+    """Puts everything into the scene."""
     ROOM.build(folders)
     hana = cast(PEOPLE["hana"], folders["Person"])
     pieces = [
@@ -73,6 +65,5 @@ def _fill(scene: bpy.types.Scene, folders: Folders) -> None:
         Climb(STEPS, RISE_M, RUN_M, TO_FIRST_M),
         Walk([(2.1, -0.2)], 0.8),
     ]
-    perform(hana, pieces, Posture((-2.3, 0.0), 0.0), FPS, frame_end=FRAMES)
-    add_access_points(corners(ROOM.shell.half_m), (0.0, 0.0), folders["Stage"])
-    watch(scene, around_room(ROOM.shell.half_m), [hana.armature], folders["Stage"])
+    perform(hana, pieces, Posture((-2.3, 0.0), 0.0), scene)
+    set_up(scene, folders, ROOM.shell.half_m, [hana.armature])

@@ -4,12 +4,11 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import bpy
 import numpy as np
 
-from blender_scenes.assemble import Folders, save_scene, watch
+from blender_scenes.assemble import Folders, watch
 from blender_scenes.motion.going import Walk
 from blender_scenes.motion.score import Posture
 from blender_scenes.people.cast import PEOPLE, cast, perform
@@ -32,7 +31,6 @@ from blender_scenes.vehicles.cars import car_model, van_model
 from blender_scenes.vehicles.driving import Route, drive
 from blender_scenes.vehicles.rig import Vehicle, build_vehicle, key_drive, park
 
-FRAMES, FPS = 70, 10
 #: Half the length of the radio scene, of the carriageway and of the street between fronts [m].
 HALF_M, ROAD_M, FRONT_M = 7.4, 2.6, 5.2
 KERB_M = 0.12
@@ -49,12 +47,8 @@ CAMERAS = (
 )  # fmt: skip
 
 
-def build(out: Path) -> None:
-    """Builds the scene from nothing and saves it, compressed, as `out`."""
-    save_scene(out, "street", FRAMES, FPS, _fill)
-
-
-def _fill(scene: bpy.types.Scene, folders: Folders) -> None:
+def fill(scene: bpy.types.Scene, folders: Folders) -> None:
+    """Puts everything into the scene."""
     _ground(folders["Room"])
     _fronts(folders["Room"], folders["Furniture"])
     _furniture(folders["Furniture"])
@@ -62,23 +56,21 @@ def _fill(scene: bpy.types.Scene, folders: Folders) -> None:
     park("parked", car_model("car_blue", lit=False), (-0.5, -1.8, GAP_M), 0.0, folders["Furniture"])
     model = van_model("van_white", "van_stripe")
     van = build_vehicle("van", model, folders["Person"])
-    key_drive(van, drive(ROUTE, model.chassis, FRAMES, FPS, SPEEDS))
+    key_drive(van, drive(ROUTE, model.chassis, scene.frame_end, scene.render.fps, SPEEDS))
     stroller = cast(PEOPLE["georg"], folders["Person"])
     perform(
         stroller,
         [Walk([(-3.0, 3.4), (0.6, 3.7)], 0.95, open_start=True, open_end=True)],
         Posture((-5.9, 3.7), math.radians(-6), floor_m=KERB_M),
-        FPS,
-        frame_end=FRAMES,
+        scene,
     )
     crossing = cast(PEOPLE["anna"], folders["Person"])
     perform(
         crossing,
         [Walk([(5.3, 2.2)], 1.0)],
         Posture((5.5, -2.2), math.radians(92)),
-        FPS,
+        scene,
         frame_start=12,
-        frame_end=FRAMES,
     )
     places = [(6.9, -4.9, 3.2), (6.9, 4.9, 2.4), (-6.9, 4.9, 3.5), (-6.9, -4.9, 3.2)]
     add_access_points(places, (0.0, 0.0), folders["Stage"])

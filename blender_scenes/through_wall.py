@@ -4,11 +4,10 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import bpy
 
-from blender_scenes.assemble import Folders, save_scene, watch
+from blender_scenes.assemble import Folders, watch
 from blender_scenes.motion.going import Stay, Turn, Walk
 from blender_scenes.motion.score import Posture
 from blender_scenes.people.cast import PEOPLE, cast, perform
@@ -51,23 +50,18 @@ ROOM = Room(
     _light,
 )
 
-FRAMES, FPS = 80, 10
 WALL_X_M = 0.0
 
 
-def build(out: Path) -> None:
-    """Builds the scene from nothing and saves it, compressed, as `out`."""
-    save_scene(out, "through_wall", FRAMES, FPS, _fill)
-
-
-def _fill(scene: bpy.types.Scene, folders: Folders) -> None:
+def fill(scene: bpy.types.Scene, folders: Folders) -> None:
+    """Puts everything into the scene."""
     ROOM.build(folders)
     build_partition(ROOM.shell, "wall_between", Wall("bare_concrete"), WALL_X_M, folders["Room"])
     ben, clara = (cast(PEOPLE[name], folders["Person"]) for name in ("ben", "clara"))
     there_and_back = [Walk([(3.2, 0.55)], 1.05), Turn(180), Walk([(0.9, 0.75)], 1.05)]
-    perform(ben, there_and_back, Posture((0.9, 0.75), 0.0), FPS, frame_end=FRAMES)
+    perform(ben, there_and_back, Posture((0.9, 0.75), 0.0), scene)
     slowly = [Stay(0.6), Walk([(1.0, -0.65)], 0.8), Turn(-180), Walk([(3.1, -0.6)], 0.8)]
-    perform(clara, slowly, Posture((3.1, -0.6), math.pi), FPS, frame_end=FRAMES)
+    perform(clara, slowly, Posture((3.1, -0.6), math.pi), scene)
     half_x, half_y = ROOM.shell.half_m
     # All radios are west of the wall, all cameras east of it.
     west = [(x + (WALL_X_M - half_x) / 2, y, z) for x, y, z in corners((half_x / 2, half_y))]

@@ -4,11 +4,10 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import bpy
 
-from blender_scenes.assemble import Folders, save_scene, watch
+from blender_scenes.assemble import Folders, set_up
 from blender_scenes.motion.going import Stay, Walk
 from blender_scenes.motion.score import Posture
 from blender_scenes.people.cast import PEOPLE, cast, perform
@@ -17,7 +16,6 @@ from blender_scenes.sets.decoration import picture
 from blender_scenes.sets.lighting import COOL, NEUTRAL, ceiling_row, soft_light, sun
 from blender_scenes.sets.room import Room, put
 from blender_scenes.sets.shell import Shell, Wall, door, window
-from blender_scenes.stage import add_access_points, around_room, corners
 
 
 def _furnish(to: bpy.types.Collection) -> None:
@@ -52,21 +50,13 @@ ROOM = Room(
     _light,
 )
 
-FRAMES, FPS = 70, 10
 
-
-def build(out: Path) -> None:
-    """Builds the scene from nothing and saves it, compressed, as `out`."""
-    save_scene(out, "two_crossing", FRAMES, FPS, _fill)
-
-
-def _fill(scene: bpy.types.Scene, folders: Folders) -> None:
+def fill(scene: bpy.types.Scene, folders: Folders) -> None:
+    """Puts everything into the scene."""
     ROOM.build(folders)
     david, emma = (cast(PEOPLE[name], folders["Person"]) for name in ("david", "emma"))
     walk = Walk([(2.35, 1.05)], 0.85, open_start=True)
-    perform(david, [walk], Posture((-2.3, -1.1), math.atan2(2.15, 4.65)), FPS, frame_end=FRAMES)
+    perform(david, [walk], Posture((-2.3, -1.1), math.atan2(2.15, 4.65)), scene)
     later = [Stay(1.3), Walk([(2.3, -1.1)], 1.15)]
-    perform(emma, later, Posture((-2.3, 1.2), -math.atan2(2.3, 4.6)), FPS, frame_end=FRAMES)
-    add_access_points(corners(ROOM.shell.half_m), (0.0, 0.0), folders["Stage"])
-    cameras = around_room(ROOM.shell.half_m)
-    watch(scene, cameras, [david.armature, emma.armature], folders["Stage"])
+    perform(emma, later, Posture((-2.3, 1.2), -math.atan2(2.3, 4.6)), scene)
+    set_up(scene, folders, ROOM.shell.half_m, [david.armature, emma.armature])

@@ -4,12 +4,11 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import bpy
 import numpy as np
 
-from blender_scenes.assemble import Folders, save_scene, watch
+from blender_scenes.assemble import Folders, watch
 from blender_scenes.motion.going import Stay, Walk
 from blender_scenes.motion.rotations import smoothstep
 from blender_scenes.motion.score import Posture
@@ -33,7 +32,6 @@ from blender_scenes.vehicles.driving import Route, drive
 from blender_scenes.vehicles.forklift import FORK_M, LOAD_X_M, carriage, forklift_model
 from blender_scenes.vehicles.rig import Vehicle, build_vehicle, key_drive
 
-FRAMES, FPS = 80, 10
 _TURN_RAD = math.radians(84)
 #: Along the middle aisle, then left towards the rack at the north wall.
 ROUTE = Route((-3.3, -2.0), 0.0, ((2.4, 0.0), (3.6, _TURN_RAD), (0.9, 0.0)))
@@ -76,39 +74,34 @@ CAMERAS = (
 )  # fmt: skip
 
 
-def build(out: Path) -> None:
-    """Builds the scene from nothing and saves it, compressed, as `out`."""
-    save_scene(out, "warehouse", FRAMES, FPS, _fill)
-
-
-def _fill(scene: bpy.types.Scene, folders: Folders) -> None:
+def fill(scene: bpy.types.Scene, folders: Folders) -> None:
+    """Puts everything into the scene."""
     build_shell(SHELL, folders["Room"])
     _racks(folders["Furniture"])
     _details(folders["Furniture"], folders["Room"])
     model = forklift_model()
     truck = build_vehicle("forklift", model, folders["Person"])
-    key_drive(truck, drive(ROUTE, model.chassis, FRAMES, FPS, SPEEDS))
-    _lift(truck, folders["Person"])
+    key_drive(truck, drive(ROUTE, model.chassis, scene.frame_end, scene.render.fps, SPEEDS))
+    _lift(scene, truck, folders["Person"])
     worker = cast(PEOPLE["ivan"], folders["Person"])
     perform(
         worker,
         [Walk([(4.7, -2.4), (4.5, 0.5)], 1.05, open_start=True), Stay(3.0)],
         Posture((5.9, -3.9), math.radians(125)),
-        FPS,
-        frame_end=FRAMES,
+        scene,
     )
     add_access_points(corners(SHELL.half_m, (2.4, 3.6)), (0.0, 0.0), folders["Stage"])
     watch(scene, CAMERAS, [worker.armature, truck.root], folders["Stage"])
     _light(scene, folders["Stage"])
 
 
-def _lift(truck: Vehicle, person: bpy.types.Collection) -> None:
+def _lift(scene: bpy.types.Scene, truck: Vehicle, person: bpy.types.Collection) -> None:
     """Adds the fork carriage with its pallet and keys its height."""
     forks = truck.attach(carriage("forklift_carriage").build(person))
     load = truck.attach(pallet("forklift_load", 5, 0.95).build(person, yaw=math.pi / 2))
     low, high = LIFT_M
-    for frame in range(1, FRAMES + 1):
-        share = ((frame - 1) / FPS - LIFT_S[0]) / (LIFT_S[1] - LIFT_S[0])
+    for frame in range(1, scene.frame_end + 1):
+        share = ((frame - 1) / scene.render.fps - LIFT_S[0]) / (LIFT_S[1] - LIFT_S[0])
         height = low + (high - low) * smoothstep(min(max(share, 0.0), 1.0))
         forks.location.z = height
         load.location = (LOAD_X_M, 0.0, FORK_M + height + 0.002)

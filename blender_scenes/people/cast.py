@@ -3,8 +3,7 @@
 
 Example:
     >>> anna = cast(PEOPLE["anna"], folders["Person"])
-    >>> perform(anna, [Walk([(2.0, 0.0)], 1.2), Turn(90), Stay(2.0)], Posture((0, 0), 0.0), fps=10)
-    79
+    >>> perform(anna, [Walk([(2.0, 0.0)], 1.2), Turn(90), Stay(2.0)], Posture((0, 0), 0.0), scene)
 
 Frames, labels and instance masks follow: the armature is called `anna`, its mesh `anna_body`.
 """
@@ -72,32 +71,16 @@ def perform(
     actor: Actor,
     pieces: Sequence[Piece],
     start: Posture,
-    fps: float,
+    scene: bpy.types.Scene,
     frame_start: int = 1,
-    frame_end: int | None = None,
-) -> int:
-    """Writes what an actor does into her or his action.
-
-    Args:
-        actor: Who.
-        pieces: What, in order.
-        start: Where it begins.
-        fps: Frames per second.
-        frame_start: Frame of the beginning.
-        frame_end: Last frame to key: the performance is cut there, or the last posture held;
-            by default the frame at which the last piece is over.
-
-    Returns:
-        The last keyed frame.
+) -> None:
+    """Writes what an actor does, cut where the scene ends, or the last posture held until then.
 
     Raises:
         ValueError: A piece cannot be done from where the one before it ended.
     """
     score = compose(actor.figure, start, pieces)
-    if frame_end is None:
-        frame_end = frame_start + int(np.ceil(score.duration_s * fps))
-    key_score(actor, score, fps, frame_start, frame_end)
-    return frame_end
+    key_score(actor, score, scene.render.fps, frame_start, scene.frame_end)
 
 
 def key_score(actor: Actor, score: Score, fps: float, frame_start: int, frame_end: int) -> None:

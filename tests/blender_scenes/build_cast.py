@@ -16,8 +16,6 @@ from blender_scenes.motion.score import Posture
 from blender_scenes.people.cast import PEOPLE, cast, perform
 from blender_scenes.surfaces import material
 
-FRAMES, FPS = 60, 10
-
 
 def fill(scene: bpy.types.Scene, folders: Folders) -> None:
     floor = bpy.data.meshes.new("floor")
@@ -25,9 +23,9 @@ def fill(scene: bpy.types.Scene, folders: Folders) -> None:
     floor.materials.append(material("oak_floor"))
     folders["Room"].objects.link(bpy.data.objects.new("floor", floor))
     anna, felix = (cast(PEOPLE[name], folders["Person"]) for name in ("anna", "felix"))
-    perform(anna, [Stay(6.0)], Posture((-1.0, 0.0), -1.5), FPS, frame_end=FRAMES)
+    perform(anna, [Stay(6.0)], Posture((-1.0, 0.0), -1.5), scene)
     pieces = [Gesture("clap"), Turn(60), Walk([(1.3, 1.6)], 0.9, open_end=True)]
-    perform(felix, pieces, Posture((1.0, -0.6), 0.4), FPS, frame_end=FRAMES)
+    perform(felix, pieces, Posture((1.0, -0.6), 0.4), scene)
     eye = bpy.data.objects.new("eye", bpy.data.cameras.new("eye"))
     eye.location = (0.0, -5.0, 1.5)
     eye.rotation_euler = (1.45, 0.0, 0.0)
@@ -36,7 +34,7 @@ def fill(scene: bpy.types.Scene, folders: Folders) -> None:
 
 
 if __name__ == "__main__":
-    save_scene(Path(sys.argv[1]), "cast", FRAMES, FPS, fill)
+    save_scene(Path(sys.argv[1]), "cast", 60, 10, fill)
     sys.stdout.flush()
     # Python's own end may wait for ever on Blender's threads.
     os._exit(0)

@@ -7,6 +7,7 @@ import json
 import subprocess
 import sys
 from collections import Counter
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -48,9 +49,9 @@ def test_some_damage_to_every_format(tmp_path: Path) -> None:
     check(attacked(tmp_path, 6, 1, 300.0), 6)
 
 
+@pytest.mark.skipif(find_spec("bpy") is None, reason="needs bpy")
 @pytest.mark.parametrize("count", [20, pytest.param(300, marks=pytest.mark.slow)])
 def test_damage_to_what_the_add_on_reads(tmp_path: Path, count: int) -> None:
-    pytest.importorskip("bpy")
     check(attacked(tmp_path, count, 3, 600.0, "add-on"), count)
 
 

@@ -10,6 +10,7 @@ import pytest
 import torch
 from safetensors.torch import save_file
 
+from rfgs_core.adam import Adam
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.limbs import weights
 from rfgs_core.limbs.network import LimbNetwork
@@ -71,9 +72,9 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
 
 
 def test_a_training_goes_on_where_it_was(network: LimbNetwork, tmp_path: Path) -> None:
-    optimiser = torch.optim.AdamW(network.parameters(), 1e-3)
+    optimiser = Adam.of(network.parameters(), 1e-3, decay=0.01)
 
-    def step(own: LimbNetwork, optimiser: torch.optim.Optimizer) -> None:
+    def step(own: LimbNetwork, optimiser: Adam) -> None:
         optimiser.zero_grad()
         sum((value**2).sum() for value in own.parameters()).backward()
         optimiser.step()
@@ -81,7 +82,7 @@ def test_a_training_goes_on_where_it_was(network: LimbNetwork, tmp_path: Path) -
     step(network, optimiser)
     keep(tmp_path / "state", network, optimiser, Progress(640, 12.5))
     other = LimbNetwork(4)
-    second = torch.optim.AdamW(other.parameters(), 1e-3)
+    second = Adam.of(other.parameters(), 1e-3, decay=0.01)
     assert resume(tmp_path / "state", other, second) == Progress(640, 12.5)
     for _ in range(2):
         step(network, optimiser)
@@ -91,10 +92,10 @@ def test_a_training_goes_on_where_it_was(network: LimbNetwork, tmp_path: Path) -
 
 
 def test_a_state_of_another_network_is_refused(network: LimbNetwork, tmp_path: Path) -> None:
-    optimiser = torch.optim.AdamW(network.parameters(), 1e-3)
+    optimiser = Adam.of(network.parameters(), 1e-3, decay=0.01)
     sum((value**2).sum() for value in network.parameters()).backward()
     optimiser.step()
     keep(tmp_path / "state", network, optimiser, Progress(1, 0.0))
     other = LimbNetwork(48)
     with pytest.raises(RfgsFormatError, match=r"of another network: .*; delete it"):
-        resume(tmp_path / "state", other, torch.optim.AdamW(other.parameters(), 1e-3))
+        resume(tmp_path / "state", other, Adam.of(other.parameters(), 1e-3, decay=0.01))

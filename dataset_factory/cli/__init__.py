@@ -8,21 +8,11 @@ from collections.abc import Sequence
 
 #: Command name → module below `dataset_factory.cli` and its arguments dataclass.
 COMMANDS: dict[str, tuple[str, str]] = {
-    "scenes": ("scenes", "ScenesArgs"),
-    "check": ("check", "CheckArgs"),
-    "plan": ("plan", "PlanArgs"),
-    "radios": ("radios", "RadiosArgs"),
-    "generate": ("generate", "GenerateArgs"),
-    "worlds": ("worlds", "WorldsArgs"),
-    "validate": ("validate", "ValidateArgs"),
-    "preview": ("preview", "PreviewArgs"),
-    "impair": ("impair", "ImpairArgs"),
-    "stats": ("stats", "StatsArgs"),
-    "convert": ("convert", "ConvertArgs"),
-    "bench": ("bench", "BenchArgs"),
-    "tracers": ("tracers", "TracersArgs"),
-    "verify": ("verify", "VerifyArgs"),
-    "coverage": ("coverage", "CoverageArgs"),
+    name: (name, f"{name.capitalize()}Args")
+    for name in (
+        *("scenes", "check", "plan", "radios", "generate", "worlds", "validate", "preview"),
+        *("impair", "stats", "convert", "bench", "tracers", "verify", "coverage"),
+    )
 }
 
 _FIRST_STEPS = r"""A first dataset, about two minutes on two cores:

@@ -5,30 +5,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+#: Modules of commands that are not called as the command.
+_FILES = {"inspect": "inspect_capture", "import": "import_capture"}
 #: Command name → module below `rfgs_core.cli` and its arguments dataclass.
 COMMANDS: dict[str, tuple[str, str]] = {
-    "info": ("info", "InfoArgs"),
-    "demo": ("demo", "DemoArgs"),
-    "encode": ("encode", "EncodeArgs"),
-    "limbs": ("limbs", "LimbsArgs"),
-    "train": ("train", "TrainArgs"),
-    "eval": ("eval", "EvalArgs"),
-    "render": ("render", "RenderArgs"),
-    "pose": ("pose", "PoseArgs"),
-    "export": ("export", "ExportArgs"),
-    "view": ("view", "ViewArgs"),
-    "report": ("report", "ReportArgs"),
-    "compare": ("compare", "CompareArgs"),
-    "study": ("study", "StudyArgs"),
-    "predict": ("predict", "PredictArgs"),
-    "csi": ("csi", "CsiArgs"),
-    "room": ("room", "RoomArgs"),
-    "inspect": ("inspect_capture", "InspectArgs"),
-    "import": ("import_capture", "ImportArgs"),
-    "live": ("live", "LiveArgs"),
-    "addon": ("addon", "AddonArgs"),
-    "bench": ("bench", "BenchArgs"),
-    "selftest": ("selftest", "SelftestArgs"),
+    name: (_FILES.get(name, name), f"{name.capitalize()}Args")
+    for name in (
+        *("info", "demo", "encode", "limbs", "train", "eval", "render", "pose", "export", "view"),
+        *("report", "compare", "study", "predict", "csi", "room", "inspect", "import", "live"),
+        *("addon", "bench", "selftest"),
+    )
 }
 
 

@@ -35,6 +35,7 @@ from rfgs_core.simulate.shadow.outline import Outline, coarse_mesh
 from rfgs_core.simulate.sight.free import free_segments
 from rfgs_core.simulate.surface.bodies import BodySurface
 from rfgs_core.simulate.surface.movers import Movers
+from rfgs_core.simulate.surface.posed import Facets
 from rfgs_core.timings import Timings
 
 
@@ -46,6 +47,10 @@ class Instant:
     """Channel of everything but people's echoes, complex128, shape (tx, rx, subcarrier)."""
     arrivals: list[Arrivals]
     """What reaches each person's facets."""
+    facets: Facets | None
+    """The facets, None where nobody is."""
+    vertices: np.ndarray
+    """Everything that moves [m], shape (V, 3)."""
 
 
 class FastTracer:
@@ -135,13 +140,13 @@ class FastTracer:
 
     def trace_at(self, vertices: np.ndarray) -> Instant:
         """What stands in whose way, with everything that moves at vertices [m], shape (V, 3)."""
-        vertices = vertices.astype(np.float32)
-        environment = self._environment_at(vertices)
-        arrivals: list[Arrivals] = []
+        environment = self._environment_at(vertices.astype(np.float32))
+        facets, arrivals = None, []
         if self._surface is not None:
             with self.timings.stage("people"):
-                arrivals = self._echoes.arrivals(self._surface.facets(vertices))
-        return Instant(environment, arrivals)
+                facets = self._surface.facets(vertices.astype(np.float32))
+                arrivals = self._echoes.arrivals(facets)
+        return Instant(environment, arrivals, facets, vertices)
 
     def mixture(
         self, vertices: np.ndarray, traces: Sequence[Instant], shares: Sequence[float]
@@ -161,14 +166,15 @@ class FastTracer:
         else:
             channel = shares[0] * traces[0].environment
             for trace, share in zip(traces[1:], shares[1:], strict=True):
-                channel = channel + share * trace.environment
+                channel += share * trace.environment
         if self._surface is not None:
             with self.timings.stage("people"):
-                facets = self._surface.facets(vertices)
+                facets = traces[0].facets if traces[0].vertices is vertices else None
+                facets = facets or self._surface.facets(vertices)
                 for trace, share in zip(traces, shares, strict=True):
                     if share and trace.arrivals:
                         echo = self._echoes.channel(facets, trace.arrivals, self._gamma)
-                        channel = channel + share * echo
+                        channel += echo if share == 1.0 else share * echo
         channel[~self._layout.measured] = 0.0
         return channel
 

@@ -58,7 +58,7 @@ def steer(
     left, share = _interpolation(freq_hz, nodes_hz)
     wavenumber = 2.0 * np.pi * np.asarray(freq_hz, dtype=np.float64) / SPEED_OF_LIGHT
     if transmission is None:
-        transmission = np.ones((0, 0, 0, 0), dtype=np.complex128)
+        transmission = np.ones((0, 0, 0, 0), dtype=np.complex64)
     step = float(wavenumber[1] - wavenumber[0]) if len(wavenumber) > 1 else 0.0
     for a, b in np.unique(np.stack([paths.tx, paths.rx], axis=1), axis=0):
         of_pair = np.flatnonzero((paths.tx == a) & (paths.rx == b))

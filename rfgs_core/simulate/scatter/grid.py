@@ -101,21 +101,20 @@ def to_subcarriers(grid: DelayGrid, spread: np.ndarray) -> np.ndarray:
 
     Args:
         grid: The grid.
-        spread: Complex64, shape (node, cell, link).
+        spread: Real and imaginary part, float32, shape (node, 2, cell, link).
 
     Returns:
         Complex64, shape (subcarrier, link).
     """
-    used = np.flatnonzero(np.abs(spread).max(axis=(0, 2)) > 0.0)
-    out = np.zeros((len(grid.row), spread.shape[2]), dtype=np.complex64)
-    if not len(used):
-        return out
     # A body fills few cells: their rows of the transform alone are cheaper than all of it.
-    turn = np.exp(-2j * np.pi / grid.cells * np.outer(grid.row, used)).astype(np.complex64)
-    for node in range(len(spread)):
-        part = turn @ spread[node, used]
-        out += grid.share[node][:, None].astype(np.float32) * part
-    return out
+    used = np.flatnonzero(spread.any(axis=(0, 1, 3)))
+    parts = spread[:, :, used]
+    filled = np.zeros((len(spread), len(used), spread.shape[3]), dtype=np.complex64)
+    filled.real, filled.imag = parts[:, 0], parts[:, 1]
+    turn = np.exp(-2j * np.pi / grid.cells * np.outer(grid.row, used))
+    # All nodes at once: one product of matrices.
+    share = (grid.share.T[:, :, None] * turn[:, None]).astype(np.complex64)
+    return share.reshape(len(grid.row), -1) @ filled.reshape(-1, spread.shape[3])
 
 
 def array_reach(xyz: np.ndarray, site: np.ndarray) -> float:

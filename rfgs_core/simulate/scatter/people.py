@@ -110,7 +110,7 @@ class PeopleChannel:
                 for body in arrivals:
                     self._spread(facets, gamma, body, (i, j), b, cells)
                 for a, part in zip(senders, cells, strict=True):
-                    links = to_subcarriers(grid, part[:, 0] + 1j * part[:, 1])
+                    links = to_subcarriers(grid, part)
                     tx = np.flatnonzero((layout.tx_site == a) & (layout.tx_port == i))
                     rx = np.flatnonzero((layout.rx_site == b) & (layout.rx_port == j))
                     out[np.ix_(tx, rx)] = links.T.reshape(n_tx, n_rx, -1)

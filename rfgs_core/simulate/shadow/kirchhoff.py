@@ -38,7 +38,7 @@ class Passed:
     path: np.ndarray
     """Which paths, ascending, int64, shape (shaded,)."""
     factor: np.ndarray
-    """Factor on the amplitude, complex128, shape (shaded, tx place of the site, rx place of the
+    """Factor on the amplitude, complex64, shape (shaded, tx place of the site, rx place of the
     site, grid); ports of one element share a place."""
     grid_hz: np.ndarray
     """Frequencies of the factors [Hz], shape (grid,); linear in between."""
@@ -73,7 +73,7 @@ def transmission(
     ]
     shaded = np.flatnonzero(np.any([rows.any(axis=1) for rows in near], axis=0))
     shape = (len(shaded), tx_places.shape[1], rx_places.shape[1], len(grid_hz))
-    out = np.ones(shape, dtype=np.complex128)
+    out = np.ones(shape, dtype=np.complex64)
     some = paths.select(shaded)
     before, after, tx_turn, rx_turn = (line[shaded] for line in lines)
     tx = np.ascontiguousarray(tx_places[some.tx] - some.vertices[:, :1])
@@ -239,7 +239,7 @@ def _times(out: np.ndarray, change: np.ndarray, weights: np.ndarray) -> None:
     """Multiplies factors into `out`, by the polynomials through them where there are any.
 
     Args:
-        out: Changed, complex128, shape (tx, rx, grid).
+        out: Changed, complex64, shape (tx, rx, grid).
         change: Factors less 1, real and imaginary, shape (2, node, tx · rx).
         weights: What the grid takes of each node, shape (node, grid); none where the nodes are
             the grid.

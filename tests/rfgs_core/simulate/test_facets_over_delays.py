@@ -63,7 +63,7 @@ def _spread(points, normals, areas, tx, rx, grid) -> np.ndarray:
         np.zeros(1, dtype=np.int64),
         cells,
     )
-    channel = to_subcarriers(grid, cells[0, :, 0] + 1j * cells[0, :, 1])
+    channel = to_subcarriers(grid, cells[0])
     return channel.T.reshape(len(tx), len(rx), -1)
 
 

@@ -14,9 +14,8 @@ from rfgs_core.seeds import sub_seed
 
 #: Components of the shape that bone lengths tell.
 _SHAPE = 3
-#: σ of a joint that pulls at a body with weight 1 [m]: twice that of `articulated.fit_pose`, for
-#: what radio tells of a joint is a mean over what bodies do already.
-_SUREST_M = 0.01
+#: σ of a joint that pulls at a body with weight 1 [m]; see `articulated.fit_pose`.
+_SUREST_M = 0.005
 #: Joints that are this unsure tell half of a person's shape [m]: means of what is not known lie
 #: nearer to each other than joints do, and would make everybody small.
 _HALF_SURE_M = 0.02

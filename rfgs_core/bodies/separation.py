@@ -95,6 +95,7 @@ def each_alone_posed(
     points: Float64[np.ndarray, "M 3"],
     normals: Float64[np.ndarray, "M 3"],
     body: Int64[np.ndarray, "M"],
+    count: int,
     config: TrainConfig,
 ) -> list[Observations]:
     """The frame once for each body, without the echoes of all others, whose poses are known.
@@ -104,9 +105,10 @@ def each_alone_posed(
         points: Places on the skins [m].
         normals: Where these face.
         body: Whose skin each is on, counted from 0.
+        count: How many bodies there are.
         config: How reflectivities are fitted.
     """
-    echoes = _echoes_of(observations, points, normals, body, config, POSED_STEPS)
+    echoes = _echoes_of(observations, points, normals, body, count, config, POSED_STEPS)
     others = echoes.sum(axis=0) - echoes
     return [_without(observations, part) for part in others]
 
@@ -165,7 +167,7 @@ def _echoes(
     points = density.draw(GAUSSIANS_PER_BODY * len(bodies), rng)
     body = nearest_axis(points, bodies.axes_xy)
     normals = outward_normals(points, bodies)
-    return _echoes_of(observations, points, normals, body, config, SOLVER_STEPS)
+    return _echoes_of(observations, points, normals, body, len(bodies), config, SOLVER_STEPS)
 
 
 def _echoes_of(
@@ -173,10 +175,11 @@ def _echoes_of(
     points: Float64[np.ndarray, "M 3"],
     normals: Float64[np.ndarray, "M 3"],
     body: Int64[np.ndarray, "M"],
+    count: int,
     config: TrainConfig,
     steps: int,
 ) -> Complex64[np.ndarray, "body tx rx subcarrier"]:
-    """The same by Gaussians at given places, facing given ways, each of one body."""
+    """The same by Gaussians at given places, facing given ways, each of one of `count` bodies."""
     gaussians = gaussians_at(points, normals)
     power = fit_power(observations, gaussians)
     head = new_head(observations, config, power)
@@ -186,7 +189,7 @@ def _echoes_of(
     gamma = posterior_mean(channel, head, gaussians, target, noise, power, steps)
     echoes = []
     with torch.no_grad():
-        for index in range(int(body.max()) + 1):
+        for index in range(count):
             own = torch.from_numpy(body == index)
             part = channel.scattered(head, gaussians.select(own), gamma[own])
             echoes.append(observations.with_entries(part.numpy()).delta)

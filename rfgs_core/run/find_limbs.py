@@ -228,10 +228,12 @@ def _without_others(
     seen: list[Observations], joints: Joints, config: TrainConfig, on_frame: Callable[[], Any]
 ) -> list[list[Observations]]:
     """Each frame once for each person, without the echoes of the others in their poses."""
-    posed, alone = PosedPeople.through(joints), []
+    posed, count, alone = PosedPeople.through(joints), joints.xyz.shape[1], []
     for frame, observations in enumerate(seen):
-        skin = posed.gaussians(frame, GAUSSIANS_PER_BODY * joints.xyz.shape[1], config.seed)
-        alone.append(each_alone_posed(observations, skin.points, skin.normals, skin.body, config))
+        skin = posed.gaussians(frame, GAUSSIANS_PER_BODY * count, config.seed)
+        alone.append(
+            each_alone_posed(observations, skin.points, skin.normals, skin.body, count, config)
+        )
         on_frame()
     return alone
 

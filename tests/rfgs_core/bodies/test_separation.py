@@ -11,7 +11,7 @@ import pytest
 from lit_bodies import lit
 
 from rfgs_core.bodies.localise import locate_bodies, pair_maps
-from rfgs_core.bodies.separation import separated
+from rfgs_core.bodies.separation import each_alone, separated
 from rfgs_core.measure.observations import Observations
 from rfgs_core.radio import preset
 from rfgs_core.settings import TrainConfig
@@ -53,6 +53,15 @@ def test_bodies_keep_their_order_and_their_reach(seen: Observations) -> None:
     together = locate_bodies(maps, ROOM_M, 2, near, reach_m)
     apart = separated(seen, maps, together, config, 0, near, reach_m)
     assert np.linalg.norm(apart - np.array(BODIES)[::-1], axis=1).max() < 0.1
+
+
+def test_a_body_without_gaussians_takes_nothing_off(seen: Observations) -> None:
+    """At one place twice, all of them are the first one's."""
+    places = np.array(BODIES[:1] * 2)
+    alone = each_alone(seen, pair_maps(seen), places, TrainConfig(bodies=2), 0)
+    assert len(alone) == 2
+    np.testing.assert_array_equal(alone[0].delta, seen.delta)
+    assert np.linalg.norm(alone[1].delta) < np.linalg.norm(seen.delta)
 
 
 @pytest.mark.parametrize("change", ["one body", "no phases"])

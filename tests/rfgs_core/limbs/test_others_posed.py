@@ -49,7 +49,7 @@ def test_less_is_left_of_people_who_are_posed(
             normals.append(skin[1][drawn])
         body = np.repeat([0, 1], ON_EACH)
         alone = each_alone_posed(
-            both, np.concatenate(points), np.concatenate(normals), body, config
+            both, np.concatenate(points), np.concatenate(normals), body, 2, config
         )
         return left(alone)
 

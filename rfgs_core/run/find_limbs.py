@@ -96,7 +96,7 @@ def find_limbs(
     if trained is not None:
         said = _by_network(trained, alone, tracks)
         if only_people and len(said) > 1:
-            said = _posed_apart(trained, seen, said, tracks, config, on_frame)
+            said = _asked_anew(trained, seen, said, tracks, config, on_frame)
         told = [
             other if one is None else of_walk_and_network(one, other)
             for one, other in zip(told, said, strict=True)
@@ -209,7 +209,7 @@ def _by_network(
     return found
 
 
-def _posed_apart(
+def _asked_anew(
     trained: Trained,
     seen: list[Observations],
     said: list[Joints],

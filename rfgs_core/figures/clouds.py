@@ -41,11 +41,12 @@ _AMBIENT = 0.45
 _FINER = 3
 
 
-def camera_on(points: Float[np.ndarray, "n 3"]) -> Camera:
+def camera_on(points: Float[np.ndarray, "n 3"], margin: float = MARGIN) -> Camera:
     """A camera that has all points in view and looks across the way that they spread.
 
     Args:
         points: Points of the true surface in all frames [m].
+        margin: Share of the picture that is left free around them.
     """
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
     flat = points[:, :2] - points[:, :2].mean(axis=0)
@@ -61,7 +62,7 @@ def camera_on(points: Float[np.ndarray, "n 3"]) -> Camera:
     right = np.array([-math.sin(azimuth), math.cos(azimuth), 0.0])
     axes = np.stack([right, np.cross(back, right), back], axis=1)
     local = (points - centre) @ axes
-    tangent = math.tan(FIELD_OF_VIEW / 2.0) * (1.0 - MARGIN)
+    tangent = math.tan(FIELD_OF_VIEW / 2.0) * (1.0 - margin)
     # Near enough that the point that needs most room still fits.
     distance_m = float((np.abs(local[:, :2]).max(axis=1) / tangent + local[:, 2]).max())
     pose = np.eye(4)
@@ -71,7 +72,7 @@ def camera_on(points: Float[np.ndarray, "n 3"]) -> Camera:
     width, height = (
         (SIDE_PX, round(SIDE_PX / ratio)) if ratio > 1.0 else (round(SIDE_PX * ratio), SIDE_PX)
     )
-    focal = (1.0 - MARGIN) * min(0.5 * width / slopes[0], 0.5 * height / slopes[1])
+    focal = (1.0 - margin) * min(0.5 * width / slopes[0], 0.5 * height / slopes[1])
     return Camera("gallery", width, height, focal, focal, width / 2, height / 2, pose)
 
 

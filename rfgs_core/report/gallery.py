@@ -5,82 +5,35 @@ from __future__ import annotations
 
 import contextlib
 import io
-import math
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from jaxtyping import Float64
 from PIL import Image
 
 from rfgs_core.dataset import Sequence, open_dataset
 from rfgs_core.errors import RfgsError
-from rfgs_core.evaluate.baselines import BASELINES, phase_free
-from rfgs_core.evaluate.geometry import reference_points, spanned
 from rfgs_core.evaluate.provenance import hardware, now, versions
-from rfgs_core.evaluate.scene import EvaluatedRun, Scene
-from rfgs_core.figures.clouds import FARTHEST_M, as_gaussians, camera_on, draw, floor_of
+from rfgs_core.evaluate.scene import EvaluatedRun
+from rfgs_core.figures.clouds import FARTHEST_M
 from rfgs_core.figures.style import bytes_uri, picture_uri, power_colours
 from rfgs_core.files import write_text
-from rfgs_core.gaussians.model import Gaussians
-from rfgs_core.render.cameras import Camera
 from rfgs_core.render.view import moving_gaussians
 from rfgs_core.report.cards import in_words
 from rfgs_core.report.page import Panel, Tile, Verdict, gallery_page, pairs
+from rfgs_core.report.stage import Stage, points_of, staged
 from rfgs_core.report.tables import show
-from rfgs_core.seeds import sub_seed
 from rfgs_core.study.gallery import ranked_baselines
 
 #: Quality of the pictures and of their edges. More effort saves a twentieth in a hundred times the
 #: time.
 _ENCODING = {"quality": 70, "alpha_quality": 60, "method": 4}
-#: Points of a drawn surface per square metre, and at most.
-_POINTS_PER_M2, _MOST_POINTS = 12_000, 150_000
-#: Of what moves, every so many points tell where the camera stands.
-_THINNED = 20
 #: F-scores below a picture.
 _SHOWN = (("F10", "f10"), ("F5", "f05"))
 #: Instances by class: one, several.
 _WORDS = {"person": ("one person", "people"), "vehicle": ("one vehicle", "vehicles")}
-
-
-class _Stage(NamedTuple):
-    """What all pictures of a scene share."""
-
-    sequence: Sequence
-    surfaces: dict[int, Float64[np.ndarray, "n 3"]]
-    """Points of the true surface of each frame, those that scores are told from [m]."""
-    camera: Camera
-    floor: Image.Image
-
-    def picture(
-        self,
-        gaussians: Gaussians,
-        frame: int,
-        surface: Float64[np.ndarray, "n 3"] | None = None,
-    ) -> str:
-        """One frame of a panel, coloured by the distance to the frame's surface or to another."""
-        stream = io.BytesIO()
-        near = self.surfaces[frame] if surface is None else surface
-        drawn = draw(gaussians, near, self.camera, self.floor)
-        drawn.save(stream, format="WEBP", **_ENCODING)
-        return bytes_uri(stream.getvalue(), "webp")
-
-    def truth(self) -> Panel:
-        """The true surface."""
-        pictures = []
-        for frame, surface in self.surfaces.items():
-            vertices, faces, _ = self.sequence.moving_mesh(frame)
-            area_m2 = 0.5 * float(spanned(vertices, faces)[2].sum())
-            # Vehicles take more points than scores do, until they look as smooth as people.
-            count = min(max(len(surface), round(_POINTS_PER_M2 * area_m2)), _MOST_POINTS)
-            points = reference_points(vertices, faces, count)
-            # Points at random have gaps, which twice the even spacing closes.
-            spacing_m = 2.0 * math.sqrt(area_m2 / count)
-            pictures.append(self.picture(as_gaussians(points, spacing_m), frame, points))
-        return Panel("true surface", "the true surface of what moves", pictures)
 
 
 def tile_of(run: EvaluatedRun, methods: Mapping[str, Any]) -> Tile:
@@ -90,24 +43,27 @@ def tile_of(run: EvaluatedRun, methods: Mapping[str, Any]) -> Tile:
         run: The run of our Gaussians.
         methods: Groups of metrics of `rfgs` and of every baseline.
     """
-    sequence, stage = run.sequence, _staged(run.sequence)
+    sequence, stage = run.sequence, staged(run.sequence)
     others = ranked_baselines(methods)
     baseline = next(iter(others), None)
     ours = Panel(
         "RF-GS",
         "our Gaussians, fitted to radio alone",
-        [stage.picture(moving_gaussians(run, frame), frame) for frame in run.frames],
+        [_picture(stage.drawn(moving_gaussians(run, frame), frame)) for frame in run.frames],
         _scores(methods["rfgs"]),
     )
     theirs = Panel("no baseline", "no baseline finds any of it", [])
     if baseline is not None:
         title = f"strongest of {len(others)} baselines: {in_words(baseline)}"
-        theirs = Panel(title, title, _voxels(run, baseline, stage), _scores(methods[baseline]))
+        pictures = [
+            _picture(stage.voxels(points_of(run, frame, baseline), frame)) for frame in run.frames
+        ]
+        theirs = Panel(title, title, pictures, _scores(methods[baseline]))
     return Tile(
         anchor=sequence.info.scene,
         title=_titled(sequence.info.scene),
         about=_about(sequence, str(run.config.radio)),
-        panels=[stage.truth(), ours, theirs],
+        panels=[_truth(stage), ours, theirs],
         frames=run.frames,
         time_s=[sequence.time_s(frame) for frame in run.frames],
         verdict=_verdict(methods, baseline),
@@ -128,7 +84,7 @@ def tile_without_run(scene: str, radio: str, data: Path, why: str) -> Tile:
     with contextlib.suppress(RfgsError):
         sequence = open_dataset(data).sequence()
         about = _about(sequence, radio)
-        panels = [_staged(sequence).truth(), Panel("RF-GS", "no answer", [])]
+        panels = [_truth(staged(sequence)), Panel("RF-GS", "no answer", [])]
         frames = sequence.frames
         times_s = [sequence.time_s(frame) for frame in frames]
     return Tile(
@@ -158,30 +114,17 @@ def write_gallery(path: Path, tiles: list[Tile], command: str) -> None:
     write_text(path, gallery_page(tiles, lead, legend, provenance))
 
 
-def _staged(sequence: Sequence) -> _Stage:
-    """The true surfaces of all frames, and a camera that sees them.
-
-    Raises:
-        RfgsError: Nothing that moves has a surface.
-    """
-    surfaces = {}
-    for frame in sequence.frames:
-        vertices, faces, _ = sequence.moving_mesh(frame)
-        seed = sub_seed(0, "reference", frame)
-        surfaces[frame] = reference_points(vertices, faces, seed=seed)
-    camera = camera_on(np.concatenate([points[::_THINNED] for points in surfaces.values()]))
-    return _Stage(sequence, surfaces, camera, floor_of(sequence.bounds_m, camera))
+def _truth(stage: Stage) -> Panel:
+    """The true surface, frame by frame."""
+    pictures = [_picture(stage.truth(frame)) for frame in stage.surfaces]
+    return Panel("true surface", "the true surface of what moves", pictures)
 
 
-def _voxels(run: EvaluatedRun, baseline: str, stage: _Stage) -> list[str]:
-    """The voxels that a baseline is scored by, frame by frame."""
-    scene, pictures = Scene.of(run), []
-    for frame in run.frames:
-        evidence = scene.evidence(frame, scene.score(frame))
-        score = phase_free.answer(baseline, BASELINES[baseline], evidence, scene.observe).score
-        points = np.zeros((0, 3)) if score is None else scene.predicted(score)
-        pictures.append(stage.picture(as_gaussians(points, scene.grid.voxel_m), frame))
-    return pictures
+def _picture(drawn: Image.Image) -> str:
+    """One frame of a panel."""
+    stream = io.BytesIO()
+    drawn.save(stream, format="WEBP", **_ENCODING)
+    return bytes_uri(stream.getvalue(), "webp")
 
 
 def _scores(groups: Mapping[str, Any]) -> str:

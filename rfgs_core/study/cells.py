@@ -18,7 +18,7 @@ from rfgs_core.evaluate.field_run import FieldRun, Given, fit_fields
 from rfgs_core.evaluate.metrics import METHOD, evaluate_method, evaluate_run
 from rfgs_core.evaluate.provenance import hardware, now, versions
 from rfgs_core.evaluate.residual import GAUSSIANS_ALONE
-from rfgs_core.evaluate.scene import EvaluatedRun
+from rfgs_core.evaluate.scene import EvaluatedRun, Scene
 from rfgs_core.frames import parse_frames
 from rfgs_core.links import refuse_link
 from rfgs_core.measure.observations import observe
@@ -63,6 +63,7 @@ class _Made(Struct):
     train_s: float
     gaussians: int | None = None
     render_fps: float | None = None
+    voxels: list[tuple[float, float, float]] | None = None
 
 
 def stored(cell: Cell, out: Path, size: Size) -> dict[str, Any] | None:
@@ -185,11 +186,19 @@ def make(cell: Cell, out: Path, size: Size, device: Device = "cpu") -> dict[str,
 
 
 def _rendering(run: EvaluatedRun) -> dict[str, Any]:
-    """How many moving Gaussians the first frame has, and how fast it is drawn."""
+    """How many moving Gaussians the first frame has, and how fast it is drawn.
+
+    Of a neural field also the voxels that this frame is scored by [m]: no run of it is kept.
+    """
     if not isinstance(run, Run) or (isinstance(run, FieldRun) and not run.readouts):
         return {}
-    gaussians = run.moving(run.frames[0])
-    return {"gaussians": len(gaussians), "render_fps": frames_per_second(gaussians)}
+    first = run.frames[0]
+    gaussians = run.moving(first)
+    told = {"gaussians": len(gaussians), "render_fps": frames_per_second(gaussians)}
+    if not isinstance(run, FieldRun):
+        return told
+    scene = Scene.of(run)
+    return {**told, "voxels": scene.predicted(scene.score(first)).round(3).tolist()}
 
 
 def _trained(

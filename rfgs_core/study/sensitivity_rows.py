@@ -23,7 +23,7 @@ TITLES = {
     "walls": "material of the room",
 }
 #: Ours, and baselines that know of bodies.
-_OF_BODIES = ("rfgs", GAUSSIANS_ALONE, "body_prior", "template", "template_filled")
+OF_BODIES = ("rfgs", GAUSSIANS_ALONE, "body_prior", "template", "template_filled")
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ def _row(sweep: str, setting: str, found: Mapping[str, Any]) -> SweepRow:
     methods = found.get("methods", {})
     f10 = {name: groups["geometry"].get("f10") for name, groups in methods.items()}
     blind = {
-        name: value for name, value in f10.items() if value is not None and name not in _OF_BODIES
+        name: value for name, value in f10.items() if value is not None and name not in OF_BODIES
     }
     best = max(blind, key=lambda name: blind[name], default="")
     ours = methods.get("rfgs", {"geometry": {}, "rf": {}})

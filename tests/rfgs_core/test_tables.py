@@ -131,7 +131,7 @@ def everybody_stands(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
         study.cells,
         "train_config",
-        lambda cell, size: replace(whole(cell, size), posture="standing", num_gaussians=200),
+        lambda cell, size: replace(whole(cell, size), posture="standing", num_gaussians=200, limbs="off"),
     )
 
 

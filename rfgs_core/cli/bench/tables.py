@@ -49,7 +49,7 @@ class PaperTable:
     """Also write the rows to this file."""
 
     def run(self) -> int:
-        """Makes what is missing, prints the table and writes OUT/NAME.md.
+        """Makes what is missing, prints the table and writes OUT/NAME.md and OUT/NAME.png.
 
         Returns:
             0 when the table holds all cells, else 1.
@@ -58,6 +58,7 @@ class PaperTable:
             RfgsError: An option is out of range, or there are no workers.
         """
         from rfgs_core.device import need_device
+        from rfgs_core.report.strip import write_strip
         from rfgs_core.study.cell_rows import method_rows, method_table
         from rfgs_core.study.cells import stored
         from rfgs_core.study.paper_tables import SIZES, cells, narrowed
@@ -78,9 +79,9 @@ class PaperTable:
                 failed[cell.name] = failure
             else:
                 results[cell] = found
-            # In the order of the table, whoever was first.
-            rows = method_rows(results[one] for one in chosen if one in results)
+            rows = method_rows(_in_order(chosen, results).values())
             self._write(rows, failed, size)
+        write_strip(self.out / f"{self.name}.png", _in_order(chosen, results), self.out)
         sys.stdout.write(method_table(rows))
         for cell_name, why in failed.items():
             sys.stdout.write(f"failed, and in no row: {cell_name}: {why}\n")
@@ -100,6 +101,13 @@ class PaperTable:
             found = {"rows": [asdict(row) for row in rows], "failed": failed}
             about = {"size": self.size, **asdict(size)}
             write_json(self.json, {**about, **found, **hardware(), "date": now()})
+
+
+def _in_order(
+    chosen: Sequence[Cell], results: dict[Cell, dict[str, Any]]
+) -> dict[Cell, dict[str, Any]]:
+    """What there is in the order of the table, whoever was first."""
+    return {cell: results[cell] for cell in chosen if cell in results}
 
 
 def outcomes(

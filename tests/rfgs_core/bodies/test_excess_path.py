@@ -28,7 +28,7 @@ BODIES = [(1.5, 2.9), (3.4, 1.6)]
 
 @pytest.fixture
 def empty(make_observations: Callable[..., Observations]) -> Observations:
-    radio = replace(preset("wifi"), rx_rows=2, rx_cols=3, num_subcarriers=24)
+    radio = replace(preset("wifi"), rx_rows=2, rx_cols=2, num_subcarriers=24)
     return make_observations(radio=radio, bounds_m=ROOM_M)
 
 

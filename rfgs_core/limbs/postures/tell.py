@@ -28,7 +28,7 @@ from rfgs_core.seeds import sub_seed
 #: Guesses of each frame that are chosen from, and that its neighbours take up.
 KEPT, TAKEN = 60, 16
 #: Device pairs without which too many poses are as likely, and the lead that it takes [nat].
-FEWEST_PAIRS, LEAST_LEAD = 6, 20.0
+FEWEST_PAIRS, LEAST_LEAD = 6, 40.0
 #: Facets lie as close as for this wavelength [m]: guesses are many.
 _WAVELENGTH_M = 0.14
 #: A joint is known no better than this [m].

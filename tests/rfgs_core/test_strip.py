@@ -52,7 +52,9 @@ def test_there_is_a_panel_of_the_truth_of_ours_and_of_what_it_is_held_against(ta
     panels = list(panels_of(made, out))
     names = [panel.title.partition("\n")[0] for panel in panels]
     assert names[:3] == ["true surface", "RF-GS", "body prior"]
-    assert names[-2:] == ["fixed density", "RF-NeRF, features"] and "matched filter all sum" in names
+    assert (
+        names[-2:] == ["fixed density", "RF-NeRF, features"] and "matched filter all sum" in names
+    )
     own = made[Cell("living_room_walk", "wifi", "rfgs", 0)]["methods"]["rfgs"]["geometry"]
     assert panels[1].title.endswith(f"F5 {own['f05']:.2f}, F10 {own['f10']:.2f}")
     assert len({panel.picture.size for panel in panels}) == 1

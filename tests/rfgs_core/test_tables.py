@@ -131,7 +131,9 @@ def everybody_stands(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
         study.cells,
         "train_config",
-        lambda cell, size: replace(whole(cell, size), posture="standing", num_gaussians=200, limbs="off"),
+        lambda cell, size: replace(
+            whole(cell, size), posture="standing", num_gaussians=200, limbs="off"
+        ),
     )
 
 
@@ -212,6 +214,7 @@ def test_a_table_may_be_narrowed_to_what_it_has() -> None:
         ("--seeds 0", "--seeds 0: expected at least 1"),
         ("--methods 3dgs", "--methods 3dgs: expected some of rfgs, rfgs_no_limbs"),
         ("--workers 0", "--workers 0: expected 1 to 256"),
+        ("--frames 10-40", "10-40"),
         ("--device cuda", "cuda"),
     ],
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
@@ -38,6 +38,9 @@ class PaperTable:
     """Trainings of each method; left out: what the size has."""
     scenes: tuple[str, ...] = ()
     """Which of the twelve scenes; left out: those of the size."""
+    frames: str | None = None
+    """Which frames of each scene, as in 10 or 10:55:15; left out: those of the size. A folder has
+    datasets of the same frames throughout."""
     radios: tuple[str, ...] = ()
     """Which radios; left out: those of the table."""
     methods: tuple[str, ...] = ()
@@ -58,6 +61,7 @@ class PaperTable:
             RfgsError: An option is out of range, or there are no workers.
         """
         from rfgs_core.device import need_device
+        from rfgs_core.frames import parse_frames
         from rfgs_core.report.strip import write_strip
         from rfgs_core.study.cell_rows import method_rows, method_table
         from rfgs_core.study.cells import stored
@@ -67,7 +71,11 @@ class PaperTable:
         need_device(self.device)
         need_folder(self.out)
         spread = self.spread.checked()
-        table, size = narrowed(self.name, SIZES[self.size], self.scenes, self.radios, self.methods)
+        size = SIZES[self.size]
+        if self.frames is not None:
+            parse_frames(self.frames)
+            size = replace(size, frames=self.frames)
+        table, size = narrowed(self.name, size, self.scenes, self.radios, self.methods)
         chosen = cells(table, size, self.seeds or size.seeds)
         results: dict[Cell, dict[str, Any]] = {}
         failed: dict[str, str] = {}

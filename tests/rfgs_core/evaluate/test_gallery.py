@@ -239,7 +239,9 @@ def tiny_scenes(tiny_dataset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(
         study.cells,
         "train_config",
-        lambda cell, size: replace(whole(cell, size), posture="standing", num_gaussians=200, limbs="off"),
+        lambda cell, size: replace(
+            whole(cell, size), posture="standing", num_gaussians=200, limbs="off"
+        ),
     )
     monkeypatch.setitem(EVERY_SCENE, "living_room_walk", StudyScene("1:2", radio="wifi"))
     shutil.copytree(tiny_dataset, tmp_path / "data/living_room_walk-wifi")

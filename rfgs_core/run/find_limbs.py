@@ -16,6 +16,8 @@ from rfgs_core.bodies.tracks import Tracks
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.fit.frame import followed
 from rfgs_core.limbs.evidence.tell import long_enough, looks, stands, tell
+from rfgs_core.limbs.evidence.track import course_of
+from rfgs_core.limbs.postures.chain import GOES_M_S
 from rfgs_core.limbs.postures.tell import can_tell
 from rfgs_core.limbs.postures.tell import looks as posture_looks
 from rfgs_core.limbs.postures.tell import tell as tell_posture
@@ -63,7 +65,8 @@ def find_limbs(
     """Follows people through a run's frames and poses them; what is kept is read.
 
     Evidence tells those of people who walk, or else whatever they do; the network tells those of
-    everybody: both together count where both tell. Where neither does for some, these stand.
+    everybody: both together count where both tell. Where neither does for some, these stand, and
+    so does everybody where neither does for any, if all of them go somewhere all the time.
     Frames of the sequence beside those of the run, near enough to smooth them, are read as well.
 
     Args:
@@ -101,6 +104,8 @@ def find_limbs(
             other if one is None else of_walk_and_network(one, other)
             for one, other in zip(told, said, strict=True)
         ]
+    if walks and not any(told):
+        told = _upright(alone, tracks)
     if not any(told):
         return None
     joints = _together(told, alone, tracks)
@@ -191,6 +196,22 @@ def _by_postures(
     axes_xy = np.array([track.axes_xy[0] for track in tracks])
     one = tell_posture([frame[0] for frame in alone], axes_xy, seed, on_frame)
     return [None if one is None else one.joints]
+
+
+def _upright(alone: list[list[Observations]], tracks: list[Tracks]) -> list[Joints | None]:
+    """Bodies that stand, facing the way they go, where nobody stays; else nothing is known.
+
+    Who goes neither sits nor lies, and a body that stands is nearer to them than the prior.
+    """
+    time_s = np.array([track.time_s for track in tracks])
+    upright: list[Joints | None] = []
+    for body in range(len(alone[0])):
+        axes_xy = np.array([track.axes_xy[body] for track in tracks])
+        heading, speed_m_s = course_of(axes_xy, time_s)
+        if speed_m_s.min() < GOES_M_S:
+            return [None] * len(alone[0])
+        upright.append(stands([frame[body] for frame in alone], axes_xy, heading))
+    return upright
 
 
 def _by_network(

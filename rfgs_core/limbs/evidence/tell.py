@@ -138,17 +138,23 @@ def tell(
     return found
 
 
-def stands(seen: list[Observations], axes_xy: Float[np.ndarray, "frame 2"]) -> Joints:
-    """Joints of somebody of whom no walk is told: a body that stands, facing the way of the places.
+def stands(
+    seen: list[Observations],
+    axes_xy: Float[np.ndarray, "frame 2"],
+    heading: Float64[np.ndarray, "frame"] | None = None,
+) -> Joints:
+    """Joints of somebody of whom no walk is told: a body that stands.
 
     Args:
         seen: Frames in the order of time.
         axes_xy: Where the person was found in each [m].
+        heading: Which way they face [rad]; None: the way of the places.
     """
     way = way_of(np.asarray(axes_xy, np.float64), np.array([one.time_s for one in seen]))
     body = people().body(np.zeros(0))
     own, floor_m = body.joints17(upright(body)), float(seen[0].bounds_m[0, 2])
-    turned = np.array([own @ about_z(heading).T for heading in way.heading])
+    facing = way.heading if heading is None else heading
+    turned = np.array([own @ about_z(one).T for one in facing])
     spots = np.column_stack([way.xy, np.full(len(way.xy), floor_m)])
     xyz = (turned + spots[:, None])[:, None]
     return Joints(xyz, np.full(xyz.shape[:3], _STANDING_M))

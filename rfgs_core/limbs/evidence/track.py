@@ -40,6 +40,19 @@ def way_of(places: Float[np.ndarray, "frame 2"], time_s: Float64[np.ndarray, "fr
     return Way(xy, heading, np.linalg.norm(velocity, axis=1))
 
 
+def course_of(
+    places: Float[np.ndarray, "frame 2"], time_s: Float64[np.ndarray, "frame"]
+) -> tuple[Float64[np.ndarray, "frame"], Float64[np.ndarray, "frame"]]:
+    """Which way somebody goes [rad] and how fast [m/s], by the places of the frames beside each.
+
+    Also where frames are so far apart in time that `way_of` takes each by itself.
+    """
+    if len(places) == 1:
+        return np.zeros(1), np.zeros(1)
+    velocity = np.gradient(np.asarray(places, np.float64), time_s, axis=0)
+    return np.arctan2(velocity[:, 1], velocity[:, 0]), np.linalg.norm(velocity, axis=1)
+
+
 def _fit(since_s: np.ndarray, places: np.ndarray, degree: int) -> np.ndarray:
     """Coefficients [degree + 1, 2] of polynomials through places."""
     return np.linalg.lstsq(since_s[:, None] ** np.arange(degree + 1), places, rcond=None)[0]

@@ -22,7 +22,7 @@ _SPEED_M_S, _APART_M = 0.8, 0.08
 _COST = 4.0
 #: Who is as fast as this or faster looks where they go [m/s], and what it costs to go backwards at
 #: twice the speed or more [nat].
-_GOES_M_S, _BACKWARDS = 0.3, 16.0
+GOES_M_S, _BACKWARDS = 0.3, 16.0
 #: Guesses within this of the path count as the same pose [m].
 _SAME_M = 0.2
 
@@ -59,7 +59,7 @@ def _astray(
     """What it costs to go from poses to others without looking there [nat]."""
     way = other[None, :, 0, :2] - one[:, None, 0, :2]
     speed_m_s = np.linalg.norm(way, axis=2) / elapsed_s
-    goes = np.clip(speed_m_s / _GOES_M_S - 1.0, 0.0, 1.0)
+    goes = np.clip(speed_m_s / GOES_M_S - 1.0, 0.0, 1.0)
     ahead = np.arctan2(way[..., 1], way[..., 0])
     off = (np.cos(ahead - headings_of(one)[:, None]) + np.cos(ahead - headings_of(other))) / 2.0
     return _BACKWARDS * goes * (1.0 - off) / 2.0

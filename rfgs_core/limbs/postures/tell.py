@@ -3,7 +3,7 @@
 
 Every frame breeds guesses by itself, then takes up the best of the frames beside it and breeds
 these. It is told only if device pairs that had no say in choosing prefer what was chosen to
-somebody who stands there.
+somebody who stands there; if they hardly do, only which way somebody faces is.
 """
 
 from __future__ import annotations
@@ -12,14 +12,17 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Float64
 
 from rfgs_core.articulated import people
 from rfgs_core.encode.body_maps import views_of
 from rfgs_core.limbs.evidence.body import figure_of
+from rfgs_core.limbs.evidence.library import headings_of
 from rfgs_core.limbs.evidence.table import in_frames
+from rfgs_core.limbs.evidence.tell import stands
+from rfgs_core.limbs.evidence.track import course_of
 from rfgs_core.limbs.postures.book import PoseBook
-from rfgs_core.limbs.postures.chain import TEMPER, around, likeliest_path
+from rfgs_core.limbs.postures.chain import GOES_M_S, TEMPER, around, likeliest_path
 from rfgs_core.limbs.postures.search import LATER, FrameSearch, Guess, spread_out
 from rfgs_core.limbs.propose import Joints
 from rfgs_core.measure.observations import Observations
@@ -27,8 +30,13 @@ from rfgs_core.seeds import sub_seed
 
 #: Guesses of each frame that are chosen from, and that its neighbours take up.
 KEPT, TAKEN = 60, 16
-#: Device pairs without which too many poses are as likely, and the lead that it takes [nat].
-FEWEST_PAIRS, LEAST_LEAD = 6, 40.0
+#: Device pairs without which too many poses are as likely.
+FEWEST_PAIRS = 6
+#: The lead a frame that it takes for a heading, and for a pose: with less, joints are further off
+#: than a standing body's [nat].
+LEAST_LEAD, POSED_LEAD = 20.0, 40.0
+#: Whose hips are lower than this share of a standing body's does not stand.
+_UPRIGHT = 0.75
 #: Facets lie as close as for this wavelength [m]: guesses are many.
 _WAVELENGTH_M = 0.14
 #: A joint is known no better than this [m].
@@ -62,6 +70,9 @@ def tell(
 ) -> Told | None:
     """The likeliest poses of one person; None where they do not stand out from standing.
 
+    Where they hardly do, a body that stands, facing the way they go or are likeliest to face,
+    unless the likeliest poses are low.
+
     Args:
         seen: Frames in the order of time, without the echoes of anybody else.
         axes_xy: Where the person was found in each [m].
@@ -94,8 +105,25 @@ def tell(
     means, spreads = zip(*map(around, scores, joints, path.tolist()), strict=True)
     sigma = np.hypot(_SUREST_M, np.array(spreads))
     told = Joints(np.array(means)[:, None], sigma[:, None])
-    lead = float(np.mean([_lead(best, stands) for best, stands in found]))
-    return Told(told, lead) if lead > LEAST_LEAD else None
+    lead = float(np.mean([_lead(best, standing) for best, standing in found]))
+    if lead <= LEAST_LEAD:
+        return None
+    if lead > POSED_LEAD:
+        return Told(told, lead)
+    upright = stands(seen, axes_xy, _facing(told.xyz[:, 0], seen, axes_xy))
+    floor_m = float(seen[0].bounds_m[0, 2])
+    low = told.xyz[:, 0, 0, 2] - floor_m < _UPRIGHT * (upright.xyz[:, 0, 0, 2] - floor_m)
+    return None if low.any() else Told(upright, lead)
+
+
+def _facing(
+    joints: Float64[np.ndarray, "frame 17 3"],
+    seen: list[Observations],
+    axes_xy: Float[np.ndarray, "frame 2"],
+) -> Float64[np.ndarray, "frame"]:
+    """Which way somebody faces [rad]: where they go, or as their joints have it where they stay."""
+    heading, speed_m_s = course_of(axes_xy, np.array([one.time_s for one in seen]))
+    return np.where(speed_m_s >= GOES_M_S, heading, headings_of(joints))
 
 
 def _rng(seed: int, frame: int) -> np.random.Generator:

@@ -15,7 +15,7 @@ from rfgs_core.limbs.evidence import tell as telling
 from rfgs_core.limbs.evidence.follow import stood, walked
 from rfgs_core.limbs.evidence.library import PHASES, about_z, headings_of, strides, upright
 from rfgs_core.limbs.evidence.tell import best_walk, tell
-from rfgs_core.limbs.evidence.track import way_of
+from rfgs_core.limbs.evidence.track import course_of, way_of
 from rfgs_core.skeleton import JOINTS
 
 SHIFTS = np.array([[0.0, 0.0, 0.0], [0.04, 0.0, 0.0], [-0.04, 0.0, 0.0]])
@@ -52,6 +52,17 @@ def test_a_way_is_smooth_and_knows_where_it_leads() -> None:
     assert np.linalg.norm(way.xy - truth, axis=1).mean() < 0.035
     np.testing.assert_allclose(way.heading, np.arctan2(0.3, 0.8), atol=0.15)
     np.testing.assert_allclose(way.speed_m_s, np.hypot(0.8, 0.3), atol=0.12)
+
+
+def test_a_course_is_known_where_frames_are_seconds_apart() -> None:
+    time_s = np.array([0.0, 2.0, 5.0])
+    places = np.stack([-0.5 * time_s, 0.5 * time_s], axis=1)
+    # Too far apart for a way to be smoothed along it.
+    assert way_of(places, time_s).speed_m_s.max() == 0.0
+    heading, speed_m_s = course_of(places, time_s)
+    np.testing.assert_allclose(heading, 0.75 * np.pi)
+    np.testing.assert_allclose(speed_m_s, np.sqrt(0.5))
+    assert course_of(places[:1], time_s[:1])[1].tolist() == [0.0]
 
 
 def test_strides_start_with_the_left_foot_ahead_and_face_along_x() -> None:

@@ -18,6 +18,7 @@ from rfgs_core.limbs.postures.book import PoseBook, blend
 from rfgs_core.limbs.postures.chain import around, likeliest_path
 from rfgs_core.limbs.postures.search import FrameSearch, spread_out
 from rfgs_core.limbs.postures.tell import can_tell, tell
+from rfgs_core.limbs.propose import Joints
 from rfgs_core.worlds.motion import random_motion
 
 PLACE, HEADING = np.array([0.3, -0.2, 0.0]), 2.0
@@ -125,6 +126,45 @@ def test_who_stands_is_left_to_the_prior(heard, walker_body, small_book, monkeyp
     monkeypatch.setattr(PoseBook, "of", lambda *_: small_book)
     seen = [heard(upright(walker_body), HEADING, PLACE)]
     assert tell(seen, PLACE[None, :2]) is None
+
+
+def test_of_who_hardly_stands_out_only_the_heading_is_told(
+    heard, walker_body, body, small_book, monkeypatch
+) -> None:
+    few = ((8, 3, 0.2, 0.04),)
+    monkeypatch.setattr(searching, "DRAWN", 40)
+    monkeypatch.setattr(FrameSearch.bred, "__defaults__", (few,))
+    monkeypatch.setattr(telling, "LATER", few)
+    monkeypatch.setattr(PoseBook, "of", lambda *_: small_book)
+    one = heard(upright(walker_body), HEADING, PLACE)
+    seen, own = [one, replace(one, time_s=one.time_s + 1.0)], body.joints17(upright(body))
+
+    def said(lead: float, step_m: float) -> Joints | None:
+        monkeypatch.setattr(telling, "_lead", lambda *_: lead)
+        places = PLACE[:2] + np.array([[0.0, 0.5], [0.0, -0.5]]) * step_m
+        told = tell(seen, places, 3)
+        return None if told is None else told.joints
+
+    posed, stands, goes = said(50.0, 0.0), said(30.0, 0.0), said(30.0, 0.35)
+    assert said(10.0, 0.0) is None
+    assert posed is not None and stands is not None and goes is not None
+    for one in (stands, goes):
+        np.testing.assert_allclose(one.xyz[:, 0, :, 2], np.tile(own[:, 2], (2, 1)), atol=1e-9)
+    assert np.abs(posed.xyz[:, 0, :, 2] - own[:, 2]).max() > 0.01
+    # Who stays faces as the poses do, and who goes, where they go.
+    off = headings_of(stands.xyz[:, 0]) - headings_of(posed.xyz[:, 0])
+    np.testing.assert_allclose(np.cos(off), 1.0, atol=1e-6)
+    np.testing.assert_allclose(np.cos(headings_of(goes.xyz[:, 0]) + 0.5 * np.pi), 1.0, atol=1e-6)
+
+
+def test_who_is_low_does_not_stand(heard, seated, small_book, monkeypatch) -> None:
+    few = ((24, 3, 0.26, 0.06), (12, 4, 0.12, 0.03))
+    monkeypatch.setattr(searching, "DRAWN", 120)
+    monkeypatch.setattr(FrameSearch.bred, "__defaults__", (few,))
+    monkeypatch.setattr(telling, "LATER", few[1:])
+    monkeypatch.setattr(PoseBook, "of", lambda *_: small_book)
+    monkeypatch.setattr(telling, "_lead", lambda *_: 30.0)
+    assert tell([heard(seated, HEADING, PLACE)], PLACE[None, :2], 3) is None
 
 
 def test_one_radar_is_too_few(heard, seated) -> None:

@@ -19,6 +19,7 @@ from rfgs_core.dataset import open_dataset
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.files import read_json
 from rfgs_core.limbs import weights
+from rfgs_core.limbs.evidence.library import headings_of
 from rfgs_core.limbs.evidence.tell import Told
 from rfgs_core.limbs.network import LimbNetwork
 from rfgs_core.limbs.postures.tell import Told as Posture
@@ -49,6 +50,11 @@ def saying(low_m: float, sigma_m: float) -> LimbNetwork:
         said = np.concatenate([upright / 0.3, np.full((17, 1), np.log(sigma_m))], axis=1)
         last.bias[:] = torch.from_numpy(said.ravel()).float()
     return made
+
+
+def stays(places: np.ndarray, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The course of somebody who goes nowhere."""
+    return np.zeros(len(places)), np.zeros(len(places))
 
 
 @pytest.fixture
@@ -153,6 +159,7 @@ def test_without_a_network_evidence_tells_who_walks(
     monkeypatch.setattr(limbs_of_run, "long_enough", lambda time_s: True)
     monkeypatch.setattr(limbs_of_run, "tell", tell)
     monkeypatch.setattr(limbs_of_run, "tell_posture", lambda *_: None)
+    monkeypatch.setattr(limbs_of_run, "course_of", stays)
     limbs = read_limbs(train(tiny_dataset, tmp_path / "run", CONFIG).path)
     assert asked and asked[0] >= 2
     assert (limbs is not None) == told
@@ -186,6 +193,7 @@ def test_who_does_not_walk_may_do_something_else(
     monkeypatch.setattr(limbs_of_run, "tell", lambda *_: None)
     monkeypatch.setattr(limbs_of_run, "can_tell", lambda _: True)
     monkeypatch.setattr(limbs_of_run, "tell_posture", tell_posture)
+    monkeypatch.setattr(limbs_of_run, "course_of", stays)
     limbs = read_limbs(train(tiny_dataset, tmp_path / "run", CONFIG).path)
     assert asked == 1 and (limbs is not None) == told
     if limbs is not None:
@@ -254,6 +262,27 @@ def test_of_two_people_one_walks_and_the_other_stands(
     )
     found = np.array([track.axes_xy[1] for track in limbs.tracks])
     assert np.linalg.norm(limbs.joints.xyz[:, 1, 0, :2] - found, axis=1).max() < 0.1
+
+
+@pytest.mark.parametrize("speed_m_s", [1.0, 0.1])
+def test_of_whom_nothing_is_told_stands_facing_the_way_if_everybody_goes(
+    speed_m_s: float, train, tiny_dataset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def course(places: np.ndarray, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return np.full(len(places), 2.0), np.full(len(places), speed_m_s)
+
+    monkeypatch.setattr(weights, "OWN", tmp_path / "none")
+    monkeypatch.setattr(limbs_of_run, "long_enough", lambda time_s: True)
+    monkeypatch.setattr(limbs_of_run, "tell", lambda *_: None)
+    monkeypatch.setattr(limbs_of_run, "can_tell", lambda _: False)
+    monkeypatch.setattr(limbs_of_run, "course_of", course)
+    limbs = read_limbs(train(tiny_dataset, tmp_path / "run", CONFIG).path)
+    assert (limbs is not None) == (speed_m_s > 0.5)
+    if limbs is not None:
+        np.testing.assert_allclose(np.cos(headings_of(limbs.joints.xyz[:, 0]) - 2.0), 1.0)
+        found = np.array([track.axes_xy[0] for track in limbs.tracks])
+        assert np.linalg.norm(limbs.joints.xyz[:, 0, 0, :2] - found, axis=1).max() < 0.1
+        assert (limbs.joints.sigma_m > 0.1).all()
 
 
 def test_two_frames_are_too_short_a_walk_for_evidence(

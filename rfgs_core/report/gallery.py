@@ -16,7 +16,7 @@ from PIL import Image
 from rfgs_core.dataset import Sequence, open_dataset
 from rfgs_core.errors import RfgsError
 from rfgs_core.evaluate.provenance import hardware, now, versions
-from rfgs_core.evaluate.scene import EvaluatedRun
+from rfgs_core.evaluate.scene import EvaluatedRun, Scene
 from rfgs_core.figures.clouds import FARTHEST_M
 from rfgs_core.figures.style import bytes_uri, picture_uri, power_colours
 from rfgs_core.files import write_text
@@ -55,8 +55,9 @@ def tile_of(run: EvaluatedRun, methods: Mapping[str, Any]) -> Tile:
     theirs = Panel("no baseline", "no baseline finds any of it", [])
     if baseline is not None:
         title = f"strongest of {len(others)} baselines: {in_words(baseline)}"
+        scene = Scene.of(run)
         pictures = [
-            _picture(stage.voxels(points_of(run, frame, baseline), frame)) for frame in run.frames
+            _picture(stage.voxels(points_of(scene, frame, baseline), frame)) for frame in run.frames
         ]
         theirs = Panel(title, title, pictures, _scores(methods[baseline]))
     return Tile(

@@ -15,7 +15,7 @@ from rfgs_core.dataset import Sequence
 from rfgs_core.evaluate.baselines import BASELINES, phase_free
 from rfgs_core.evaluate.geometry import reference_points, spanned
 from rfgs_core.evaluate.grid import Grid
-from rfgs_core.evaluate.scene import EvaluatedRun, Scene
+from rfgs_core.evaluate.scene import Scene
 from rfgs_core.figures.clouds import MARGIN, as_gaussians, camera_on, draw, floor_of
 from rfgs_core.gaussians.model import Gaussians
 from rfgs_core.render.cameras import Camera
@@ -67,11 +67,8 @@ class Stage(NamedTuple):
         return self.drawn(as_gaussians(points, voxel_m), frame)
 
 
-def points_of(
-    run: EvaluatedRun, frame: int, baseline: str | None = None
-) -> Float64[np.ndarray, "n 3"]:
+def points_of(scene: Scene, frame: int, baseline: str | None = None) -> Float64[np.ndarray, "n 3"]:
     """Centres of the voxels that a run is scored by, or a baseline that sees what it sees [m]."""
-    scene = Scene.of(run)
     score = scene.score(frame)
     if baseline is not None:
         evidence = scene.evidence(frame, score)

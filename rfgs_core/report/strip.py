@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from PIL import Image
 
+from rfgs_core.evaluate.scene import Scene
 from rfgs_core.figures.clouds import FARTHEST_M
 from rfgs_core.figures.style import new_figure, power_colours, write_picture
 from rfgs_core.report.stage import points_of, staged
@@ -87,12 +88,13 @@ def panels_of(cells: Mapping[Cell, Mapping[str, Any]], out: Path) -> Iterator[Sh
     stage = staged(sequence, [frame], _MARGIN)
     yield Shown("true surface\n", stage.truth(frame))
     for cell, found in cells.items():
-        points = points_of(runs[cell], frame) if cell in runs else _kept(cell, found)
+        scene = Scene.of(runs[cell]) if cell in runs else None
+        points = _kept(cell, found) if scene is None else points_of(scene, frame)
         if points is not None:
             yield _titled(cell.method, found["methods"], stage.voxels(points, frame))
-        if cell in runs and cell.method == "rfgs":
+        if scene is not None and cell.method == "rfgs":
             for name in _baselines(found["methods"]):
-                points = points_of(runs[cell], frame, name)
+                points = points_of(scene, frame, name)
                 yield _titled(name, found["methods"], stage.voxels(points, frame))
 
 

@@ -6,7 +6,9 @@ from __future__ import annotations
 import dataclasses
 import importlib.util
 import os
+import resource
 import shutil
+import sys
 from typing import Any, Literal, TypeVar, cast
 
 from rfgs_core.errors import MissingToolError
@@ -59,3 +61,13 @@ def finish_device() -> None:
 
     if torch.cuda.is_available():
         torch.cuda.synchronize()
+
+
+def most_held_gib(device: Device) -> float:
+    """The most memory that this process has held there [GiB]."""
+    if device == "cuda":
+        import torch
+
+        return torch.cuda.max_memory_allocated() / 2**30
+    unit = 1 if sys.platform == "darwin" else 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 2**30

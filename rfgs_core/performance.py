@@ -6,16 +6,12 @@ Every number of `docs/performance.md` is measured when the page is made, in one 
 
 from __future__ import annotations
 
-import resource
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import torch
-
 from rfgs_core.bench import PropagationBench, bench_propagation, hardware
-from rfgs_core.device import Device
+from rfgs_core.device import Device, most_held_gib
 from rfgs_core.render.bench import (
     Distant,
     Picture,
@@ -85,7 +81,7 @@ def measure(
     for count, distance_m in DISTANT if device == "cpu" else ():
         note(f"a picture of {count} Gaussians, {distance_m:g} m away")
         distant.append(time_distant(count, distance_m))
-    memory_gib = _peak_gib(device)
+    memory_gib = most_held_gib(device)
     return Performance(
         propagation=propagation,
         share=share,
@@ -270,11 +266,3 @@ def _growths(growths: Sequence[Growth]) -> str:
 def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     lines = [heads, ["---"] * len(heads), *rows]
     return "".join(f"| {' | '.join(row)} |\n" for row in lines)
-
-
-def _peak_gib(device: Device) -> float:
-    """The most memory that this process has held there [GiB]."""
-    if device == "cuda":
-        return torch.cuda.max_memory_allocated() / 2**30
-    unit = 1 if sys.platform == "darwin" else 1024
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 2**30

@@ -13,6 +13,7 @@ from torch import Tensor
 
 from rfgs_core.bench import CloudAndLinks, PropagationBench, cloud_and_links, fastest
 from rfgs_core.device import Device, on_device
+from rfgs_core.fit.nearest import nearest_gaussian, nearest_on_gpu
 from rfgs_core.gaussians.model import FEATURE_DIM, Gaussians
 from rfgs_core.propagation import Backend, Subcarriers, propagate
 from rfgs_core.render.bench import random_cloud
@@ -27,6 +28,8 @@ SIZES = ((1, 1, 1), (2, 3, 5), (129, 2, 33), (1000, 65, 61))
 PICTURES = ((1, 17), (300, 33), (2000, 96))
 #: So many, small in their picture, that hidden ones are left out.
 CROWD = (60_000, 17)
+#: Points, and Gaussians of which each one's nearest is looked for.
+NEAREST = ((1, 1), (33, 129), (5000, 20_001))
 #: The sizes at which speed is measured: large enough that a GPU does not wait for the CPU.
 SPEED: dict[Device, tuple[int, int, int]] = {
     "cpu": (20_000, 64, 64),
@@ -37,6 +40,8 @@ CHANNEL, GRADIENT = 1e-4, 1e-4
 #: The same of pictures and their gradients. On a GPU, drawn in float32, a contribution at the
 #: least that counts falls to either side of it, and gsplat stops earlier (`render.gpu`).
 PICTURE: dict[Device, float] = {"cpu": 1e-4, "cuda": 1e-3}
+#: The same of distances.
+NEAR = 1e-5
 #: Additions and multiplications of one Gaussian, link and subcarrier: one step of the recurrence
 #: (`propagation.kernels_scatter`) and two sums; on a GPU, where neighbours do not wait for each
 #: other, sine, cosine and exponential of each (`propagation.kernels_triton`).
@@ -94,6 +99,8 @@ def checks(device: Device) -> Iterator[Check]:
         yield from _pictures(*size, device)
     if device == "cpu":
         yield _crowd(*CROWD)
+    else:
+        yield from (_nearest(*size) for size in NEAREST)
 
 
 def _scene(gaussians: int, links: int, subcarriers: int) -> CloudAndLinks:
@@ -184,6 +191,15 @@ def _crowd(gaussians: int, edge_px: int) -> Check:
     found, exact = splat(cloud, rgb, camera), splat_plain(cloud, rgb, camera)
     worst = max(_relative(found.rgb, exact.rgb), _relative(found.alpha, exact.alpha))
     return Check(f"picture of a crowd, {gaussians} at {edge_px} px", worst, PICTURE["cpu"])
+
+
+def _nearest(points: int, gaussians: int) -> Check:
+    """Distances to the nearest Gaussians, beside the tree of the CPU."""
+    generator = torch.Generator().manual_seed(gaussians)
+    places, means = (torch.randn(count, 3, generator=generator) for count in (points, gaussians))
+    _, found = nearest_on_gpu(places.cuda(), means.cuda())
+    _, exact = nearest_gaussian(places, means)
+    return Check(f"nearest of {gaussians}, {points} points", _relative(found, exact), NEAR)
 
 
 def _drawn(

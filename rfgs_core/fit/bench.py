@@ -13,7 +13,7 @@ import torch
 from tqdm import tqdm
 
 from rfgs_core.dataset import open_dataset
-from rfgs_core.device import Device, finish_device, need_device
+from rfgs_core.device import Device, finish_device, most_held_gib, need_device
 from rfgs_core.errors import RfgsError
 from rfgs_core.fit.frame import FrameState, solved_frame
 from rfgs_core.fit.losses import channel_loss
@@ -62,7 +62,8 @@ def bench_training(
 
     Returns:
         `train_s` of the training whose last window stands still, or of the steps asked for, its
-        `start_s`, `steps`, `loss_start`, `loss_end`, `still`, and what was trained.
+        `start_s`, `steps`, `loss_start`, `loss_end`, `still`, the most memory that was held
+        [GiB], and what was trained.
 
     Raises:
         RfgsError: There is no such radio, frame or device.
@@ -105,6 +106,7 @@ def bench_training(
         "loss_start": losses[0],
         "loss_end": losses[-1],
         "still": still,
+        "memory_gib": most_held_gib(bench.device),
     }
 
 

@@ -5,19 +5,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
 import torch
 from jaxtyping import Float, Int64
-from scipy.spatial import KDTree
 from torch import Tensor
 
+from rfgs_core.fit.nearest import nearest_gaussian
 from rfgs_core.gaussians import Gaussians
 
 #: Weights λ1, λ2, λ3 of eq. 4 (paper section 3.4).
 POSITION_WEIGHT, FEATURE_WEIGHT, REGULARISATION_WEIGHT = 1.0, 0.1, 0.001
-
-#: Distances that are in memory at a time where no tree is used.
-MOST_DISTANCES = 1 << 26
 
 
 @dataclass(frozen=True)
@@ -32,39 +28,6 @@ class SamplePoints:
     def rows(self, chosen: Int64[Tensor, "batch"]) -> SamplePoints:
         """Some of the points."""
         return SamplePoints(self.xyz[chosen], self.features[chosen])
-
-
-def nearest_gaussian(
-    points: Float[Tensor, "N 3"], means: Float[Tensor, "M 3"]
-) -> tuple[Int64[Tensor, "N"], Float[Tensor, "N"]]:
-    """Index of and distance [m] to the Gaussian closest to each point."""
-    if means.device.type != "cpu":
-        return _nearest_in_batches(points, means.detach())
-    # Of a tree that few points ask, most of the time is its making: half as long unbalanced.
-    much = len(points) >= len(means)
-    tree = KDTree(means.detach().numpy(), compact_nodes=much, balanced_tree=much)
-    distance, index = tree.query(points.numpy())
-    return torch.from_numpy(np.asarray(index)), torch.from_numpy(np.asarray(distance)).float()
-
-
-def _nearest_in_batches(
-    points: Float[Tensor, "N 3"], means: Float[Tensor, "M 3"]
-) -> tuple[Int64[Tensor, "N"], Float[Tensor, "N"]]:
-    """Twin of the tree for a GPU: all distances, some points at a time."""
-    rows = max(1, MOST_DISTANCES // max(1, len(means)))
-    found = [_square_distances(part, means).min(dim=1) for part in points.split(rows)]
-    square = torch.cat([row.values for row in found])
-    return torch.cat([row.indices for row in found]), square.sqrt()
-
-
-def _square_distances(
-    points: Float[Tensor, "N 3"], means: Float[Tensor, "M 3"]
-) -> Float[Tensor, "N M"]:
-    """Axis by axis: |a|² + |b|² − 2ab loses millimetres, and a GPU's `cdist` is slow in 3D."""
-    total = (points[:, None, 0] - means[None, :, 0]) ** 2
-    for axis in (1, 2):
-        total += (points[:, None, axis] - means[None, :, axis]) ** 2
-    return total
 
 
 def position_loss(

@@ -13,7 +13,8 @@ from jaxtyping import Bool, Float
 from scipy.spatial import KDTree
 from torch import Tensor
 
-from rfgs_core.fit.losses import SamplePoints, nearest_gaussian
+from rfgs_core.fit.losses import SamplePoints
+from rfgs_core.fit.nearest import nearest_gaussian
 from rfgs_core.fit.parameters import TrainableGaussians
 from rfgs_core.model.first_gaussians import LONE_OPACITY, LONE_SCALE_M, lone_gaussians
 

@@ -12,7 +12,6 @@ from rfgs_core.fit.losses import (
     SamplePoints,
     channel_loss,
     feature_loss,
-    nearest_gaussian,
     paper_loss,
     position_loss,
     regularisation_loss,
@@ -42,12 +41,6 @@ def points() -> SamplePoints:
     features[0, 0], features[0, 1] = 3.0, 4.0
     features[1, 2] = 0.5
     return SamplePoints(torch.tensor([[1.0, 0, 0], [0, 2.0, 0], [7.0, 0, 0]]), features)
-
-
-def test_nearest_gaussian(gaussians: Gaussians, points: SamplePoints) -> None:
-    index, distance = nearest_gaussian(points.xyz, gaussians.means)
-    assert index.tolist() == [0, 0, 1]
-    assert distance.tolist() == [1.0, 2.0, 3.0]
 
 
 def test_equation_5(gaussians: Gaussians, points: SamplePoints) -> None:

@@ -12,10 +12,9 @@ import torch
 from rfgs_core.device import need_device, on_device
 from rfgs_core.encode import MATCHED_FILTER
 from rfgs_core.errors import MissingToolError
-from rfgs_core.fit import losses
+from rfgs_core.fit import nearest
 from rfgs_core.fit import refine as refine_module
 from rfgs_core.fit.frame import FrameState, solve_reflectivity
-from rfgs_core.fit.losses import nearest_gaussian
 from rfgs_core.fit.parameters import LearningRates, TrainableGaussians
 from rfgs_core.fit.refine import refine
 from rfgs_core.fit.task import Task
@@ -33,17 +32,6 @@ def test_a_gpu_that_is_not_there_is_named(monkeypatch) -> None:
     with pytest.raises(MissingToolError, match="needs a C compiler"):
         need_device("cuda")
     need_device("cpu")
-
-
-def test_the_nearest_gaussian_is_the_trees(monkeypatch) -> None:
-    generator = torch.Generator().manual_seed(0)
-    points, means = (torch.randn(count, 3, generator=generator) for count in (101, 57))
-    # Batches of two points, the last one of one.
-    monkeypatch.setattr(losses, "MOST_DISTANCES", 2 * 57)
-    index, distance = losses._nearest_in_batches(points, means)
-    expected, far = nearest_gaussian(points, means)
-    assert torch.equal(index, expected)
-    torch.testing.assert_close(distance, far)
 
 
 def test_kernels_of_the_gpu_descend_as_those_of_the_cpu(
@@ -74,6 +62,9 @@ def test_a_step_meets_no_tensor_of_another_device(
 ) -> None:
     """Tensors of the device `meta` hold nothing, but refuse to meet those of the CPU."""
     monkeypatch.setattr("rfgs_core.propagation._twin", lambda backend, device: reference)
+    monkeypatch.setattr(
+        nearest, "nearest_on_gpu", lambda points, means: torch.cdist(means, points).min(dim=0)[::-1]
+    )
     profile = np.abs(delay_amplitude(observations.static, observations.subcarriers))
     seen = replace(observations, kind=kind, delay_change=profile)
     config = replace(quick_config, objective="both")

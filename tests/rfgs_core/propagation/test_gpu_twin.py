@@ -109,21 +109,24 @@ import sys
 from triton.backends.compiler import GPUTarget
 from triton.compiler import ASTSource, compile
 from rfgs_core.propagation import kernels_triton as scattering, kernels_triton_shadow as shading
+from rfgs_core.fit import kernels_triton as searching
 from rfgs_core.worlds import kernels_triton as echoing
 
 double = ("means", "ends", "subcarrier", "legs")
 numbers = ("per_wave", "damping", "screen", "per_step", "per_range")
-counts = ("facets", "ranges", "last", "total", "links",
+counts = ("facets", "ranges", "last", "total", "links", "count",
           "chunks", "rows_out", "per_split", "legs_in", "legs_out")
 types = {**dict.fromkeys(double, "*fp64"), "group": "*i64", "sharpness": "fp32"}
 types |= dict.fromkeys(counts, "i32")
-sizes = ("ROWS", "SUBCARRIERS", "LEGS", "SCREENS", "SLOPES", "GRADIENTS", "BLOCK")
+sizes = ("ROWS", "SUBCARRIERS", "LEGS", "SCREENS", "SLOPES", "GRADIENTS", "BLOCK", "POINTS",
+         "COLUMNS")
 for room, kernel, own in (
     (scattering, scattering.scatter_forward, {}),
     (scattering, scattering.scatter_backward, {}),
     (shading, shading.shadow_forward, {"shape": "*fp64"}),
     (shading, shading.shadow_backward, {"shape": "*fp64"}),
     (echoing, echoing.facet_waves, {"rows": "*i64", "lit": "*u8", "numbers": "*fp32"}),
+    (searching, searching.nearest_of, {"means": "*fp32", "index": "*i32"}),
 ):
     names = kernel.arg_names
     known = {"FACING": True, "WEIGHED": True, **{n: getattr(room, n, None) for n in sizes}}
@@ -145,4 +148,4 @@ def test_kernels_compile_for_gpus_that_are_not_there(tmp_path) -> None:
     program = [sys.executable, "-c", COMPILE, "80", "90"]
     done = subprocess.run(program, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    assert [int(line) > 10_000 for line in done.stdout.split()] == [True] * 10
+    assert [int(line) > 10_000 for line in done.stdout.split()] == [True] * 12

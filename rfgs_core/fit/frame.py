@@ -29,7 +29,7 @@ from rfgs_core.gaussians import Gaussians
 from rfgs_core.measure.observations import Observations
 from rfgs_core.model.channel import Channel
 from rfgs_core.model.first_gaussians import gaussians_at, lone_gaussians
-from rfgs_core.model.first_powers import fit_power, level_of_power, new_head
+from rfgs_core.model.first_powers import level_of_power, new_head
 from rfgs_core.model.head import RadioHead
 from rfgs_core.model.reflectivity import fitted_reflectivities
 from rfgs_core.seeds import sub_seed
@@ -218,7 +218,7 @@ def state_at(
         head: The head of the frame before; None makes one.
     """
     gaussians = gaussians_at(points, normals)
-    power = fit_power(observations, gaussians)
+    power = level_of_power(observations, gaussians)
     head = head or new_head(observations, config, power)
     features = head.without_readings(encode(observations, points, encoder).features)
     track_id = np.arange(len(points), dtype=np.int64)

@@ -44,6 +44,8 @@ from rfgs_core.settings import TrainConfig
 CHANNEL_RATES = LearningRates(
     means=5e-4, log_scales=2e-3, quats=1e-3, features=1e-2, logit_opacities=2e-2
 )
+#: So many Gaussians these rates suit.
+_SUITED = 6000
 #: Adam steps between checkpoints within a frame.
 CHECKPOINT_EVERY = 1000
 #: What a checkpoint may hold beside the Gaussians: Adam's moments, and what densities remember.
@@ -83,7 +85,8 @@ def refine(
     """
     task = Task.of(observations, config, seed, encoder).on(config.device)
     before, state = state, on_device(state, config.device)
-    rates = LearningRates() if config.recipe == "paper" else CHANNEL_RATES
+    paper = config.recipe == "paper"
+    rates = LearningRates() if paper else channel_rates(len(state.gaussians))
     trained, first, memory = _resume(checkpoint, state.gaussians, rates)
     density = density_control(observations, state, config, seed, task)
     density.resume(memory)
@@ -109,6 +112,16 @@ def refine(
         if on_step is not None:
             on_step(float(loss.detach()), len(trained.gaussians))
     return _with_gaussians(before, trained, config)
+
+
+def channel_rates(count: int) -> LearningRates:
+    """Rates for the channel loss of so many Gaussians.
+
+    Of M that reflect a given power together, each has an amplitude of 1/√M, and Adam's first steps
+    move the features of all alike: their sum changes by √M times the rate.
+    """
+    slower = min(1.0, (_SUITED / max(count, 1)) ** 0.5)
+    return replace(CHANNEL_RATES, features=CHANNEL_RATES.features * slower)
 
 
 def _continuity(state: FrameState, config: TrainConfig) -> Continuity | None:

@@ -17,8 +17,8 @@ from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import TrainConfig
 
-#: Gaussians that tell the level of many.
-_FEW = 5000
+#: Gaussians whose maps fit into memory, and those that tell the level of more.
+MANY, _FEW = 20_000, 5000
 
 
 def visibility(
@@ -66,15 +66,18 @@ def fit_power(
 
 
 def level_of_power(observations: Observations, gaussians: Gaussians) -> Float[Tensor, "M"]:
-    """One reflected power for all, of places drawn alike: that which `fit_power` finds for a few.
+    """One reflected power for all: of many, that which `fit_power` finds for a few among them.
 
     Of 10⁵ Gaussians its maps would take gigabytes, and of equal shares the level is all that they
     tell.
     """
     count = len(gaussians)
-    few = gaussians.select(torch.arange(count) < _FEW)
-    total = float(fit_power(observations, few).double().sum())
-    return torch.full((count,), total / max(count, 1))
+    if count <= MANY:
+        return fit_power(observations, gaussians)
+    few = torch.zeros(count, dtype=torch.bool)
+    few[torch.linspace(0, count - 1, _FEW, dtype=torch.float64).long()] = True
+    total = float(fit_power(observations, gaussians.select(few)).double().sum())
+    return torch.full((count,), total / count)
 
 
 def noise_per_link(

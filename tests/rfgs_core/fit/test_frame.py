@@ -17,6 +17,7 @@ from rfgs_core.errors import RfgsError
 from rfgs_core.fit.frame import solve_reflectivity, start_anywhere, start_frame
 from rfgs_core.fit.sampling import encode
 from rfgs_core.measure.observations import Observations, observe
+from rfgs_core.model import first_powers
 from rfgs_core.model.channel import Channel
 from rfgs_core.model.comparison import comparison_of
 from rfgs_core.model.delay_power import DelayPowerModel
@@ -167,9 +168,16 @@ def test_a_random_start_fills_the_bounds_and_knows_of_no_bodies(observations) ->
     assert after.head is state.head
 
 
-def test_many_gaussians_have_the_power_of_a_few(observations) -> None:
-    config = TrainConfig.chosen(TrainOptions(recipe="paper"), num_gaussians=6000)
-    many = start_anywhere(observations, config, 3, None, PAPER_FILTER).gaussians
+@pytest.mark.parametrize("recipe", ["rfgs", "paper"])
+def test_many_gaussians_have_the_power_of_a_few(observations, monkeypatch, recipe) -> None:
+    """Anywhere in the bounds as in bodies, which stand one after the other in their order."""
+    config = TrainConfig.chosen(TrainOptions(recipe=recipe), num_gaussians=6000)
+    begin = start_anywhere if recipe == "paper" else start_frame
+    many = begin(observations, config, 3, None, PAPER_FILTER).gaussians
+    monkeypatch.setattr(first_powers, "MANY", 5999)
     found, whole = level_of_power(observations, many), fit_power(observations, many)
     assert float(found.sum()) == pytest.approx(float(whole.sum()), rel=0.1)
     assert len(found.unique()) == 1
+    assert torch.equal(begin(observations, config, 3, None, PAPER_FILTER).power, found)
+    monkeypatch.setattr(first_powers, "MANY", 6000)
+    assert torch.equal(level_of_power(observations, many), whole)

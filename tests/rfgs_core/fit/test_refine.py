@@ -12,7 +12,7 @@ import torch
 
 from rfgs_core.errors import RfgsError
 from rfgs_core.fit import refine as refine_module
-from rfgs_core.fit.frame import FrameState
+from rfgs_core.fit.frame import FrameState, solved_frame
 from rfgs_core.fit.losses import channel_loss
 from rfgs_core.fit.refine import refine
 from rfgs_core.measure.observations import Observations
@@ -45,6 +45,29 @@ def test_the_channel_loss_falls(observations, state, quick_config) -> None:
     assert cost(observations, after, config) < 0.5 * cost(observations, state, config)
     np.testing.assert_array_equal(after.track_id, state.track_id)
     assert torch.equal(after.power, state.power)
+
+
+def test_features_of_many_change_the_channel_no_more_than_those_of_few(
+    observations, quick_config, monkeypatch
+) -> None:
+    """All begin alike, so Adam's first step moves all alike, and what they reflect adds up."""
+    channel = Channel.of(observations, observations.links, observations.subcarriers)
+    still = dict.fromkeys(("means", "log_scales", "quats", "logit_opacities"), 0.0)
+    alone = replace(refine_module.CHANNEL_RATES, **still)
+    monkeypatch.setattr(refine_module, "CHANNEL_RATES", alone)
+
+    def first_change(count: int, suited: int) -> float:
+        monkeypatch.setattr(refine_module, "_SUITED", suited)
+        config = replace(quick_config, num_gaussians=count, iterations=1, batch_entries=4096)
+        state = solved_frame(observations, config, 3)
+        after = refine(observations, state, config, 0)
+        moved = [channel.change(one.head, one.gaussians) for one in (state, after)]
+        return float((moved[1] - moved[0]).detach().norm())
+
+    few = first_change(200, suited=200)
+    assert first_change(2000, suited=200) == pytest.approx(few, rel=0.2)
+    # At the rates of few, by the root of how many more they are.
+    assert first_change(2000, suited=2000) == pytest.approx(10**0.5 * few, rel=0.2)
 
 
 @pytest.mark.parametrize("objective", ["paper", "csi", "both"])

@@ -6,7 +6,6 @@ from __future__ import annotations
 import dataclasses
 import importlib.util
 import os
-import resource
 import shutil
 import sys
 from typing import Any, Literal, TypeVar, cast
@@ -69,5 +68,7 @@ def most_held_gib(device: Device) -> float:
         import torch
 
         return torch.cuda.max_memory_allocated() / 2**30
+    import resource  # No system but Unix has it.
+
     unit = 1 if sys.platform == "darwin" else 1024
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 2**30

@@ -18,7 +18,7 @@ from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import TrainConfig
 
 #: Gaussians whose maps fit into memory, and those that tell the level of more.
-MANY, _FEW = 20_000, 5000
+_MANY, _FEW = 20_000, 5000
 
 
 def visibility(
@@ -72,7 +72,7 @@ def level_of_power(observations: Observations, gaussians: Gaussians) -> Float[Te
     tell.
     """
     count = len(gaussians)
-    if count <= MANY:
+    if count <= _MANY:
         return fit_power(observations, gaussians)
     few = torch.zeros(count, dtype=torch.bool)
     few[torch.linspace(0, count - 1, _FEW, dtype=torch.float64).long()] = True

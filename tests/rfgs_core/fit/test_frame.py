@@ -174,10 +174,10 @@ def test_many_gaussians_have_the_power_of_a_few(observations, monkeypatch, recip
     config = TrainConfig.chosen(TrainOptions(recipe=recipe), num_gaussians=6000)
     begin = start_anywhere if recipe == "paper" else start_frame
     many = begin(observations, config, 3, None, PAPER_FILTER).gaussians
-    monkeypatch.setattr(first_powers, "MANY", 5999)
+    monkeypatch.setattr(first_powers, "_MANY", 5999)
     found, whole = level_of_power(observations, many), fit_power(observations, many)
     assert float(found.sum()) == pytest.approx(float(whole.sum()), rel=0.1)
     assert len(found.unique()) == 1
     assert torch.equal(begin(observations, config, 3, None, PAPER_FILTER).power, found)
-    monkeypatch.setattr(first_powers, "MANY", 6000)
+    monkeypatch.setattr(first_powers, "_MANY", 6000)
     assert torch.equal(level_of_power(observations, many), whole)

@@ -32,8 +32,10 @@ from rfgs_core.settings import TrainConfig
 
 #: Evidence that it takes to count one more [nat], and beside others a share of their median.
 TO_COUNT, OF_OTHERS = 20.0, 0.3
-#: Share of the device pairs whose evidence rises, of those that would hear a body at the place:
-#: it would raise their log-likelihood by at least this on average [nat].
+#: Share of the device pairs whose evidence rises: beside nobody of all of them …
+ALONE_SHARE = 2 / 3
+#: … and beside others of those that would hear a body at the place: it would raise their
+#: log-likelihood by at least this on average [nat].
 PAIR_SHARE, AUDIBLE = 0.75, 5.0
 #: A pair does not hear who stands behind another body: within this of the line of sight, and this
 #: far behind it, for echoes that linger appear just behind a body [m].
@@ -45,6 +47,8 @@ _NOBODY = Bodies.together([])
 MOST = 8
 #: Places where one more is tried: the highest peaks of what remains of the channel …
 _CANDIDATES = 3
+#: … beside so many more around each body that is known …
+_NEAR_KNOWN = 3
 #: … and around each of them [m].
 _STEPS_M = 0.08 * np.arange(-2, 3)
 _HERE_M = np.zeros((1, 3))
@@ -145,11 +149,33 @@ def _added(
     return found
 
 
+def settled(observations: Observations, found: list[Gain]) -> list[Gain]:
+    """Bodies that were found, each near there where it is likeliest beside all others.
+
+    Args:
+        observations: The frame, which need not be the one in which they were found.
+        found: The bodies; what they explained is found anew.
+    """
+    found = list(found)
+    for _ in range(_ROUNDS):
+        before = _bodies(found).axes_xy
+        for body, one in enumerate(found):
+            others = _bodies([other for other in found if other is not one])
+            again = gain_near(observations, others, one.body)
+            found[body] = (
+                again if stands_clear(others, again.place_xy) else again._replace(body=one.body)
+            )
+        if (_bodies(found).axes_xy == before).all():
+            break
+    return found
+
+
 def one_more_counts(bodies: list[Gain]) -> bool:
     """Whether the last of some bodies is one, beside the others."""
     *others, last = bodies
     share = OF_OTHERS * float(np.median([one.nat for one in others])) if others else 0.0
-    return last.nat >= max(TO_COUNT, share) and last.heard >= PAIR_SHARE
+    pairs = PAIR_SHARE if others else ALONE_SHARE
+    return last.nat >= max(TO_COUNT, share) and last.heard >= pairs
 
 
 def _one_more(
@@ -163,18 +189,17 @@ def _one_more(
     known = _bodies(found)
     if found:
         maps = pair_maps(residual_of_bodies(observations, maps, known, config, seed))
-    gains = [
-        gain_near(observations, known, Bodies.standing(place[None]))
-        for place in locate_bodies(maps, observations.bounds_m, _CANDIDATES)
-        if stands_clear(known, place)
-    ]
+    # Around who is known are the loudest leavings: peaks there must not use up the candidates.
+    peaks = locate_bodies(maps, observations.bounds_m, _CANDIDATES + _NEAR_KNOWN * len(known))
+    clear = [place for place in peaks if stands_clear(known, place)][:_CANDIDATES]
+    gains = [gain_near(observations, known, Bodies.standing(place[None])) for place in clear]
     best = max(gains, key=lambda gain: gain.nat, default=None)
     if best is None or best.nat < TO_COUNT or not stands_clear(known, best.place_xy):
         return None
     # Beside others who is heard well enough upright needs no second look.
     if not found or not one_more_counts([*found, best]):
         best = _lain(observations, maps, known, best)
-    return _settled(observations, [*found, best])
+    return settled(observations, [*found, best]) if found else [best]
 
 
 def _lain(observations: Observations, maps: PairMaps, known: Bodies, upright: Gain) -> Gain:
@@ -190,22 +215,6 @@ def _lain(observations: Observations, maps: PairMaps, known: Bodies, upright: Ga
         turned = replace(best.body, lying=best.body.ways + np.array([turn_rad, 0.0]))
         best = max(best, gain_near(observations, known, turned), key=lambda gain: gain.nat)
     return best if best.nat > upright.nat and stands_clear(known, best.place_xy) else upright
-
-
-def _settled(observations: Observations, found: list[Gain]) -> list[Gain]:
-    """Each body where it is likeliest beside all others."""
-    found = list(found)
-    for _ in range(_ROUNDS if len(found) > 1 else 0):
-        before = _bodies(found).axes_xy
-        for body, one in enumerate(found):
-            others = _bodies([other for other in found if other is not one])
-            again = gain_near(observations, others, one.body)
-            found[body] = (
-                again if stands_clear(others, again.place_xy) else again._replace(body=one.body)
-            )
-        if (_bodies(found).axes_xy == before).all():
-            break
-    return found
 
 
 def _bodies(found: list[Gain]) -> Bodies:
@@ -259,12 +268,13 @@ def gain_near(
         seen = [True] * len(pairs)
     for row, (pair, fit) in enumerate(zip(pairs, fits, strict=True)):
         part = tried[row][best]
+        with_it = fit.with_part(part)
         if pair.change.any():
-            by_pair[row] = fit.with_part(part).log_likelihood - fit.log_likelihood
+            by_pair[row] = with_it.log_likelihood - fit.log_likelihood
         by_pair[row] -= 0.5 * math.log(len(pair.change))
         if others and seen[row]:
             level = float(np.median(brightness or [0.0])) * mean_power(part) / pair.scale**2
-            expected[row] = fit.expected_rise(part, level)
+            expected[row] = with_it.expected_rise(level)
     there = replace(near, axes_xy=near.axes_xy + shifts_m[best, :2])
     return Gain(there, by_pair, expected)
 

@@ -10,9 +10,10 @@ greatest where it is taken off (autofocus for through-wall imaging: Ahmad, Amin 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import Any
 
-from rfgs_core.bodies.count import count_bodies, loudest_gain
+from rfgs_core.bodies.count import Gain, count_bodies, loudest_gain, settled
 from rfgs_core.measure.observations import Observations
 from rfgs_core.settings import TrainConfig
 
@@ -21,7 +22,7 @@ from rfgs_core.settings import TrainConfig
 PROBE_M = 0.9
 #: One frame in which evidence falls below this share says that there is no wall.
 CLEARLY_NONE = 0.95
-#: Then so many steps are tried of this much [m], and finer ones around the best.
+#: Then so many steps are tried of this much [m], and a finer one on both sides of the best.
 COARSE_M, COARSE = 0.3, 5
 FINE_M = 0.1
 #: Frames in which these are tried.
@@ -48,13 +49,20 @@ def excess_path_m(
     straight, probed = looks.loudest(0, 0.0), looks.loudest(0, PROBE_M)
     if probed <= CLEARLY_NONE * straight or not straight > 0.0:
         return 0.0
-    looks.left = 2 * (len(frames) - 1) + (COARSE + 2) * len(frames[:REFINED])
+    refined, coarse = len(frames[:REFINED]), [COARSE_M * step for step in range(1, COARSE + 1)]
+    looks.left = 2 * (len(frames) - 1) + refined * (COARSE + 2 * (COARSE - 1) + 2)
     rises = [looks.loudest(row, PROBE_M) - looks.loudest(row, 0.0) for row in range(1, len(frames))]
     if probed - straight + sum(rises) <= 0.0:
         return 0.0
-    coarse = [COARSE_M * step for step in range(1, COARSE + 1)]
+    for path_m in coarse:
+        looks.count(path_m)
+    for there, path_m in [*pairwise(coarse), *pairwise(coarse[::-1])]:
+        looks.carry(there, path_m)
     best = max(coarse, key=looks.everybody)
-    return round(max((best, best - FINE_M, best + FINE_M), key=looks.everybody), 3)
+    fine = [best - FINE_M, best + FINE_M]
+    for path_m in fine:
+        looks.carry(best, path_m)
+    return round(max((best, *fine), key=looks.everybody), 3)
 
 
 class _Looks:
@@ -68,23 +76,46 @@ class _Looks:
         on_look: Callable[[int], Any],
     ) -> None:
         self.frames, self.config, self.seed, self.on_look = frames, config, seed, on_look
-        self.left, self.known = FIRST_LOOK, dict[float, float]()
+        self.left, self.found = FIRST_LOOK, dict[float, list[list[Gain]]]()
 
     def loudest(self, row: int, path_m: float) -> float:
         """Evidence of the loudest body of one frame [nat]."""
         seen = self.frames[row].lengthened(-path_m)
-        return self._looked(loudest_gain(seen))
+        nat = loudest_gain(seen)
+        self._looked()
+        return nat
+
+    def count(self, path_m: float) -> None:
+        """Who is in some frames with so much taken off."""
+        self.found[path_m] = []
+        for frame in self.frames[:REFINED]:
+            found = count_bodies(frame.lengthened(-path_m), self.config, self.seed)
+            self.found[path_m].append(found)
+            self._looked()
+
+    def carry(self, there: float, path_m: float) -> None:
+        """Who was found with another excess path, if with this one they explain more.
+
+        Counting is a choice: of two people that one excess path finds, the next may find one, and
+        its evidence falls by half. Carried along, evidence is smooth.
+        """
+        nobody: list[list[Gain]] = [[] for _ in self.found[there]]
+        known = self.found.get(path_m, nobody)
+        carried = []
+        for frame, found in zip(self.frames, self.found[there], strict=False):
+            carried.append(settled(frame.lengthened(-path_m), found))
+            self._looked()
+        self.found[path_m] = [max(both, key=_evidence) for both in zip(known, carried, strict=True)]
 
     def everybody(self, path_m: float) -> float:
         """Evidence of everybody in some frames [nat]: whoever is left out would draw the others."""
-        if path_m not in self.known:
-            self.known[path_m] = 0.0
-            for frame in self.frames[:REFINED]:
-                found = count_bodies(frame.lengthened(-path_m), self.config, self.seed)
-                self.known[path_m] += self._looked(sum(one.nat for one in found))
-        return self.known[path_m]
+        return sum(map(_evidence, self.found[path_m]))
 
-    def _looked(self, nat: float) -> float:
+    def _looked(self) -> None:
         self.left = max(self.left - 1, 0)
         self.on_look(self.left)
-        return nat
+
+
+def _evidence(found: list[Gain]) -> float:
+    """Of some bodies [nat]."""
+    return sum(one.nat for one in found)

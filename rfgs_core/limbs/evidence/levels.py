@@ -25,6 +25,8 @@ from rfgs_core.limbs.evidence.kernel import log_evidence
 #: Steps of the fit, and the least level of the first covariance, which is noise: a share of the
 #: entries' mean power.
 STEPS, LEAST_NOISE = 15, 1e-3
+#: Relative error of an entry of a covariance, which is computed in single precision.
+_ROUNDING = float(np.finfo(np.float32).eps)
 
 
 class Levels(NamedTuple):
@@ -57,6 +59,7 @@ class Levels(NamedTuple):
             return Levels(change, whole, np.array([max(power, LEAST_NOISE)]))
         level = np.full(len(whole), 1.0 / len(whole)) if start is None else start.copy()
         level[~whole.any(axis=(1, 2))] = 0.0
+        level[0] = max(level[0], _least_noise(level, len(change)))
         for _ in range(STEPS):
             inverse = _inverse(np.tensordot(level, whole, 1))
             white = inverse @ change
@@ -64,7 +67,7 @@ class Levels(NamedTuple):
             power = np.maximum(np.einsum("n,kn->k", white.conj(), whole @ white).real, 0.0)
             trace = np.einsum("knm,mn->k", whole, inverse).real
             level = level * np.sqrt(power / np.maximum(trace, 1e-300))
-            level[0] = max(level[0], LEAST_NOISE)
+            level[0] = max(level[0], _least_noise(level, len(change)))
         return Levels(change, whole, level)
 
     @property
@@ -83,20 +86,21 @@ class Levels(NamedTuple):
     def with_part(self, part: Complex[np.ndarray, "entry entry"]) -> Levels:
         """One covariance more, and the levels of all fitted anew."""
         start = np.append(0.9 * self.level, 0.1 * self.level.sum())
-        start[0] = max(start[0], LEAST_NOISE)
         parts = [*self.parts[1:], part]
         return Levels.fitted(self.change, parts, start)
 
-    def expected_rise(self, part: Complex[np.ndarray, "entry entry"], level: float) -> float:
-        """By how much a covariance raises the log-likelihood on average where it is there [nat].
+    def expected_rise(self, level: float) -> float:
+        """By how much the last covariance, at a level, raises the log-likelihood on average [nat].
 
-        Σ (sλ − ln(1 + sλ)) over the eigenvalues λ of R⁻¹ C, the divergence of the two normal
+        Against noise of its power in its place, for that is how it is explained without it:
+        Σ (λ − 1 − ln λ) over the eigenvalues λ of R₀⁻¹ R₁, the divergence of the two normal
         distributions (Kullback and Leibler, Ann. Math. Stat. 22(1), 1951).
         """
-        inverse = np.linalg.inv(np.linalg.cholesky(self.covariance))
-        eigenvalues = np.linalg.eigvalsh(inverse @ _whole(part) @ inverse.conj().T)
-        ratio = level * np.maximum(eigenvalues, 0.0)
-        return float((ratio - np.log1p(ratio)).sum())
+        others = np.tensordot(self.level[:-1], self.parts[:-1], 1)
+        inverse = np.linalg.inv(np.linalg.cholesky(others + level * self.parts[0]))
+        there = inverse @ (others + level * self.parts[-1]) @ inverse.conj().T
+        eigenvalues = np.maximum(np.linalg.eigvalsh(there), 1e-12)
+        return float((eigenvalues - 1.0 - np.log(eigenvalues)).sum())
 
     def rises(self, parts: list[Complex[np.ndarray, "entry entry"]]) -> Float64[np.ndarray, "part"]:
         """By how much each covariance, added alone, raises the log-likelihood at least [nat].
@@ -118,6 +122,16 @@ def mean_power(upper: Complex[np.ndarray, "entry entry"]) -> float:
     return float(np.diagonal(upper).real.mean())
 
 
+def _least_noise(level: Float64[np.ndarray, "part"], entries: int) -> float:
+    """Least level of the noise beside other levels.
+
+    Rounding takes no more than ε √(Σ |C|²) ≤ ε tr C from the smallest eigenvalue of a covariance,
+    and its trace is the number of entries. A body that one direction of antennas explains may have
+    a level of some hundred: then that is more than `LEAST_NOISE`, and makes R indefinite.
+    """
+    return max(LEAST_NOISE, _ROUNDING * entries * float(level[1:].sum()))
+
+
 def _whole(
     upper: Complex[np.ndarray, "*part entry entry"],
 ) -> Complex128[np.ndarray, "*part entry entry"]:
@@ -133,7 +147,7 @@ def _inverse(
     """Of a covariance with noise, by Cholesky's factor: in half the time of `numpy.linalg.inv`."""
     cholesky, invert = _routines()
     root, failed = cholesky(matrix, lower=0, clean=1)
-    assert not failed, "noise of at least LEAST_NOISE makes every covariance positive definite"
+    assert not failed, "the least noise makes every covariance positive definite"
     upper = invert(root, lower=0)[0]
     upper.ravel(order="F")[:: len(upper) + 1] *= 0.5
     return upper + upper.conj().T

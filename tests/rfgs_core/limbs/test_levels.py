@@ -89,11 +89,36 @@ def test_what_is_there_raises_the_likelihood_and_nothing_else_does() -> None:
 
 def test_expected_rise_is_the_mean_over_draws() -> None:
     known, new, level = covariance(0), covariance(1), 0.5
-    before = Levels(np.zeros(SIZE, complex), np.array([np.eye(SIZE), known]), np.array([0.2, 0.8]))
-    after = before.covariance + level * new
-    rises = []
-    for heard in drawn(after, 4000, seed=7):
-        fit = before._replace(change=heard)
-        both = Levels(heard, np.array([*before.parts, new]), np.array([0.2, 0.8, level]))
+    parts = np.array([np.eye(SIZE), known, new])
+    there = Levels(np.zeros(SIZE, complex), parts, np.array([0.2, 0.8, level]))
+    noise_instead = there._replace(level=np.array([0.2 + level, 0.8, 0.0]))
+    rises = [
+        there._replace(change=heard).log_likelihood
+        - noise_instead._replace(change=heard).log_likelihood
+        for heard in drawn(there.covariance, 4000, seed=7)
+    ]
+    assert there.expected_rise(level) == pytest.approx(np.mean(rises), rel=0.05)
+
+
+def test_what_is_missing_is_expected_though_it_filled_the_noise() -> None:
+    known, missing, level = covariance(0), covariance(1), 0.6
+    matrix = 0.4 * known + level * missing + 0.01 * np.eye(SIZE)
+    rises, expected = [], []
+    for heard in drawn(matrix, 20, seed=8):
+        fit = Levels.fitted(heard, [known])
+        assert fit.level[0] > 0.1
+        both = fit.with_part(missing)
         rises.append(both.log_likelihood - fit.log_likelihood)
-    assert before.expected_rise(new, level) == pytest.approx(np.mean(rises), rel=0.05)
+        expected.append(both.expected_rise(level))
+    assert np.mean(expected) == pytest.approx(np.mean(rises), rel=0.3)
+
+
+def test_a_level_that_makes_rounding_louder_than_noise_is_fitted() -> None:
+    """A covariance of two echoes, one 37 dB louder, of which the weak one was heard."""
+    rng = np.random.default_rng(9)
+    echoes = np.linalg.qr(rng.standard_normal((SIZE, 2)) + 1j * rng.standard_normal((SIZE, 2)))[0]
+    part = ((echoes * [1.0, 2e-4]) @ echoes.conj().T).astype(np.complex64)
+    heard = np.sqrt(SIZE) * echoes[:, 1]
+    fit = Levels.fitted(heard, [part], start=np.array([LEAST_NOISE, 5e3]))
+    assert fit.level[1] > 1e3
+    assert fit.log_likelihood > Levels.fitted(heard, []).log_likelihood

@@ -32,8 +32,9 @@ from rfgs_core.settings import TrainConfig
 
 #: Evidence that it takes to count one more [nat], and beside others a share of their median.
 TO_COUNT, OF_OTHERS = 20.0, 0.3
-#: Share of the device pairs whose evidence rises: beside nobody of all of them …
-ALONE_SHARE = 2 / 3
+#: Share of the device pairs whose evidence rises: beside nobody of all of them, some of which may
+#: hear others who are not known yet …
+ALONE_SHARE = 0.5
 #: … and beside others of those that would hear a body at the place: it would raise their
 #: log-likelihood by at least this on average [nat].
 PAIR_SHARE, AUDIBLE = 0.75, 5.0
@@ -53,6 +54,8 @@ _NEAR_KNOWN = 3
 _STEPS_M = 0.08 * np.arange(-2, 3)
 _HERE_M = np.zeros((1, 3))
 _SHIFTS_M = np.array([[x, y, 0.0] for x in _STEPS_M for y in _STEPS_M])
+#: Steps from there towards more evidence, at most.
+_CLIMBS = 10
 #: Turns by which who lies is made likelier, one after the other [rad].
 _TURNS_RAD = (0.0, 0.3, -0.3, 0.15, -0.15)
 #: Times that every body is moved to where it is likeliest beside all others, at most.
@@ -70,6 +73,8 @@ class Gain(NamedTuple):
     expected: Float64[np.ndarray, "pair"]
     """Rise that a body would cause on average, were it as bright as the others [nat]; zero where
     one of them hides it, infinite beside nobody."""
+    leads_on: bool = False
+    """Whether the best of the places that were tried is one of the outermost."""
 
     @property
     def place_xy(self) -> Float64[np.ndarray, "2"]:
@@ -196,10 +201,26 @@ def _one_more(
     best = max(gains, key=lambda gain: gain.nat, default=None)
     if best is None or best.nat < TO_COUNT or not stands_clear(known, best.place_xy):
         return None
+    best = climbed(observations, known, best)
     # Beside others who is heard well enough upright needs no second look.
     if not found or not one_more_counts([*found, best]):
         best = _lain(observations, maps, known, best)
     return settled(observations, [*found, best]) if found else [best]
+
+
+def climbed(observations: Observations, known: Bodies, best: Gain) -> Gain:
+    """Somebody as found, or where evidence leads from there, as long as it rises.
+
+    It rises over a metre and more towards a body of which the map of what remains has no peak.
+    """
+    for _ in range(_CLIMBS):
+        if not best.leads_on:
+            break
+        further = gain_near(observations, known, best.body)
+        if further.nat <= best.nat or not stands_clear(known, further.place_xy):
+            break
+        best = further
+    return best
 
 
 def _lain(observations: Observations, maps: PairMaps, known: Bodies, upright: Gain) -> Gain:
@@ -276,7 +297,8 @@ def gain_near(
             level = float(np.median(brightness or [0.0])) * mean_power(part) / pair.scale**2
             expected[row] = with_it.expected_rise(level)
     there = replace(near, axes_xy=near.axes_xy + shifts_m[best, :2])
-    return Gain(there, by_pair, expected)
+    outermost = np.abs(shifts_m[best]).max() == np.abs(shifts_m).max() > 0.0
+    return Gain(there, by_pair, expected, bool(outermost))
 
 
 def _hidden(pair: Pair, known: Bodies, place_xy: Float64[np.ndarray, "2"]) -> bool:

@@ -16,6 +16,7 @@ from rfgs_core.bodies.count import (
     OF_OTHERS,
     TO_COUNT,
     Gain,
+    climbed,
     count_bodies,
     gain_near,
     one_more_counts,
@@ -121,6 +122,39 @@ def test_who_is_known_is_not_counted_again(empty: Observations) -> None:
     assert not one_more_counts([first, beside])
 
 
+@pytest.mark.parametrize("off_m", [(0.0, 0.0), (0.5, 0.3), (-0.4, 0.5), (-0.6, -0.4)])
+def test_evidence_leads_to_a_body_from_half_a_metre_away(empty: Observations, off_m) -> None:
+    seen = noisy(lit(empty, BODIES, seed=2), 0.02)
+    known = upright(BODIES[0])
+    begun = gain_near(seen, known, upright(np.add(BODIES[1], off_m)))
+    led = climbed(seen, known, begun)
+    assert led.nat >= begun.nat
+    assert np.linalg.norm(led.place_xy - BODIES[1]) < 0.2
+
+
+def test_evidence_does_not_lead_into_who_is_known(empty: Observations) -> None:
+    seen = noisy(lit(empty, BODIES[:1], seed=2), 0.02)
+    beside = upright(np.add(BODIES[0], (0.6, 0.0)))
+    elsewhere = upright(BODIES[1])
+    led = climbed(seen, elsewhere, gain_near(seen, elsewhere, beside))
+    assert np.linalg.norm(led.place_xy - BODIES[0]) < 0.2
+    into = climbed(seen, upright(BODIES[0]), gain_near(seen, upright(BODIES[0]), beside))
+    assert stands_clear(upright(BODIES[0]), into.place_xy)
+
+
+@pytest.mark.parametrize(
+    ("rising", "beside_nobody", "beside_another"),
+    [(1, False, False), (2, True, False), (3, True, True)],
+)
+def test_beside_nobody_half_of_the_pairs_are_enough(rising, beside_nobody, beside_another) -> None:
+    """A pair may hear somebody who is not known yet; who is known is taken off."""
+    by_pair = np.where(np.arange(4) < rising, 60.0, -2.0)
+    alone = Gain(upright(BODIES[0]), by_pair, np.full(4, np.inf))
+    assert one_more_counts([alone]) == beside_nobody
+    last = alone._replace(expected=np.full(4, 60.0))
+    assert one_more_counts([alone, last]) == beside_another
+
+
 @pytest.mark.parametrize(
     ("by_pair", "expected", "counts"),
     [
@@ -135,8 +169,9 @@ def test_who_is_known_is_not_counted_again(empty: Observations) -> None:
 def test_evidence_and_agreement_are_both_needed(
     by_pair: list[float], expected: list[float], counts: bool
 ) -> None:
+    known = Gain(upright(np.ones(2)), np.full(4, 30.0), np.full(4, 90.0))
     one = Gain(upright(np.zeros(2)), np.array(by_pair), np.array(expected))
-    assert one_more_counts([one]) is counts
+    assert one_more_counts([known, one]) is counts
 
 
 def test_next_to_strong_evidence_a_faint_one_is_nobody() -> None:

@@ -33,8 +33,8 @@ from rfgs_core.settings import TrainConfig
 #: Evidence that it takes to count one more [nat], and beside others a share of their median.
 TO_COUNT, OF_OTHERS = 20.0, 0.3
 #: Share of the device pairs whose evidence rises: beside nobody of all of them, some of which may
-#: hear others who are not known yet …
-ALONE_SHARE = 0.5
+#: hear others who are not known yet (gains that drift in an empty room are heard by 8 of 14) …
+ALONE_SHARE = 2 / 3
 #: … and beside others of those that would hear a body at the place: it would raise their
 #: log-likelihood by at least this on average [nat].
 PAIR_SHARE, AUDIBLE = 0.75, 5.0

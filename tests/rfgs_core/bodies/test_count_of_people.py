@@ -144,14 +144,14 @@ def test_evidence_does_not_lead_into_who_is_known(empty: Observations) -> None:
 
 @pytest.mark.parametrize(
     ("rising", "beside_nobody", "beside_another"),
-    [(1, False, False), (2, True, False), (3, True, True)],
+    [(8, False, False), (10, True, False), (11, True, True)],
 )
-def test_beside_nobody_half_of_the_pairs_are_enough(rising, beside_nobody, beside_another) -> None:
+def test_beside_nobody_fewer_pairs_are_enough(rising, beside_nobody, beside_another) -> None:
     """A pair may hear somebody who is not known yet; who is known is taken off."""
-    by_pair = np.where(np.arange(4) < rising, 60.0, -2.0)
-    alone = Gain(upright(BODIES[0]), by_pair, np.full(4, np.inf))
+    by_pair = np.where(np.arange(14) < rising, 60.0, -2.0)
+    alone = Gain(upright(BODIES[0]), by_pair, np.full(14, np.inf))
     assert one_more_counts([alone]) == beside_nobody
-    last = alone._replace(expected=np.full(4, 60.0))
+    last = alone._replace(expected=np.full(14, 60.0))
     assert one_more_counts([alone, last]) == beside_another
 
 

@@ -83,7 +83,8 @@ def find_scene(name: str) -> Scene:
         RfgsFormatError: It is not a Blender file.
     """
     path = Path(name)
-    if path.suffix == ".blend" or path.exists():
+    # A folder of that name may be the dataset that the same command has made of it before.
+    if path.suffix == ".blend" or path.is_file():
         scene = Scene(path.stem, path.resolve(), "", None, "")
     else:
         known = {row.name: row for row in catalogue()}

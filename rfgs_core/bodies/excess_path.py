@@ -13,7 +13,8 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any
 
-from rfgs_core.bodies.count import Gain, count_bodies, loudest_gain, settled
+from rfgs_core.bodies.count import count_bodies, loudest_gain
+from rfgs_core.bodies.gain import Gain, settled
 from rfgs_core.measure.observations import Observations
 from rfgs_core.settings import TrainConfig
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from rfgs_core.bodies.body_prior import Bodies
-from rfgs_core.bodies.count import count_bodies, gain_near, one_more_counts
+from rfgs_core.bodies.count import count_bodies, one_more_counts
+from rfgs_core.bodies.gain import NOBODY, gain_near
 from rfgs_core.dataset import Sequence
 from rfgs_core.measure.observations import Observations, observe
 from rfgs_core.run.people import told, voted
@@ -56,7 +56,7 @@ def head_count_table(
         seed = sub_seed(0, sequence.name, radio, frame, "people")
         found = count_bodies(now, config, seed)
         other = seen[(index + len(seen) // 2) % len(seen)]
-        there = [one_more_counts([gain_near(other, _NOBODY, one.body)]) for one in found]
+        there = [one_more_counts([gain_near(other, NOBODY, one.body)]) for one in found]
         confirmed += sum(there)
         counts.append(len(found))
         if index < EMPTY_FRAMES:
@@ -74,9 +74,6 @@ def head_count_table(
         "empty room heard anew": float(np.mean(nobody["empty"])),
         "confirmed by another frame": confirmed / max(sum(counts), 1),
     }
-
-
-_NOBODY = Bodies.together([])
 
 
 def noise_alone(observations: Observations, seed: int) -> Observations:

@@ -13,6 +13,7 @@ from torch import Tensor
 
 from rfgs_core.bodies.body_prior import outward_normals
 from rfgs_core.bodies.count import place_bodies
+from rfgs_core.bodies.gain import likelier_upright
 from rfgs_core.bodies.localise import PairMaps, in_order_of, locate_bodies, pair_maps
 from rfgs_core.bodies.lying import with_lying
 from rfgs_core.bodies.motion_density import novelty, speeds_m_s, wanted_counts
@@ -256,7 +257,8 @@ def _followed(
     """Finds the bodies, anywhere in a first frame, where they are expected in a later one."""
     bounds_m, time_s = observations.bounds_m, observations.time_s
     several = config.bodies > 1 and observations.kind == "complex"
-    axes_xy = place_bodies(observations, config.bodies, config, seed) if several else None
+    placed = place_bodies(observations, config.bodies, config, seed) if several else None
+    axes_xy = placed
     if before is None:
         if axes_xy is None:
             axes_xy = locate_bodies(maps, bounds_m, config.bodies)
@@ -271,7 +273,11 @@ def _followed(
             axes_xy = in_order_of(near, axes_xy)
         tracks = before.moved(axes_xy, time_s)
     lay = None if before is None else before.bodies
-    return tracks.laid(with_lying(observations, maps, axes_xy, config, seed, lay))
+    bodies = with_lying(observations, maps, axes_xy, config, seed, lay)
+    if placed is not None:
+        # What others leave of their echoes may look like somebody who lies.
+        bodies = likelier_upright(observations, bodies, axes_xy)
+    return tracks.laid(bodies)
 
 
 def solve_reflectivity(

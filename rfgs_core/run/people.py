@@ -15,7 +15,8 @@ from msgspec import Meta
 from tqdm import tqdm
 
 from rfgs_core.background.learned import learned_background
-from rfgs_core.bodies.count import FEWEST_PAIRS, count_bodies
+from rfgs_core.bodies.count import count_bodies
+from rfgs_core.bodies.gain import FEWEST_PAIRS
 from rfgs_core.dataset import Sequence
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.frames import spread_frames

@@ -11,15 +11,14 @@ import pytest
 from lit_bodies import echoing, lit
 
 from rfgs_core.bodies.body_prior import Bodies
-from rfgs_core.bodies.count import (
+from rfgs_core.bodies.count import OF_OTHERS, TO_COUNT, count_bodies, one_more_counts
+from rfgs_core.bodies.gain import (
     FEWEST_PAIRS,
-    OF_OTHERS,
-    TO_COUNT,
+    NOBODY,
     Gain,
     climbed,
-    count_bodies,
     gain_near,
-    one_more_counts,
+    likelier_upright,
     stands_clear,
 )
 from rfgs_core.measure.observations import Observations
@@ -28,7 +27,6 @@ from rfgs_core.settings import TrainConfig
 
 ROOM_M = np.array([[0.0, 0.0, 0.0], [5.0, 4.6, 2.4]])
 BODIES = [(1.5, 2.9), (3.4, 1.6)]
-NOBODY = Bodies.together([])
 
 
 @pytest.fixture
@@ -83,6 +81,20 @@ def test_who_lies_is_counted_once_and_told_to_lie(empty: Observations) -> None:
     assert found.body.lies.all()
     assert np.linalg.norm(found.place_xy - body.axes_xy[0]) < 0.4
     assert abs(np.sin(found.body.ways[0, 0] - way_rad)) < 0.35
+
+
+def test_who_explains_more_upright_beside_another_does_not_lie(empty: Observations) -> None:
+    other = upright(BODIES[0])
+    axes_xy = np.array([BODIES[1], BODIES[0]])
+    lies = Bodies(np.array([BODIES[1]]) - 0.4, np.array([np.nan]), np.array([[0.8, 0.6]]))
+    both = Bodies.together([lies, other])
+    seen = noisy(lit(empty, BODIES, seed=2), 0.02)
+    stands = likelier_upright(seen, both, axes_xy)
+    assert not stands.lies.any()
+    np.testing.assert_array_equal(stands.axes_xy, axes_xy)
+    # Who does lie goes on lying.
+    seen = noisy(echoing(empty, both, seed=2), 0.02)
+    assert likelier_upright(seen, both, axes_xy) is both
 
 
 def test_an_unchanged_channel_has_nobody(empty: Observations) -> None:

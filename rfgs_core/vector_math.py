@@ -7,6 +7,10 @@ float64 versions are the library's: they serve gradient checks, not speed. They 
 before compilation (`inline="always"`), as LLVM leaves a loop scalar when it still finds a call;
 numba's `max` of two numbers is such a call.
 
+A function with such freedom that another compiled one calls has `forceinline=True`: otherwise its
+caller's cached file holds a second copy, optimised once more and so of other last bits, and which
+of the two serves depends on what the process has compiled or loaded before.
+
 numba's cache looks at the file of a kernel only: after editing this module, remove the cached
 kernels of its neighbours (`__pycache__/*.nbi`).
 """
@@ -22,9 +26,7 @@ from numba.extending import overload
 
 #: Compiler freedom of all kernels. Signed zeros, infinities and NaN are of no use here.
 FAST_MATH = {"nnan", "ninf", "nsz", "arcp", "contract"}
-#: Where a sum over Gaussians shall become a vector sum, in an order fixed at compile time. Not
-#: elsewhere: numba optimises code that it caches once more than code that it runs at once, and
-#: terms that may be reordered then end in other last bits.
+#: Where a sum over Gaussians shall become a vector sum, in an order fixed at compile time.
 FAST_REDUCTION = FAST_MATH | {"reassoc"}
 
 #: Gaussians per block: about thirty rows of this many float32 numbers stay in the L1 cache.
@@ -42,7 +44,7 @@ _LN_2 = _F(0.6931471805599453)
 _LOWEST = _F(-87.0)
 
 
-@njit(**_OPTIONS)
+@njit(forceinline=True, **_OPTIONS)
 def scratch(rows: int, like: np.ndarray) -> np.ndarray:
     """Zeroed [rows, BLOCK] for one block in the precision of `like`, apart from other arrays."""
     return np.zeros((rows + 2 * _SPARE_ROWS, BLOCK), dtype=like.dtype)[_SPARE_ROWS:-_SPARE_ROWS]

@@ -29,7 +29,7 @@ POINTS = 256 * CHUNK
 _ONE = np.uint64(1)
 
 
-@numba.njit(fastmath=FAST_MATH, cache=True)
+@numba.njit(forceinline=True, fastmath=FAST_MATH, cache=True)
 def _legs(
     points: np.ndarray,
     elements: np.ndarray,
@@ -56,7 +56,7 @@ def _legs(
             cosines[n], sines[n] = cosine, sine
 
 
-@numba.njit(fastmath=FAST_MATH, cache=True)
+@numba.njit(forceinline=True, fastmath=FAST_MATH, cache=True)
 def _places(a: np.ndarray, b: np.ndarray, size: int, low: np.ndarray, share: np.ndarray) -> None:
     """Sample below each path length, and how far above it the length is."""
     times, per = float(size), 1.0 / size
@@ -67,7 +67,7 @@ def _places(a: np.ndarray, b: np.ndarray, size: int, low: np.ndarray, share: np.
         share[n] = np.float32(at - low[n])
 
 
-@numba.njit(fastmath=FAST_MATH, cache=True)
+@numba.njit(forceinline=True, fastmath=FAST_MATH, cache=True)
 def _read(profile: np.ndarray, low: np.ndarray, share: np.ndarray, out: np.ndarray) -> None:
     """Real or imaginary part of a profile, linear between samples."""
     for n in range(len(low)):
@@ -77,7 +77,7 @@ def _read(profile: np.ndarray, low: np.ndarray, share: np.ndarray, out: np.ndarr
         out[n] = below + share[n] * (profile[i + _ONE] - below)
 
 
-@numba.njit(fastmath=FAST_MATH, cache=True)
+@numba.njit(forceinline=True, fastmath=FAST_MATH, cache=True)
 def _add_turned(
     real: np.ndarray, imaginary: np.ndarray, t: np.ndarray, r: np.ndarray, total: np.ndarray
 ) -> None:

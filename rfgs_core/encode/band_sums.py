@@ -18,7 +18,7 @@ from rfgs_core.radio.constants import SPEED_OF_LIGHT
 CHUNK = 64
 
 
-@numba.njit(fastmath=True, cache=True)
+@numba.njit(forceinline=True, fastmath=True, cache=True)
 def _turns(
     points: np.ndarray, elements: np.ndarray, per_m: float, step_per_m: float, out: np.ndarray
 ) -> None:
@@ -38,7 +38,7 @@ def _turns(
             out[e, 2, n], out[e, 3, n] = np.cos(angle), np.sin(angle)
 
 
-@numba.njit(fastmath=True, cache=True)
+@numba.njit(forceinline=True, fastmath=True, cache=True)
 def _joined(t: np.ndarray, r: np.ndarray, out: np.ndarray) -> None:
     """The phasors of both legs together, rows as in `_turns`."""
     for n in range(out.shape[1]):
@@ -48,7 +48,7 @@ def _joined(t: np.ndarray, r: np.ndarray, out: np.ndarray) -> None:
         out[3, n] = t[2, n] * r[3, n] + t[3, n] * r[2, n]
 
 
-@numba.njit(fastmath=True, cache=True)
+@numba.njit(forceinline=True, fastmath=True, cache=True)
 def _add_one(a: float, b: float, z: np.ndarray, total: np.ndarray) -> None:
     """Adds a + j b at one subcarrier, and turns z on to the next."""
     x, y, u, v = z[0], z[1], z[2], z[3]
@@ -60,7 +60,7 @@ def _add_one(a: float, b: float, z: np.ndarray, total: np.ndarray) -> None:
         x[n], y[n] = p * u[n] - q * v[n], p * v[n] + q * u[n]
 
 
-@numba.njit(fastmath=True, cache=True)
+@numba.njit(forceinline=True, fastmath=True, cache=True)
 def _add_two(a: float, b: float, c: float, d: float, z: np.ndarray, total: np.ndarray) -> None:
     """Adds a + j b at one subcarrier and c + j d at the next, with half as many writes."""
     x, y, u, v = z[0], z[1], z[2], z[3]

@@ -84,7 +84,7 @@ class Plan(NamedTuple):
     """First frequency, spacing, centre frequency [Hz] and centre offset, float64 [chunk, 4]."""
 
 
-@njit(**OPTIONS)
+@njit(forceinline=True, **OPTIONS)
 def illuminate(
     cloud: Cloud, end: np.ndarray, first: int, n: int, distance: np.ndarray, w: np.ndarray
 ) -> None:
@@ -115,7 +115,7 @@ def illuminate(
         w[AMPLITUDE, b] = w[INV_T, b] * w[INV_R, b]
 
 
-@njit(**OPTIONS)
+@njit(forceinline=True, **OPTIONS)
 def see(cloud: Cloud, group: int, first: int, n: int, w: np.ndarray) -> None:
     """Multiplies the amplitude by the visibility; keeps what its gradient needs."""
     one = w.dtype.type(1.0)
@@ -137,7 +137,7 @@ def see(cloud: Cloud, group: int, first: int, n: int, w: np.ndarray) -> None:
         w[AMPLITUDE, b] *= visibility[b]
 
 
-@njit(**OPTIONS)
+@njit(forceinline=True, **OPTIONS)
 def start_subcarriers(subcarrier: np.ndarray, n: int, distance: np.ndarray, w: np.ndarray) -> None:
     """Sets z, r and e at the first subcarrier of a chunk."""
     real = w.dtype.type
@@ -162,7 +162,7 @@ def start_subcarriers(subcarrier: np.ndarray, n: int, distance: np.ndarray, w: n
         w[E, b] = near if x > small else exponential(x) - one
 
 
-@njit(**OPTIONS)
+@njit(forceinline=True, **OPTIONS)
 def _gain(gain: np.ndarray, first: int, n: int, w: np.ndarray) -> None:
     """Multiplies z by amplitude and gain."""
     gain_r, gain_i = gain[0, first : first + n], gain[1, first : first + n]
@@ -178,7 +178,7 @@ def turn(x: float, y: float, u: float, v: float, e: float) -> Any:
     return x * u - y * v, x * v + y * u, u + u * e, v + v * e
 
 
-@njit(**_SUM_OPTIONS)
+@njit(forceinline=True, **_SUM_OPTIONS)
 def _sum_subcarriers(
     n: int,
     zr: np.ndarray,

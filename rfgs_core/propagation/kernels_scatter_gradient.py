@@ -74,7 +74,7 @@ def _add(x: float, y: float, g: float, h: float, at: float, sums: Any) -> Any:
     return s + p, t + q, s1 + p1, t1 + q1, s2 + p1 * at, t2 + q1 * at
 
 
-@njit(**OPTIONS)
+@njit(forceinline=True, **OPTIONS)
 def _moment_subcarriers(n: int, seed: np.ndarray, centre: float, w: np.ndarray) -> None:
     """Moments of a chunk for each Gaussian of the block, moving z and r on."""
     zr, zi, rr, ri, e = w[ZR], w[ZI], w[RR], w[RI], w[E]
@@ -105,7 +105,7 @@ def _moment_subcarriers(n: int, seed: np.ndarray, centre: float, w: np.ndarray) 
             d2[b] += sums[5]
 
 
-@njit(**OPTIONS)
+@njit(forceinline=True, **OPTIONS)
 def _first_moment(n: int, seed: np.ndarray, w: np.ndarray) -> None:
     """The moment of order 0 alone."""
     zr, zi, rr, ri, e = w[ZR], w[ZI], w[RR], w[RI], w[E]
@@ -128,7 +128,7 @@ def _first_moment(n: int, seed: np.ndarray, w: np.ndarray) -> None:
             d0[b] += q
 
 
-@njit(**OPTIONS)
+@njit(forceinline=True, **OPTIONS)
 def _contract(
     gain: np.ndarray, subcarrier: np.ndarray, first: int, n: int, w: np.ndarray, by_gain: np.ndarray
 ) -> None:
@@ -160,7 +160,7 @@ def _across(x: float, y: float, z: float, ux: float, uy: float, uz: float) -> An
     return x - along * ux, y - along * uy, z - along * uz
 
 
-@njit(**OPTIONS)
+@njit(forceinline=True, **OPTIONS)
 def _chain_shape(shape: np.ndarray, first: int, n: int, w: np.ndarray, grad: CloudGradient) -> None:
     """From d, Q and 1 / (d_t d_r) to positions and covariances.
 
@@ -193,7 +193,7 @@ def _chain_shape(shape: np.ndarray, first: int, n: int, w: np.ndarray, grad: Clo
         pz[b] += near_t * tz + near_r * rz - z1 * it - z2 * ir
 
 
-@njit(**OPTIONS)
+@njit(forceinline=True, **OPTIONS)
 def _chain_normals(cloud: Cloud, first: int, n: int, w: np.ndarray, grad: CloudGradient) -> None:
     """From the two sigmoids of the visibility to normals and positions."""
     slope = w.dtype.type(cloud.sharpness)
@@ -217,7 +217,7 @@ def _chain_normals(cloud: Cloud, first: int, n: int, w: np.ndarray, grad: CloudG
         pz[b] -= by_t * z1 + by_r * z2
 
 
-@njit(**OPTIONS)
+@njit(forceinline=True, **OPTIONS)
 def _chain_visibility(group: int, first: int, n: int, w: np.ndarray, grad: CloudGradient) -> None:
     """From the amplitude to the weight of the link's group."""
     target = grad.visibility[group, first : first + n]

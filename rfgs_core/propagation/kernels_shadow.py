@@ -69,14 +69,14 @@ def _form(shape: Any, i: int, weights: Any) -> float:
     return diagonal + d * xy[i] + e * xz[i] + f * yz[i]
 
 
-@njit(**_OPTIONS)
+@njit(forceinline=True, **_OPTIONS)
 def _weights(v: np.ndarray, u: np.ndarray) -> Any:
     """Weights of the six packed entries of a symmetric matrix A in v^T A u."""
     mixed = v[0] * u[1] + v[1] * u[0], v[0] * u[2] + v[2] * u[0], v[1] * u[2] + v[2] * u[1]
     return v[0] * u[0], v[1] * u[1], v[2] * u[2], mixed[0], mixed[1], mixed[2]
 
 
-@njit(**_OPTIONS)
+@njit(forceinline=True, **_OPTIONS)
 def _project(
     screens: Screens, leg: np.ndarray, wavelength_m: float, first: int, n: int, w: np.ndarray
 ) -> None:
@@ -103,7 +103,7 @@ def _project(
         w[_ALPHA, b] = alpha[b]
 
 
-@njit(**_OPTIONS)
+@njit(forceinline=True, **_OPTIONS)
 def _spread(screens: Screens, leg: np.ndarray, first: int, n: int, w: np.ndarray) -> None:
     """Projected covariance, its determinant and the real part of log g's exponent."""
     f2, s2 = _weights(leg[6:9], leg[6:9]), _weights(leg[9:12], leg[9:12])
@@ -122,7 +122,7 @@ def _spread(screens: Screens, leg: np.ndarray, first: int, n: int, w: np.ndarray
         w[_LOG, b] = half * (u * p + v * q) / (p * p + q * q + tiny)
 
 
-@njit(**_OPTIONS)
+@njit(forceinline=True, **_OPTIONS)
 def _compact(n: int, w: np.ndarray, index: np.ndarray) -> int:
     """Moves the Gaussians that shadow the leg to the left; returns how many there are."""
     count = 0
@@ -141,7 +141,7 @@ def _compact(n: int, w: np.ndarray, index: np.ndarray) -> int:
     return kept
 
 
-@njit(**_OPTIONS)
+@njit(forceinline=True, **_OPTIONS)
 def _expand(kept: int, n: int, w: np.ndarray, index: np.ndarray) -> None:
     """Moves what `_compact` kept back to its place; everything else becomes zero."""
     if kept == n:
@@ -189,7 +189,7 @@ def _blob(w: np.ndarray, b: int) -> Any:
     return gr, gi, mr, mi, vxr, vxi, vyr, vyi
 
 
-@njit(**_OPTIONS)
+@njit(forceinline=True, **_OPTIONS)
 def _multiply(n: int, w: np.ndarray, tr: np.ndarray, ti: np.ndarray) -> None:
     """Multiplies the running products by 1 - alpha e g; -300 dB and less become zero."""
     one, least = w.dtype.type(1.0), w.dtype.type(_LEAST**2)
@@ -224,7 +224,7 @@ def shadow_forward(
         out[path, 0], out[path, 1] = x, y
 
 
-@njit(**_OPTIONS)
+@njit(forceinline=True, **_OPTIONS)
 def _differentiate(n: int, w: np.ndarray, seed: np.ndarray) -> None:
     """Replaces X, Y, KAPPA, XX, YY, XY, EDGE and ALPHA by the gradients with respect to them.
 
@@ -261,7 +261,7 @@ def _differentiate(n: int, w: np.ndarray, seed: np.ndarray) -> None:
         w[_KAPPA, b] = -half * (hr * trace_i + hi * trace_r)
 
 
-@njit(**_OPTIONS)
+@njit(forceinline=True, **_OPTIONS)
 def _chain(leg: np.ndarray, first: int, n: int, w: np.ndarray, grad: Any) -> None:
     """From the leg's axes back to positions, covariances and opacities."""
     real = w.dtype.type

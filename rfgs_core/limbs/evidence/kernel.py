@@ -165,7 +165,7 @@ def _weight(
     return sent / (d_t * d_r), d_t + d_r
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST_MATH)
+@numba.njit(forceinline=True, cache=True, nogil=True, fastmath=FAST_MATH)
 def _array_responses(
     x: np.ndarray, xyz: np.ndarray, steered: np.ndarray, block: np.ndarray, share: np.ndarray,
     per_m: float,
@@ -188,7 +188,7 @@ def _array_responses(
     return out
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST_MATH)
+@numba.njit(forceinline=True, cache=True, nogil=True, fastmath=FAST_MATH)
 def _band_responses(
     late: np.ndarray, first_per_m: float, step_per_m: float, band: np.ndarray, share: np.ndarray
 ) -> np.ndarray:
@@ -244,7 +244,7 @@ def _responses(
     return _products(sent, heard, banded, strength.astype(np.float32))
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST_MATH)
+@numba.njit(forceinline=True, cache=True, nogil=True, fastmath=FAST_MATH)
 def _products(
     sent: np.ndarray, heard: np.ndarray, banded: np.ndarray, weight: np.ndarray
 ) -> np.ndarray:

@@ -13,7 +13,7 @@ import numba
 import numpy as np
 
 
-@numba.njit(cache=True, fastmath={"reassoc", "nsz"})
+@numba.njit(forceinline=True, cache=True, fastmath={"reassoc", "nsz"})
 def summed(values: np.ndarray) -> float:
     """Sum of all values, in an order that depends on their number alone."""
     total = 0.0

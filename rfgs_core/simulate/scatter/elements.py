@@ -22,7 +22,7 @@ _SIXTEENTH = np.float32(-1.0 / 16.0)
 _FAST = {"contract", "nsz", "ninf", "nnan"}
 
 
-@numba.njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+@numba.njit(forceinline=True, cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
 def see_elements(
     to: tuple[float, float, float],
     centre_m: float,
@@ -85,7 +85,7 @@ def see_elements(
         _turn(np.float32(2.0 * math.pi * turns[1 + m]), deltas, (re, im), phasor[m])
 
 
-@numba.njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+@numba.njit(forceinline=True, cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
 def _turn(
     more: np.float32, deltas: np.ndarray, phasor: tuple[np.ndarray, np.ndarray], out: np.ndarray
 ) -> None:
@@ -100,7 +100,7 @@ def _turn(
         row_im[e] = im[e] * c - re[e] * s
 
 
-@numba.njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+@numba.njit(forceinline=True, cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
 def exact_values(
     tx: np.ndarray,
     rx: np.ndarray,
@@ -149,7 +149,7 @@ def exact_values(
             im[r] = value * (s_re * h_im[r] + s_im * h_re[r])
 
 
-@numba.njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+@numba.njit(forceinline=True, cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
 def centre_values(
     rx: np.ndarray, sent: np.ndarray, heard: np.ndarray, weight: complex, out: np.ndarray
 ) -> None:
@@ -165,7 +165,7 @@ def centre_values(
             im[r] = near[r] * (s_re * h_im[r] + s_im * h_re[r])
 
 
-@numba.njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+@numba.njit(forceinline=True, cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
 def spread_values(values: np.ndarray, kernel: np.ndarray, first: int, out: np.ndarray) -> None:
     """Adds the values of all links to the cells around a delay.
 

@@ -44,7 +44,7 @@ _G6, _G7, _G8 = (np.float32(v) for v in (-0.112668685, 0.0484870714, 0.061393622
 _G9, _G10 = np.float32(-0.0103375671), np.float32(-0.0141175795)
 
 
-@numba.njit(cache=True, fastmath={"contract", "nsz"})
+@numba.njit(forceinline=True, cache=True, fastmath={"contract", "nsz"})
 def add_fresnel(
     table: np.ndarray,
     edge: float,
@@ -65,7 +65,7 @@ def add_fresnel(
         out[1, e] += signed * (table[1, i] + (table[1, i + 1] - table[1, i]) * share)
 
 
-@numba.njit(cache=True, fastmath={"contract", "nsz"}, error_model="numpy")
+@numba.njit(forceinline=True, cache=True, fastmath={"contract", "nsz"}, error_model="numpy")
 def fill_fresnel(edges: np.ndarray, shift: float, per_m: float, out: np.ndarray) -> None:
     """F((edge − shift) · per_m) of many edges by polynomials, errors below 1e-5, in vector code.
 

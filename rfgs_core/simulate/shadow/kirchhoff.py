@@ -234,7 +234,7 @@ def _rule_of(counts: np.ndarray, degree: float) -> int:
     return rule
 
 
-@numba.njit(cache=True, fastmath={"contract", "nsz"})
+@numba.njit(forceinline=True, cache=True, fastmath={"contract", "nsz"})
 def _times(out: np.ndarray, change: np.ndarray, weights: np.ndarray) -> None:
     """Multiplies factors into `out`, by the polynomials through them where there are any.
 

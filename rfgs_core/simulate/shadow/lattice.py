@@ -79,7 +79,7 @@ def lattice_factors(
     return change
 
 
-@numba.njit(cache=True, fastmath={"contract", "nsz"})
+@numba.njit(forceinline=True, cache=True, fastmath={"contract", "nsz"})
 def _add_scaled(
     weight: np.ndarray, re: float, im: float, real: np.ndarray, imaginary: np.ndarray
 ) -> None:
@@ -89,7 +89,7 @@ def _add_scaled(
         imaginary[e] += weight[e] * im
 
 
-@numba.njit(cache=True, fastmath={"contract", "nsz"})
+@numba.njit(forceinline=True, cache=True, fastmath={"contract", "nsz"})
 def _add_product(weight: np.ndarray, row: np.ndarray, scale: float, out: np.ndarray) -> None:
     """Adds rows times weights, pair by pair."""
     for e in range(len(weight)):
@@ -192,7 +192,7 @@ def _levels_of(heights: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     return levels[:count], lower, upper
 
 
-@numba.njit(cache=True, fastmath={"contract", "nsz", "reassoc"})
+@numba.njit(forceinline=True, cache=True, fastmath={"contract", "nsz", "reassoc"})
 def _product_sum(a: np.ndarray, b: np.ndarray) -> tuple[np.float32, np.float32]:
     """Sum of products of complex numbers, given as rows real and imaginary."""
     a_re, a_im, b_re, b_im = a[0], a[1], b[0], b[1]

@@ -61,7 +61,7 @@ def project(
     return xy, plane, at_plane, axes
 
 
-@numba.njit(cache=True, fastmath={"contract", "reassoc"}, error_model="numpy")
+@numba.njit(forceinline=True, cache=True, fastmath={"contract", "reassoc"}, error_model="numpy")
 def _flatten(
     vertices: np.ndarray,
     start: tuple[float, float, float],

@@ -6,9 +6,15 @@ Otherwise a dataset resumed on the next day would differ from an undisturbed one
 
 from __future__ import annotations
 
+import hashlib
+import importlib
 from pathlib import Path
 
 import pytest
+from numba.core.dispatcher import Dispatcher
+
+import dataset_factory
+import rfgs_core
 
 _DIGESTS = """
 import hashlib, os, sys
@@ -93,3 +99,79 @@ def test_the_run_that_compiles_and_later_ones_give_the_same_bytes(python, tmp_pa
     assert list((tmp_path / "cache").rglob("*.nbi")), "expected the first run to fill the cache"
     assert compiling.count("\n") == 5
     assert loading == compiling
+
+
+def _bytes_of(folder: Path) -> dict[str, str]:
+    """Digests of a folder's files, but of those that hold a time or a path."""
+    return {
+        str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and path.suffix not in {".json", ".jsonl", ".log", ".sha256"}
+    }
+
+
+@pytest.mark.slow
+def test_a_world_and_its_run_have_the_same_bytes_in_the_run_that_compiles(
+    python, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Through the commands, so that functions are compiled and loaded in the order of real use."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    worlds = ("--radio", "wifi", "--count", 1, "--frames", 2, "--people", 1, "--depth", 2)
+    made = []
+    for name in ("compiling", "loading"):
+        data, run = tmp_path / f"data_{name}", tmp_path / f"run_{name}"
+        python("-m", "dataset_factory", "worlds", *worlds, "--out", data, must_work=True)
+        # The same data for both: only the kernels of training may make a difference.
+        world = tmp_path / "data_compiling" / "world_0000000"
+        short = ("--iterations", 5, "--out", run)
+        python("-m", "rfgs_core.cli", "train", world, *short, must_work=True)
+        made.append((_bytes_of(data), _bytes_of(run)))
+    assert any("csi.zarr" in name for name in made[0][0])
+    assert any(name.endswith(".ply") for name in made[0][1])
+    assert made[1] == made[0]
+
+
+def test_functions_that_may_round_as_they_like_are_inlined() -> None:
+    """A function that a compiled one calls exists twice: by itself, and within its caller's file.
+
+    Which of the two serves depends on what the process loaded before. With a compiler that may
+    contract or reorder sums, the two need not round alike.
+    """
+    kernels = _kernels()
+    free = {
+        name: kernel
+        for name, kernel in kernels.items()
+        if any(kernel is called for caller in kernels.values() for called in _called_by(caller))
+        and kernel.targetoptions.get("fastmath")
+    }
+    assert len(free) > 40
+    outside = [
+        name
+        for name, kernel in free.items()
+        if not kernel.targetoptions.get("forceinline")
+        and kernel.targetoptions.get("inline") != "always"
+    ]
+    assert not outside, f"expected forceinline=True or inline='always' of {outside}"
+
+
+def _kernels() -> dict[str, Dispatcher]:
+    """All functions that numba compiles, by module and name."""
+    found = {}
+    for package in (rfgs_core, dataset_factory):
+        root = Path(package.__path__[0])
+        for path in root.rglob("*.py"):
+            if "njit(" in path.read_text():
+                parts = path.relative_to(root.parent).with_suffix("").parts
+                module = importlib.import_module(".".join(parts))
+                for value in vars(module).values():
+                    if isinstance(value, Dispatcher):
+                        function = value.py_func
+                        found[f"{function.__module__}.{function.__name__}"] = value
+    return found
+
+
+def _called_by(kernel: Dispatcher) -> list[Dispatcher]:
+    """Functions that a compiled one names."""
+    function = kernel.py_func
+    named = [function.__globals__.get(name) for name in function.__code__.co_names]
+    return [value for value in named if isinstance(value, Dispatcher)]

@@ -19,8 +19,8 @@ EVIDENCE_EXPONENT = 0.25
 #: How much of that moves Gaussians from one height to another: what is below or above the
 #: antennas mirrors waves away from them, and answers weaker than a trunk of the same surface.
 HEIGHT_EVIDENCE = 0.1
-#: Cross-section of a trunk [m²]. Heights and bodies are compared by their likeliest cells of that
-#: area: where the matched filter is blurred, equal sums would be too thin to stand out.
+#: Cross-section of a trunk [m²]. Heights are compared by their likeliest cells of that area: where
+#: the matched filter is blurred, equal sums would be too thin to stand out.
 CROSS_SECTION_M2 = 0.06
 #: Edge of the cells in which the density is taken as even [m].
 CELL_M = 0.04
@@ -30,9 +30,9 @@ CELL_M = 0.04
 class StartDensity:
     """Where new Gaussians are drawn: body-sized prior times matched filter, in cubic cells.
 
-    The densest part of a body is about as dense as the prior makes it, in all bodies alike and at
-    all heights. The matched filter decides where within a height, and to a small part between
-    heights.
+    A body has as much of it as the prior gives it, however well it is heard. Its densest parts are
+    about alike at all heights: the matched filter decides where within a height, and to a small
+    part between heights.
     """
 
     share: Float64[np.ndarray, "x y z"]
@@ -110,7 +110,7 @@ class StartCells:
             own = np.where(mine, share, 0)
             wanted = _densest(np.where(mine, prior, 0))
             own *= (wanted / np.maximum(_densest(own), 1e-300)) ** (1 - HEIGHT_EVIDENCE)
-            share = np.where(mine, own * wanted.sum() / max(_densest(own).sum(), 1e-300), share)
+            share = np.where(mine, own * prior[mine].sum() / max(own.sum(), 1e-300), share)
         return StartDensity(share / share.sum(), self.low_m, self.high_m)
 
 

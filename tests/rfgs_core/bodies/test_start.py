@@ -83,6 +83,19 @@ def test_a_loud_body_gets_no_more_gaussians_than_a_quiet_one() -> None:
     assert counts[0] == pytest.approx(10_000, abs=5 * math.sqrt(5000))
 
 
+def test_a_body_on_the_slope_of_a_louder_one_gets_as_many() -> None:
+    """Its side towards the other peaks: by its likeliest cells alone it would get fewer."""
+    bounds_m = np.array([[0.0, 0.0, 0.0], [4.0, 2.0, 2.0]])
+    x = 0.1 + 0.2 * np.arange(20)
+    slope = np.exp(-12.0 * np.abs(x - 1.0)).astype(np.float32)
+    power = np.broadcast_to(slope[:, None, None], (2, 20, 10, 10)).copy()
+    axes = np.array([[1.0, 1.0], [2.0, 1.0]])
+    share = StartDensity.of(flat_maps(power), Bodies.standing(axes), bounds_m).share
+    plain = StartDensity.of(flat_maps(), Bodies.standing(axes), bounds_m).share
+    middle = round((1.5 - 0.2) / CELL_M)
+    assert share[:middle].sum() == pytest.approx(plain[:middle].sum(), rel=0.02)
+
+
 @pytest.mark.parametrize("axis", [(0.75, 0.7), (0.13, 0.13), (1.4, 1.34)])
 def test_drawn_points_stay_in_bounds(axis: tuple[float, float]) -> None:
     rng = np.random.default_rng(1)

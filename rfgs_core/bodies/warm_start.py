@@ -44,10 +44,11 @@ def carry_over(
     fresh: Float64[np.ndarray, "M 3"],
     rng: np.random.Generator,
 ) -> tuple[Float64[np.ndarray, "M 3"], Int64[np.ndarray, "M"]]:
-    """Moves Gaussians along with their bodies; the least supported third is fresh.
+    """Moves Gaussians along with their bodies; the least supported third of each body is fresh.
 
-    Whoever has sat down, lain down or stood up is drawn anew: no Gaussian of one posture has a
-    place in the other.
+    Of each, not of all: somebody whom radio hears less would lose Gaussians in every frame. Whoever
+    has sat down, lain down or stood up is drawn anew: no Gaussian of one posture has a place in the
+    other.
 
     Args:
         before: The fitted frame before.
@@ -62,14 +63,16 @@ def carry_over(
     """
     points = _moved_along(before, bodies)
     changed = (before.bodies.sits != bodies.sits) | (before.bodies.lies != bodies.lies)
+    support, fresh_of = density.at(points), nearest_axis(fresh, bodies.axes_xy)
     anew = changed[before.body]
-    count = min(len(points) // 3, len(fresh), int((~anew).sum()))
-    weakest = np.argsort(np.where(anew, np.inf, density.at(points)))[:count]
-    points[weakest] = fresh[:count]
-    for body in np.flatnonzero(changed):
-        own = before.body == body
-        points[own] = cells.density(bodies.only(body)).draw(int(own.sum()), rng)
-    anew[weakest] = True
+    for body in range(len(bodies)):
+        own = np.flatnonzero(before.body == body)
+        if changed[body]:
+            points[own] = cells.density(bodies.only(body)).draw(len(own), rng)
+            continue
+        replacing = fresh[fresh_of == body][: len(own) // 3]
+        weakest = own[np.argsort(support[own])[: len(replacing)]]
+        points[weakest], anew[weakest] = replacing, True
     track_id = before.track_id.copy()
     track_id[anew] = before.unused_track + np.arange(int(anew.sum()))
     return points, track_id

@@ -23,9 +23,9 @@ def fitted(bodies: Bodies) -> Moving:
     return Moving(points, bodies, np.ones(COUNT), np.arange(COUNT) + 7, COUNT + 7)
 
 
-def carried(before: Moving, bodies: Bodies) -> tuple[np.ndarray, np.ndarray]:
+def carried(before: Moving, bodies: Bodies, maps: PairMaps = EVEN) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(1)
-    cells = StartCells.around(EVEN, bodies.axes_xy, BOUNDS_M)
+    cells = StartCells.around(maps, bodies.axes_xy, BOUNDS_M)
     density = cells.density(bodies)
     return carry_over(before, bodies, cells, density, density.draw(COUNT, rng), rng)
 
@@ -43,6 +43,21 @@ def test_gaussians_keep_their_place_on_a_body_that_walks_or_turns(knees, turn) -
     angle = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
     np.testing.assert_allclose(where[:, :2], offset[:, :2] @ angle.T, atol=1e-9)
     np.testing.assert_array_equal(where[:, 2], offset[:, 2])
+
+
+def test_who_is_hardly_heard_keeps_as_many_from_frame_to_frame() -> None:
+    """Its Gaussians have less support than anybody's, and would all be among the weakest third."""
+    power = np.ones((1, 26, 21, 13), np.float32)
+    power[:, 8:] = 1e-3 + np.exp(-40.0 * np.linspace(0.0, 1.0, 18))[None, :, None, None]
+    sharp = PairMaps(power, np.zeros(3), 0.2, np.zeros((1, 3)), np.ones((1, 3)))
+    bodies = Bodies.standing(np.array([[1.0, 2.0], [2.0, 2.0]]))
+    now = fitted(bodies)
+    first = np.bincount(now.body)
+    for _ in range(4):
+        points, track_id = carried(now, bodies, sharp)
+        assert (track_id < now.unused_track).sum() == pytest.approx(COUNT * 2 / 3, abs=2)
+        now = Moving(points, bodies, np.ones(COUNT), track_id, int(track_id.max()) + 1)
+    np.testing.assert_array_equal(np.bincount(now.body), first)
 
 
 def test_gaussians_turn_with_who_lies() -> None:

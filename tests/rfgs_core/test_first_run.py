@@ -123,7 +123,7 @@ def test_a_world_and_its_run_have_the_same_bytes_in_the_run_that_compiles(
         python("-m", "dataset_factory", "worlds", *worlds, "--out", data, must_work=True)
         # The same data for both: only the kernels of training may make a difference.
         world = tmp_path / "data_compiling" / "world_0000000"
-        short = ("--iterations", 5, "--out", run)
+        short = ("--radio", "wifi", "--iterations", 5, "--out", run)
         python("-m", "rfgs_core.cli", "train", world, *short, must_work=True)
         made.append((_bytes_of(data), _bytes_of(run)))
     assert any("csi.zarr" in name for name in made[0][0])

@@ -30,9 +30,9 @@ CELL_M = 0.04
 class StartDensity:
     """Where new Gaussians are drawn: body-sized prior times matched filter, in cubic cells.
 
-    A body has as much of it as the prior gives it, however well it is heard. Its densest parts are
-    about alike at all heights: the matched filter decides where within a height, and to a small
-    part between heights.
+    All bodies have as much of it, however well each is heard. Their densest parts are about alike
+    at all heights: the matched filter decides where within a height, and to a small part between
+    heights.
     """
 
     share: Float64[np.ndarray, "x y z"]
@@ -110,7 +110,7 @@ class StartCells:
             own = np.where(mine, share, 0)
             wanted = _densest(np.where(mine, prior, 0))
             own *= (wanted / np.maximum(_densest(own), 1e-300)) ** (1 - HEIGHT_EVIDENCE)
-            share = np.where(mine, own * prior[mine].sum() / max(own.sum(), 1e-300), share)
+            share = np.where(mine, own / max(own.sum(), 1e-300), share)
         return StartDensity(share / share.sum(), self.low_m, self.high_m)
 
 

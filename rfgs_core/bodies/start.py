@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, Float64
@@ -19,8 +19,8 @@ EVIDENCE_EXPONENT = 0.25
 #: How much of that moves Gaussians from one height to another: what is below or above the
 #: antennas mirrors waves away from them, and answers weaker than a trunk of the same surface.
 HEIGHT_EVIDENCE = 0.1
-#: Cross-section of a trunk [m²]. Heights are compared by their likeliest cells of that area: where
-#: the matched filter is blurred, equal sums would be too thin to stand out.
+#: Cross-section of a trunk [m²]. Heights and bodies are compared by their likeliest cells of that
+#: area: where the matched filter is blurred, equal sums would be too thin to stand out.
 CROSS_SECTION_M2 = 0.06
 #: Edge of the cells in which the density is taken as even [m].
 CELL_M = 0.04
@@ -30,8 +30,8 @@ CELL_M = 0.04
 class StartDensity:
     """Where new Gaussians are drawn: body-sized prior times matched filter, in cubic cells.
 
-    All bodies have as much of it, however well each is heard. Their densest parts are about alike
-    at all heights: the matched filter decides where within a height, and to a small part between
+    The densest part of a body is about as dense as the prior makes it, in all bodies alike and at
+    all heights. The matched filter decides where within a height, and to a small part between
     heights.
     """
 
@@ -54,6 +54,20 @@ class StartDensity:
         points = self.low_m + (index + rng.uniform(0, 1, (count, 3))) * CELL_M
         # The last cell along an axis may stick out of the scene.
         return np.clip(points, self.low_m, self.high_m)
+
+    def even(self, bodies: Bodies) -> StartDensity:
+        """The same with as much for each body: who is heard less takes up no less space.
+
+        Its densest cells alone say little of a body on the slope of another's echo. Evidence of
+        postures is taken without this, since a body that sits shows less of itself.
+        """
+        if len(bodies) < 2:
+            return self
+        cells = np.moveaxis(np.indices(self.share.shape), 0, -1).reshape(-1, 3)
+        whose = nearest_axis(self.low_m + (cells + 0.5) * CELL_M, bodies.axes_xy)
+        sums = np.bincount(whose, weights=self.share.ravel(), minlength=len(bodies))
+        share = self.share * (1.0 / np.maximum(sums, 1e-300))[whose].reshape(self.share.shape)
+        return replace(self, share=share / share.sum())
 
     def at(self, points: Float[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N"]:
         """Probability of the cells that points lie in, zero outside of all."""
@@ -110,7 +124,7 @@ class StartCells:
             own = np.where(mine, share, 0)
             wanted = _densest(np.where(mine, prior, 0))
             own *= (wanted / np.maximum(_densest(own), 1e-300)) ** (1 - HEIGHT_EVIDENCE)
-            share = np.where(mine, own / max(own.sum(), 1e-300), share)
+            share = np.where(mine, own * wanted.sum() / max(_densest(own).sum(), 1e-300), share)
         return StartDensity(share / share.sum(), self.low_m, self.high_m)
 
 

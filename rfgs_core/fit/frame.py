@@ -145,7 +145,7 @@ def start_frame(
     bodies = tell_postures(observations, maps, tracks.bodies, config, seed)
     tracks = replace(tracks, knees_rad=bodies.knees_rad)
     cells = StartCells.of(maps, bodies, observations.bounds_m)
-    density = cells.density(bodies)
+    density = cells.density(bodies).even(bodies)
     points = density.draw(config.num_gaussians, rng)
     track_id, goes_on, next_track = np.arange(len(points), dtype=np.int64), None, 0
     if before is not None:

@@ -102,7 +102,7 @@ class Cloud:
             skins = self._limbs.on_skins(observations, still)
             return state_at(skins.points, skins.normals, observations, self.config, still)
         bodies = Bodies.standing(axes_xy)
-        density = StartDensity.of(maps, bodies, observations.bounds_m)
+        density = StartDensity.of(maps, bodies, observations.bounds_m).even(bodies)
         points = density.draw(self.config.num_gaussians, self._rng)
         normals = outward_normals(points, bodies)
         return state_at(points, normals, observations, self.config, still)

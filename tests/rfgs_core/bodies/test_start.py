@@ -84,19 +84,24 @@ def test_a_loud_body_gets_no_more_gaussians_than_a_quiet_one() -> None:
 
 
 def test_a_body_on_the_slope_of_a_louder_one_gets_as_many() -> None:
-    """Its side towards the other peaks: by its likeliest cells alone it would get fewer.
-
-    Neither does it cost any to sit.
-    """
+    """Its side towards the other peaks: by its likeliest cells alone it would get fewer."""
     bounds_m = np.array([[0.0, 0.0, 0.0], [4.0, 2.0, 2.0]])
     x = 0.1 + 0.2 * np.arange(20)
     slope = np.exp(-12.0 * np.abs(x - 1.0)).astype(np.float32)
     power = np.broadcast_to(slope[:, None, None], (2, 20, 10, 10)).copy()
-    axes = np.array([[1.0, 1.0], [2.0, 1.0]])
+    axes = np.array([[1.0, 1.0], [2.04, 1.0]])
     for bodies in (Bodies.standing(axes), Bodies(axes, np.array([np.nan, 0.0]))):
-        share = StartDensity.of(flat_maps(power), bodies, bounds_m).share
-        middle = round((1.5 - 0.2) / CELL_M)
-        assert share[:middle].sum() == pytest.approx(0.5, rel=0.02)
+        density = StartDensity.of(flat_maps(power), bodies, bounds_m)
+        even = density.even(bodies)
+        middle = round((1.52 - 0.2) / CELL_M)
+        assert even.share[:middle].sum() == pytest.approx(0.5, rel=1e-9)
+        assert density.share[:middle].sum() != pytest.approx(0.5, rel=0.05)
+        # Within a body nothing changes.
+        for part in (np.s_[:middle], np.s_[middle:]):
+            own, before = even.share[part], density.share[part]
+            np.testing.assert_allclose(own / own.sum(), before / before.sum())
+    alone = StartDensity.of(flat_maps(power), Bodies.standing(axes[:1]), bounds_m)
+    assert alone.even(Bodies.standing(axes[:1])) is alone
 
 
 @pytest.mark.parametrize("axis", [(0.75, 0.7), (0.13, 0.13), (1.4, 1.34)])

@@ -84,6 +84,23 @@ def test_results_are_short_and_their_summary_leads_to_every_page() -> None:
         assert max(map(len, prose)) <= 120, page.name
 
 
+def test_figures_of_the_summary_stand_on_the_pages_it_links() -> None:
+    summary = (ROOT / "docs" / "results.md").read_text("utf-8")
+    table = summary[summary.index("## Summary") : summary.index("## Where it loses")]
+    checked = 0
+    for row in table.splitlines():
+        question, *figures = row.strip("|").split("|")
+        linked = re.findall(r"\]\((results/\w+\.md)", row)
+        if not linked:
+            continue
+        text = (ROOT / "docs" / linked[0]).read_text("utf-8")
+        known = set(re.findall(r"\d+\.\d+", text))
+        for number in re.findall(r"\d+\.\d+", " ".join(figures[:3])):
+            assert {number, number.rstrip("0")} & known, f"{question.strip()}: {number}"
+            checked += 1
+    assert checked > 80
+
+
 @pytest.mark.parametrize(
     "page",
     [

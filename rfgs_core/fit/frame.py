@@ -14,7 +14,8 @@ from torch import Tensor
 from rfgs_core.bodies.body_prior import outward_normals
 from rfgs_core.bodies.count import place_bodies
 from rfgs_core.bodies.gain import likelier_upright
-from rfgs_core.bodies.localise import PairMaps, in_order_of, locate_bodies, pair_maps
+from rfgs_core.bodies.likeliest_place import likeliest_places
+from rfgs_core.bodies.localise import NEAR_M, PairMaps, in_order_of, locate_bodies, pair_maps
 from rfgs_core.bodies.lying import with_lying
 from rfgs_core.bodies.motion_density import novelty, speeds_m_s, wanted_counts
 from rfgs_core.bodies.posture import tell_postures
@@ -258,20 +259,14 @@ def _followed(
     bounds_m, time_s = observations.bounds_m, observations.time_s
     several = config.bodies > 1 and observations.kind == "complex"
     placed = place_bodies(observations, config.bodies, config, seed) if several else None
-    axes_xy = placed
-    if before is None:
-        if axes_xy is None:
-            axes_xy = locate_bodies(maps, bounds_m, config.bodies)
-            axes_xy = separated(observations, maps, axes_xy, config, seed)
-        tracks = Tracks.begun(axes_xy, time_s)
+    near, reach_m = (None, NEAR_M) if before is None else before.expected(time_s)
+    if placed is None:
+        axes_xy = locate_bodies(maps, bounds_m, config.bodies, near, reach_m)
+        axes_xy = separated(observations, maps, axes_xy, config, seed, near, reach_m)
     else:
-        near, reach_m = before.expected(time_s)
-        if axes_xy is None:
-            axes_xy = locate_bodies(maps, bounds_m, config.bodies, near, reach_m)
-            axes_xy = separated(observations, maps, axes_xy, config, seed, near, reach_m)
-        else:
-            axes_xy = in_order_of(near, axes_xy)
-        tracks = before.moved(axes_xy, time_s)
+        axes_xy = placed if near is None else in_order_of(near, placed)
+    axes_xy = likeliest_places(observations, axes_xy)
+    tracks = Tracks.begun(axes_xy, time_s) if before is None else before.moved(axes_xy, time_s)
     lay = None if before is None else before.bodies
     bodies = with_lying(observations, maps, axes_xy, config, seed, lay)
     if placed is not None:

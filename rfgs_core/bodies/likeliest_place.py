@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where people are likeliest, each with what the walls send back of them.
+
+A map's peak is drawn aside by echoes off walls, the more so the fewer antennas tell directions.
+Here a place is as likely as what a standing body there explains of the channel, straight and by
+way of one wall, of levels that are fitted for each device pair (see `limbs.evidence.levels`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Complex64, Float64
+
+from rfgs_core.bodies.body_prior import Bodies
+from rfgs_core.bodies.expected_echoes import ExpectedEchoes, middle_of
+from rfgs_core.bodies.localise import BODY_RADIUS_M, SEPARATION_M
+from rfgs_core.limbs.evidence.entries import Pair, pairs_of
+from rfgs_core.limbs.evidence.levels import Levels
+from rfgs_core.measure.observations import Observations
+
+#: With fewer device pairs whether somebody sits moves the place: all are taken to stand.
+FEWEST_PAIRS = 4
+#: Steps from a place to better ones, each halved where none is [m].
+_FIRST_STEP_M, _LAST_STEP_M = 0.16, 0.04
+_WAYS = np.array([[x, y] for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y], dtype=np.float64)
+#: Times that each of several people is moved beside the others.
+_ROUNDS = 2
+
+
+def likeliest_places(
+    observations: Observations, axes_xy: Float64[np.ndarray, "body 2"]
+) -> Float64[np.ndarray, "body 2"]:
+    """Places towards which evidence rises from those that were found.
+
+    Args:
+        observations: The frame; without phases, or of fewer than `FEWEST_PAIRS` device pairs,
+            nothing is changed.
+        axes_xy: Where people were found [m].
+
+    Returns:
+        Their places, in the same order [m].
+    """
+    if observations.kind != "complex" or len(observations.pairs[1]) < FEWEST_PAIRS:
+        return axes_xy
+    places = axes_xy.copy()
+    for _ in range(_ROUNDS if len(places) > 1 else 1):
+        before = places.copy()
+        for body in range(len(places)):
+            places[body] = _climbed(observations, places, body)
+        if (places == before).all():
+            break
+    return places
+
+
+def _climbed(
+    observations: Observations, places: Float64[np.ndarray, "body 2"], body: int
+) -> Float64[np.ndarray, "2"]:
+    """Where one of some people is likeliest, uphill from where they are."""
+    others = np.delete(places, body, axis=0)
+    evidence = _PlaceEvidence(observations, places[body], others)
+    low, high = observations.bounds_m[:, :2] + np.array([[BODY_RADIUS_M], [-BODY_RADIUS_M]])
+    here, step_m = places[body], _FIRST_STEP_M
+    likely = evidence.at(here)
+    while step_m >= _LAST_STEP_M:
+        around = here + step_m * _WAYS
+        inside = ((around >= low) & (around <= high)).all(axis=1)
+        apart_m = np.linalg.norm(around[:, None] - others, axis=2).min(axis=1, initial=np.inf)
+        tried = around[inside & (apart_m >= SEPARATION_M)]
+        values = [evidence.at(place) for place in tried]
+        best = int(np.argmax(values)) if values else -1
+        if values and values[best] > likely:
+            here, likely = tried[best], values[best]
+        else:
+            step_m /= 2
+    return here
+
+
+class _PlaceEvidence:
+    """How likely a frame is with somebody at a place beside others; what was tried is kept."""
+
+    def __init__(
+        self,
+        observations: Observations,
+        near: Float64[np.ndarray, "2"],
+        others: Float64[np.ndarray, "body 2"],
+    ) -> None:
+        self._bounds_m = observations.bounds_m
+        self._floor_m = float(observations.bounds_m[0, 2])
+        pairs = pairs_of(observations, middle_of(Bodies.standing(near[None]), self._floor_m))
+        self._pairs = [pair for pair in pairs if pair.change.any()]
+        self._others = [self._parts(place) for place in others]
+        self._known: dict[tuple[int, int], float] = {}
+
+    def at(self, place: Float64[np.ndarray, "2"]) -> float:
+        """Log-likelihood at the likeliest levels, less a constant [nat]."""
+        millimetres = np.round(1000 * place).astype(int)
+        key = (int(millimetres[0]), int(millimetres[1]))
+        if key not in self._known:
+            parts = zip(self._parts(place), *self._others, strict=True)
+            self._known[key] = sum(
+                Levels.fitted(pair.change, [part for one in heard for part in one]).log_likelihood
+                for pair, heard in zip(self._pairs, parts, strict=True)
+            )
+        return self._known[key]
+
+    def _parts(
+        self, place: Float64[np.ndarray, "2"]
+    ) -> list[tuple[Complex64[np.ndarray, "entry entry"], Complex64[np.ndarray, "entry entry"]]]:
+        """Covariances of each pair: of straight echoes, and of those by way of one wall."""
+        body = ExpectedEchoes.at(Bodies.standing(place[None]), self._floor_m, self._pairs)
+
+        def heard(pair: Pair) -> tuple[np.ndarray, np.ndarray]:
+            return body.echoes(pair), body.by_bounces(pair, self._bounds_m)
+
+        return [heard(pair) for pair in self._pairs]

@@ -3,18 +3,23 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import zarr
 from lit_bodies import lit
 
 from rfgs_core.bodies.count import place_bodies
 from rfgs_core.bodies.excess_path import excess_path_m
 from rfgs_core.cli import main
 from rfgs_core.dataset import open_dataset
+from rfgs_core.dataset.csi_store import digest
+from rfgs_core.dataset.names import SequenceFiles
+from rfgs_core.files import write_json
 from rfgs_core.measure.observations import Observations, excess_turn
 from rfgs_core.radio import preset
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
@@ -74,15 +79,26 @@ def test_people_are_placed_where_they_stand_or_not_at_all(empty: Observations) -
     assert place_bodies(empty, 2, TrainConfig(), 0) is None
 
 
+def behind_a_wall(dataset: Path, path_m: float) -> Path:
+    """Makes what the moving ball of the tiny dataset changes come later, in the first frame."""
+    sequence, files = open_dataset(dataset).sequence(), SequenceFiles(dataset / "tiny")
+    static = sequence.csi_static("wifi")
+    turn = excess_turn(sequence.radio_spec("wifi").freq_hz, path_m)
+    stored = (static + (sequence.csi("wifi", 1) - static) * turn).astype(np.complex64)
+    zarr.open_array(str(files.csi("wifi") / "csi"), mode="r+")[0] = stored
+    write_json(files.csi_done("wifi", 1), {"sha256": digest(stored)})
+    return dataset
+
+
 def test_what_a_run_says_has_the_excess_path_that_its_fit_was_spared(
     tiny_dataset: Path, tmp_path: Path, quick_config: TrainConfig
 ) -> None:
-    data = open_dataset(tiny_dataset)
+    data = open_dataset(behind_a_wall(Path(shutil.copytree(tiny_dataset, tmp_path / "data")), 2.0))
     out = tmp_path / "run"
-    run = train_sequence(data, data.sequence(), "wifi", [1], quick_config, out, excess=0.7)
-    assert open_run(out).config.settings.excess_m == 0.7
+    run = train_sequence(data, data.sequence(), "wifi", [1], quick_config, out, excess=2.0)
+    assert open_run(out).config.settings.excess_m == 2.0
     reported, seen = run.as_reported(1), run.observations(1)
-    turn = excess_turn(seen.freq_hz, 0.7)
+    turn = excess_turn(seen.freq_hz, 2.0)
     np.testing.assert_allclose(seen.delta * turn, reported.delta, atol=1e-6)
     change = run.visible_change(1, seen)
     visible = seen.links[..., None] & seen.subcarriers

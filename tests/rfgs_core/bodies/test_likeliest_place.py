@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Places are found in spite of echoes off walls, which draw the peaks of maps aside."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from lit_bodies import lit
+
+from rfgs_core.bodies.likeliest_place import FEWEST_PAIRS, likeliest_places
+from rfgs_core.bodies.localise import (
+    BODY_RADIUS_M,
+    SEPARATION_M,
+    locate_bodies,
+    pair_maps,
+)
+from rfgs_core.measure.observations import Observations
+from rfgs_core.radio import preset
+
+ROOM_M = np.array([[0.0, 0.0, 0.0], [5.0, 4.6, 2.4]])
+ALONE = [(1.4, 2.9), (3.5, 1.3), (2.4, 2.2), (3.8, 3.3)]
+#: Share of an amplitude that a wall reflects.
+REFLECTED = 0.6
+
+
+@pytest.fixture
+def empty(make_observations: Callable[..., Observations]) -> Observations:
+    radio = replace(preset("wifi"), rx_rows=2, rx_cols=2, num_subcarriers=24)
+    return make_observations(radio=radio, bounds_m=ROOM_M)
+
+
+def in_a_room(empty: Observations, bodies: list[tuple[float, float]], seed: int) -> Observations:
+    """Scatterers heard straight, and with the antennas of either end in the mirror of each wall."""
+    delta = lit(empty, bodies, seed).delta
+    for axis in range(3):
+        for at_m in ROOM_M[:, axis]:
+            for end in ("tx_xyz", "rx_xyz"):
+                image = getattr(empty.layout, end).copy()
+                image[:, axis] = 2.0 * at_m - image[:, axis]
+                behind = replace(empty, layout=replace(empty.layout, **{end: image}))
+                delta = delta + REFLECTED * lit(behind, bodies, seed).delta
+    return empty.with_delta(delta)
+
+
+def off_m(places: np.ndarray, bodies: list[tuple[float, float]]) -> np.ndarray:
+    return np.linalg.norm(places - np.array(bodies), axis=1)
+
+
+def test_echoes_off_walls_draw_nobody_aside(empty: Observations) -> None:
+    by_map, by_evidence = [], []
+    for seed, body in enumerate(ALONE):
+        seen = in_a_room(empty, [body], seed)
+        found = locate_bodies(pair_maps(seen), seen.bounds_m, 1)
+        by_map += off_m(found, [body]).tolist()
+        by_evidence += off_m(likeliest_places(seen, found), [body]).tolist()
+    assert np.mean(by_map) > 0.15, "the case is too easy"
+    assert np.mean(by_evidence) < 0.5 * np.mean(by_map), by_evidence
+
+
+def test_several_people_are_each_placed_beside_the_others(empty: Observations) -> None:
+    bodies = [ALONE[0], ALONE[1]]
+    seen = in_a_room(empty, bodies, seed=3)
+    guessed = np.array(bodies) + np.array([[0.2, -0.1], [-0.15, 0.2]])
+    found = likeliest_places(seen, guessed)
+    assert off_m(found, bodies).max() < 0.15
+
+
+def test_people_stay_apart_and_in_the_room(empty: Observations) -> None:
+    corner = (ROOM_M[0, 0] + BODY_RADIUS_M, ROOM_M[0, 1] + BODY_RADIUS_M)
+    seen = in_a_room(empty, [corner], seed=4)
+    guessed = np.array([corner, (corner[0] + SEPARATION_M + 0.05, corner[1])]) + 0.1
+    found = likeliest_places(seen, guessed)
+    assert np.linalg.norm(found[1] - found[0]) >= SEPARATION_M - 1e-9
+    assert (found >= ROOM_M[0, :2] + BODY_RADIUS_M - 1e-9).all()
+    assert (found <= ROOM_M[1, :2] - BODY_RADIUS_M + 1e-9).all()
+
+
+def test_without_phases_or_with_few_pairs_places_stay(empty: Observations) -> None:
+    seen = in_a_room(empty, ALONE[:1], seed=0)
+    guessed = np.array(ALONE[:1]) + 0.2
+    pair, _ = seen.pairs
+    few = replace(seen, links=seen.links & (pair >= 0) & (pair < FEWEST_PAIRS - 1))
+    for left in (few, replace(seen, kind="delay_power")):
+        np.testing.assert_array_equal(likeliest_places(left, guessed), guessed)
+    assert (likeliest_places(seen, guessed) != guessed).any()

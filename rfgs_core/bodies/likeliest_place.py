@@ -8,6 +8,8 @@ way of one wall, of levels that are fitted for each device pair (see `limbs.evid
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Complex64, Float64
 
@@ -27,44 +29,40 @@ _WAYS = np.array([[x, y] for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y], dty
 _ROUNDS = 2
 
 
-def likeliest_places(
-    observations: Observations, axes_xy: Float64[np.ndarray, "body 2"]
-) -> Float64[np.ndarray, "body 2"]:
-    """Places towards which evidence rises from those that were found.
+def likeliest_places(observations: Observations, bodies: Bodies) -> Bodies:
+    """Bodies moved to where evidence of them rises; who lies stays.
 
     Args:
         observations: The frame; without phases, or of fewer than `FEWEST_PAIRS` device pairs,
             nothing is changed.
-        axes_xy: Where people were found [m].
-
-    Returns:
-        Their places, in the same order [m].
+        bodies: Where people were found.
     """
     if observations.kind != "complex" or len(observations.pairs[1]) < FEWEST_PAIRS:
-        return axes_xy
-    places = axes_xy.copy()
-    for _ in range(_ROUNDS if len(places) > 1 else 1):
-        before = places.copy()
-        for body in range(len(places)):
-            places[body] = _climbed(observations, places, body)
-        if (places == before).all():
+        return bodies
+    upright = np.flatnonzero(~bodies.lies)
+    for _ in range(_ROUNDS if len(bodies) > 1 else 1):
+        before = bodies
+        for body in upright:
+            axes_xy = bodies.axes_xy.copy()
+            axes_xy[body] = _climbed(observations, bodies, int(body))
+            bodies = replace(bodies, axes_xy=axes_xy)
+        if (bodies.axes_xy == before.axes_xy).all():
             break
-    return places
+    return bodies
 
 
-def _climbed(
-    observations: Observations, places: Float64[np.ndarray, "body 2"], body: int
-) -> Float64[np.ndarray, "2"]:
-    """Where one of some people is likeliest, uphill from where they are."""
-    others = np.delete(places, body, axis=0)
-    evidence = _PlaceEvidence(observations, places[body], others)
+def _climbed(observations: Observations, bodies: Bodies, body: int) -> Float64[np.ndarray, "2"]:
+    """Where one of some bodies is likeliest, uphill from where it is."""
+    others = [bodies.only(k) for k in range(len(bodies)) if k != body]
+    here, step_m = bodies.axes_xy[body], _FIRST_STEP_M
+    evidence = _PlaceEvidence(observations, here, others)
     low, high = observations.bounds_m[:, :2] + np.array([[BODY_RADIUS_M], [-BODY_RADIUS_M]])
-    here, step_m = places[body], _FIRST_STEP_M
+    others_xy = np.delete(bodies.axes_xy, body, axis=0)
     likely = evidence.at(here)
     while step_m >= _LAST_STEP_M:
         around = here + step_m * _WAYS
         inside = ((around >= low) & (around <= high)).all(axis=1)
-        apart_m = np.linalg.norm(around[:, None] - others, axis=2).min(axis=1, initial=np.inf)
+        apart_m = np.linalg.norm(around[:, None] - others_xy, axis=2).min(axis=1, initial=np.inf)
         tried = around[inside & (apart_m >= SEPARATION_M)]
         values = [evidence.at(place) for place in tried]
         best = int(np.argmax(values)) if values else -1
@@ -79,16 +77,13 @@ class _PlaceEvidence:
     """How likely a frame is with somebody at a place beside others; what was tried is kept."""
 
     def __init__(
-        self,
-        observations: Observations,
-        near: Float64[np.ndarray, "2"],
-        others: Float64[np.ndarray, "body 2"],
+        self, observations: Observations, near: Float64[np.ndarray, "2"], others: list[Bodies]
     ) -> None:
         self._bounds_m = observations.bounds_m
         self._floor_m = float(observations.bounds_m[0, 2])
         pairs = pairs_of(observations, middle_of(Bodies.standing(near[None]), self._floor_m))
         self._pairs = [pair for pair in pairs if pair.change.any()]
-        self._others = [self._parts(place) for place in others]
+        self._others = [self._parts(one) for one in others]
         self._known: dict[tuple[int, int], float] = {}
 
     def at(self, place: Float64[np.ndarray, "2"]) -> float:
@@ -96,7 +91,7 @@ class _PlaceEvidence:
         millimetres = np.round(1000 * place).astype(int)
         key = (int(millimetres[0]), int(millimetres[1]))
         if key not in self._known:
-            parts = zip(self._parts(place), *self._others, strict=True)
+            parts = zip(self._parts(Bodies.standing(place[None])), *self._others, strict=True)
             self._known[key] = sum(
                 Levels.fitted(pair.change, [part for one in heard for part in one]).log_likelihood
                 for pair, heard in zip(self._pairs, parts, strict=True)
@@ -104,10 +99,10 @@ class _PlaceEvidence:
         return self._known[key]
 
     def _parts(
-        self, place: Float64[np.ndarray, "2"]
+        self, one: Bodies
     ) -> list[tuple[Complex64[np.ndarray, "entry entry"], Complex64[np.ndarray, "entry entry"]]]:
         """Covariances of each pair: of straight echoes, and of those by way of one wall."""
-        body = ExpectedEchoes.at(Bodies.standing(place[None]), self._floor_m, self._pairs)
+        body = ExpectedEchoes.at(one, self._floor_m, self._pairs)
 
         def heard(pair: Pair) -> tuple[np.ndarray, np.ndarray]:
             return body.echoes(pair), body.by_bounces(pair, self._bounds_m)

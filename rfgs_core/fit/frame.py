@@ -265,13 +265,14 @@ def _followed(
         axes_xy = separated(observations, maps, axes_xy, config, seed, near, reach_m)
     else:
         axes_xy = placed if near is None else in_order_of(near, placed)
-    axes_xy = likeliest_places(observations, axes_xy)
-    tracks = Tracks.begun(axes_xy, time_s) if before is None else before.moved(axes_xy, time_s)
     lay = None if before is None else before.bodies
     bodies = with_lying(observations, maps, axes_xy, config, seed, lay)
     if placed is not None:
         # What others leave of their echoes may look like somebody who lies.
         bodies = likelier_upright(observations, bodies, axes_xy)
+    bodies = likeliest_places(observations, bodies)
+    axes_xy = bodies.axes_xy
+    tracks = Tracks.begun(axes_xy, time_s) if before is None else before.moved(axes_xy, time_s)
     return tracks.laid(bodies)
 
 

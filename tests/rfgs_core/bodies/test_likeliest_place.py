@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from lit_bodies import lit
 
+from rfgs_core.bodies.body_prior import Bodies
 from rfgs_core.bodies.likeliest_place import FEWEST_PAIRS, likeliest_places
 from rfgs_core.bodies.localise import (
     BODY_RADIUS_M,
@@ -45,6 +46,10 @@ def in_a_room(empty: Observations, bodies: list[tuple[float, float]], seed: int)
     return empty.with_delta(delta)
 
 
+def moved(seen: Observations, places: np.ndarray) -> np.ndarray:
+    return likeliest_places(seen, Bodies.standing(places)).axes_xy
+
+
 def off_m(places: np.ndarray, bodies: list[tuple[float, float]]) -> np.ndarray:
     return np.linalg.norm(places - np.array(bodies), axis=1)
 
@@ -55,7 +60,7 @@ def test_echoes_off_walls_draw_nobody_aside(empty: Observations) -> None:
         seen = in_a_room(empty, [body], seed)
         found = locate_bodies(pair_maps(seen), seen.bounds_m, 1)
         by_map += off_m(found, [body]).tolist()
-        by_evidence += off_m(likeliest_places(seen, found), [body]).tolist()
+        by_evidence += off_m(moved(seen, found), [body]).tolist()
     assert np.mean(by_map) > 0.15, "the case is too easy"
     assert np.mean(by_evidence) < 0.5 * np.mean(by_map), by_evidence
 
@@ -64,7 +69,7 @@ def test_several_people_are_each_placed_beside_the_others(empty: Observations) -
     bodies = [ALONE[0], ALONE[1]]
     seen = in_a_room(empty, bodies, seed=3)
     guessed = np.array(bodies) + np.array([[0.2, -0.1], [-0.15, 0.2]])
-    found = likeliest_places(seen, guessed)
+    found = moved(seen, guessed)
     assert off_m(found, bodies).max() < 0.15
 
 
@@ -72,7 +77,7 @@ def test_people_stay_apart_and_in_the_room(empty: Observations) -> None:
     corner = (ROOM_M[0, 0] + BODY_RADIUS_M, ROOM_M[0, 1] + BODY_RADIUS_M)
     seen = in_a_room(empty, [corner], seed=4)
     guessed = np.array([corner, (corner[0] + SEPARATION_M + 0.05, corner[1])]) + 0.1
-    found = likeliest_places(seen, guessed)
+    found = moved(seen, guessed)
     assert np.linalg.norm(found[1] - found[0]) >= SEPARATION_M - 1e-9
     assert (found >= ROOM_M[0, :2] + BODY_RADIUS_M - 1e-9).all()
     assert (found <= ROOM_M[1, :2] - BODY_RADIUS_M + 1e-9).all()
@@ -84,5 +89,16 @@ def test_without_phases_or_with_few_pairs_places_stay(empty: Observations) -> No
     pair, _ = seen.pairs
     few = replace(seen, links=seen.links & (pair >= 0) & (pair < FEWEST_PAIRS - 1))
     for left in (few, replace(seen, kind="delay_power")):
-        np.testing.assert_array_equal(likeliest_places(left, guessed), guessed)
-    assert (likeliest_places(seen, guessed) != guessed).any()
+        np.testing.assert_array_equal(moved(left, guessed), guessed)
+    assert (moved(seen, guessed) != guessed).any()
+
+
+def test_who_lies_stays(empty: Observations) -> None:
+    stands, lies = np.array(ALONE[0]), np.array(ALONE[1])
+    seen = in_a_room(empty, [tuple(stands)], seed=0)
+    lying = np.array([[np.nan, np.nan], [0.4, 0.13]])
+    both = Bodies(np.array([stands + 0.2, lies]), np.full(2, np.nan), lying)
+    found = likeliest_places(seen, both)
+    np.testing.assert_array_equal(found.axes_xy[1], lies)
+    np.testing.assert_array_equal(found.lies, [False, True])
+    assert np.linalg.norm(found.axes_xy[0] - stands) < 0.15

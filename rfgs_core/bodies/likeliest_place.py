@@ -9,6 +9,7 @@ way of one wall, of levels that are fitted for each device pair (see `limbs.evid
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 from jaxtyping import Complex64, Float64
@@ -16,7 +17,7 @@ from jaxtyping import Complex64, Float64
 from rfgs_core.bodies.body_prior import Bodies
 from rfgs_core.bodies.expected_echoes import ExpectedEchoes, middle_of
 from rfgs_core.bodies.localise import BODY_RADIUS_M, SEPARATION_M
-from rfgs_core.limbs.evidence.entries import Pair, pairs_of
+from rfgs_core.limbs.evidence.entries import pairs_of
 from rfgs_core.limbs.evidence.levels import Levels
 from rfgs_core.measure.observations import Observations
 
@@ -25,6 +26,9 @@ FEWEST_PAIRS = 4
 #: Steps from a place to better ones, each halved where none is [m].
 _FIRST_STEP_M, _LAST_STEP_M = 0.16, 0.04
 _WAYS = np.array([[x, y] for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y], dtype=np.float64)
+#: A body is moved for as much more evidence as this share of what it explains where it was found:
+#: which way it faces and what its limbs do, which is not known here, changes that as well.
+TO_MOVE = 0.02
 #: Times that each of several people is moved beside the others.
 _ROUNDS = 2
 
@@ -54,11 +58,12 @@ def likeliest_places(observations: Observations, bodies: Bodies) -> Bodies:
 def _climbed(observations: Observations, bodies: Bodies, body: int) -> Float64[np.ndarray, "2"]:
     """Where one of some bodies is likeliest, uphill from where it is."""
     others = [bodies.only(k) for k in range(len(bodies)) if k != body]
-    here, step_m = bodies.axes_xy[body], _FIRST_STEP_M
-    evidence = _PlaceEvidence(observations, here, others)
+    found, step_m = bodies.axes_xy[body], _FIRST_STEP_M
+    evidence = _PlaceEvidence(observations, found, others)
     low, high = observations.bounds_m[:, :2] + np.array([[BODY_RADIUS_M], [-BODY_RADIUS_M]])
     others_xy = np.delete(bodies.axes_xy, body, axis=0)
-    likely = evidence.at(here)
+    here, likely = found, evidence.at(found)
+    enough = likely + TO_MOVE * (likely - evidence.without())
     while step_m >= _LAST_STEP_M:
         around = here + step_m * _WAYS
         inside = ((around >= low) & (around <= high)).all(axis=1)
@@ -70,7 +75,13 @@ def _climbed(observations: Observations, bodies: Bodies, body: int) -> Float64[n
             here, likely = tried[best], values[best]
         else:
             step_m /= 2
-    return here
+    return here if likely > enough else found
+
+
+#: Of each device pair the covariances of a body's straight echoes, and of those off one wall.
+_Parts: TypeAlias = list[
+    tuple[Complex64[np.ndarray, "entry entry"], Complex64[np.ndarray, "entry entry"]]
+]
 
 
 class _PlaceEvidence:
@@ -91,20 +102,24 @@ class _PlaceEvidence:
         millimetres = np.round(1000 * place).astype(int)
         key = (int(millimetres[0]), int(millimetres[1]))
         if key not in self._known:
-            parts = zip(self._parts(Bodies.standing(place[None])), *self._others, strict=True)
-            self._known[key] = sum(
-                Levels.fitted(pair.change, [part for one in heard for part in one]).log_likelihood
-                for pair, heard in zip(self._pairs, parts, strict=True)
-            )
+            body = self._parts(Bodies.standing(place[None]))
+            self._known[key] = self._likelihood([body, *self._others])
         return self._known[key]
 
-    def _parts(
-        self, one: Bodies
-    ) -> list[tuple[Complex64[np.ndarray, "entry entry"], Complex64[np.ndarray, "entry entry"]]]:
+    def without(self) -> float:
+        """The same if nobody is there but the others [nat]."""
+        return self._likelihood(self._others)
+
+    def _likelihood(self, bodies: list[_Parts]) -> float:
+        """Of the echoes of some bodies."""
+        return sum(
+            Levels.fitted(
+                pair.change, [part for body in bodies for part in body[row]]
+            ).log_likelihood
+            for row, pair in enumerate(self._pairs)
+        )
+
+    def _parts(self, one: Bodies) -> _Parts:
         """Covariances of each pair: of straight echoes, and of those by way of one wall."""
         body = ExpectedEchoes.at(one, self._floor_m, self._pairs)
-
-        def heard(pair: Pair) -> tuple[np.ndarray, np.ndarray]:
-            return body.echoes(pair), body.by_bounces(pair, self._bounds_m)
-
-        return [heard(pair) for pair in self._pairs]
+        return [(body.echoes(pair), body.by_bounces(pair, self._bounds_m)) for pair in self._pairs]

@@ -33,37 +33,58 @@ TO_MOVE = 0.02
 _ROUNDS = 2
 
 
-def likeliest_places(observations: Observations, bodies: Bodies) -> Bodies:
-    """Bodies moved to where evidence of them rises; who lies stays.
+def likeliest_places(
+    observations: Observations, bodies: Bodies, axes_xy: Float64[np.ndarray, "body 2"]
+) -> Bodies:
+    """Bodies moved to where evidence of them rises; who lies stays, or stands if that is likelier.
 
     Args:
         observations: The frame; without phases, or of fewer than `FEWEST_PAIRS` device pairs,
             nothing is changed.
-        bodies: Where people were found.
+        bodies: Where people were found, and who of them lies.
+        axes_xy: Where each was found upright [m].
     """
     if observations.kind != "complex" or len(observations.pairs[1]) < FEWEST_PAIRS:
         return bodies
-    upright = np.flatnonzero(~bodies.lies)
     for _ in range(_ROUNDS if len(bodies) > 1 else 1):
         before = bodies
-        for body in upright:
-            axes_xy = bodies.axes_xy.copy()
-            axes_xy[body] = _climbed(observations, bodies, int(body))
-            bodies = replace(bodies, axes_xy=axes_xy)
-        if (bodies.axes_xy == before.axes_xy).all():
+        for body in range(len(bodies)):
+            bodies = _moved(observations, bodies, body, axes_xy[body])
+        axes_xy = bodies.axes_xy
+        if (axes_xy == before.axes_xy).all():
             break
     return bodies
 
 
-def _climbed(observations: Observations, bodies: Bodies, body: int) -> Float64[np.ndarray, "2"]:
-    """Where one of some bodies is likeliest, uphill from where it is."""
-    others = [bodies.only(k) for k in range(len(bodies)) if k != body]
-    found, step_m = bodies.axes_xy[body], _FIRST_STEP_M
-    evidence = _PlaceEvidence(observations, found, others)
+def _moved(
+    observations: Observations, bodies: Bodies, body: int, upright_xy: Float64[np.ndarray, "2"]
+) -> Bodies:
+    """Bodies, one of whom is where and how it is likeliest."""
+    alone = [bodies.only(k) for k in range(len(bodies))]
+    one, others = alone[body], alone[:body] + alone[body + 1 :]
+    evidence = _PlaceEvidence(observations, upright_xy, others)
+    found = evidence.at(upright_xy)
+    here, likely = _climbed(evidence, observations, upright_xy, Bodies.together(others).axes_xy)
+    if one.lies[0]:
+        if likely <= evidence.of(one):
+            return bodies
+        return Bodies.together([*alone[:body], Bodies.standing(here[None]), *alone[body + 1 :]])
+    if likely - found <= TO_MOVE * (found - evidence.of(None)):
+        return bodies
+    axes_xy = bodies.axes_xy.copy()
+    axes_xy[body] = here
+    return replace(bodies, axes_xy=axes_xy)
+
+
+def _climbed(
+    evidence: _PlaceEvidence,
+    observations: Observations,
+    here: Float64[np.ndarray, "2"],
+    others_xy: Float64[np.ndarray, "other 2"],
+) -> tuple[Float64[np.ndarray, "2"], float]:
+    """The likeliest place uphill from one, in the room and apart from others."""
     low, high = observations.bounds_m[:, :2] + np.array([[BODY_RADIUS_M], [-BODY_RADIUS_M]])
-    others_xy = np.delete(bodies.axes_xy, body, axis=0)
-    here, likely = found, evidence.at(found)
-    enough = likely + TO_MOVE * (likely - evidence.without())
+    step_m, likely = _FIRST_STEP_M, evidence.at(here)
     while step_m >= _LAST_STEP_M:
         around = here + step_m * _WAYS
         inside = ((around >= low) & (around <= high)).all(axis=1)
@@ -75,7 +96,7 @@ def _climbed(observations: Observations, bodies: Bodies, body: int) -> Float64[n
             here, likely = tried[best], values[best]
         else:
             step_m /= 2
-    return here if likely > enough else found
+    return here, likely
 
 
 #: Of each device pair the covariances of a body's straight echoes, and of those off one wall.
@@ -102,16 +123,12 @@ class _PlaceEvidence:
         millimetres = np.round(1000 * place).astype(int)
         key = (int(millimetres[0]), int(millimetres[1]))
         if key not in self._known:
-            body = self._parts(Bodies.standing(place[None]))
-            self._known[key] = self._likelihood([body, *self._others])
+            self._known[key] = self.of(Bodies.standing(place[None]))
         return self._known[key]
 
-    def without(self) -> float:
-        """The same if nobody is there but the others [nat]."""
-        return self._likelihood(self._others)
-
-    def _likelihood(self, bodies: list[_Parts]) -> float:
-        """Of the echoes of some bodies."""
+    def of(self, one: Bodies | None) -> float:
+        """The same for a body that may lie, or for nobody, beside the others."""
+        bodies = self._others if one is None else [self._parts(one), *self._others]
         return sum(
             Levels.fitted(
                 pair.change, [part for body in bodies for part in body[row]]

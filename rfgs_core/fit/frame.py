@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The fit of one frame, in named stages: locate, posture, draw, power, reflectivity, refine."""
+"""The fit of one frame in stages: locate, settle, posture, draw, power, reflectivity, refine."""
 
 from __future__ import annotations
 
@@ -270,7 +270,7 @@ def _followed(
     if placed is not None:
         # What others leave of their echoes may look like somebody who lies.
         bodies = likelier_upright(observations, bodies, axes_xy)
-    bodies = likeliest_places(observations, bodies)
+    bodies = likeliest_places(observations, bodies, axes_xy)
     axes_xy = bodies.axes_xy
     tracks = Tracks.begun(axes_xy, time_s) if before is None else before.moved(axes_xy, time_s)
     return tracks.laid(bodies)

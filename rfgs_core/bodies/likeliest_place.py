@@ -28,7 +28,7 @@ _FIRST_STEP_M, _LAST_STEP_M = 0.16, 0.04
 _WAYS = np.array([[x, y] for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y], dtype=np.float64)
 #: A body is moved for as much more evidence as this share of what it explains where it was found:
 #: which way it faces and what its limbs do, which is not known here, changes that as well.
-TO_MOVE = 0.03
+TO_MOVE = 0.02
 #: Times that each of several people is moved beside the others.
 _ROUNDS = 2
 

@@ -121,6 +121,8 @@ def start_frame(
     before: FrameState | None,
     encoder: Encoder = MATCHED_FILTER,
     earlier: Observations | None = None,
+    *,
+    settle: bool = True,
 ) -> FrameState:
     """Locates the bodies, tells how they hold themselves and draws Gaussians.
 
@@ -135,6 +137,7 @@ def start_frame(
         before: The fitted frame before; None in a first one.
         encoder: φ.
         earlier: What was observed then; only `--density motion` reads it.
+        settle: Whether evidence moves the bodies from where the map shows them.
 
     Raises:
         RfgsError: Nobody changes the channel.
@@ -142,7 +145,8 @@ def start_frame(
     _need_change(observations)
     rng = np.random.default_rng(seed)
     maps = pair_maps(observations)
-    tracks = _followed(None if before is None else before.tracks, maps, observations, config, seed)
+    known = None if before is None else before.tracks
+    tracks = _followed(known, maps, observations, config, seed, settle)
     bodies = tell_postures(observations, maps, tracks.bodies, config, seed)
     tracks = replace(tracks, knees_rad=bodies.knees_rad)
     cells = StartCells.of(maps, bodies, observations.bounds_m)
@@ -236,7 +240,7 @@ def followed(
         RfgsError: Nobody changes the channel.
     """
     _need_change(observations)
-    return _followed(before, pair_maps(observations), observations, config, seed)
+    return _followed(before, pair_maps(observations), observations, config, seed, True)
 
 
 def _need_change(observations: Observations) -> None:
@@ -254,6 +258,7 @@ def _followed(
     observations: Observations,
     config: TrainConfig,
     seed: int,
+    settle: bool,
 ) -> Tracks:
     """Finds the bodies, anywhere in a first frame, where they are expected in a later one."""
     bounds_m, time_s = observations.bounds_m, observations.time_s
@@ -270,7 +275,8 @@ def _followed(
     if placed is not None:
         # What others leave of their echoes may look like somebody who lies.
         bodies = likelier_upright(observations, bodies, axes_xy)
-    bodies = likeliest_places(observations, bodies, axes_xy)
+    if settle:
+        bodies = likeliest_places(observations, bodies, axes_xy)
     axes_xy = bodies.axes_xy
     tracks = Tracks.begun(axes_xy, time_s) if before is None else before.moved(axes_xy, time_s)
     return tracks.laid(bodies)
@@ -299,10 +305,15 @@ def solve_reflectivity(
 
 
 def solved_frame(
-    observations: Observations, config: TrainConfig, seed: int, before: FrameState | None = None
+    observations: Observations,
+    config: TrainConfig,
+    seed: int,
+    before: FrameState | None = None,
+    *,
+    settle: bool = True,
 ) -> FrameState:
-    """A started frame with its reflectivities, not refined."""
-    state = start_frame(observations, config, seed, before)
+    """A started frame with its reflectivities, not refined; arguments as of `start_frame`."""
+    state = start_frame(observations, config, seed, before, settle=settle)
     return solve_reflectivity(observations, state, config)
 
 

@@ -21,8 +21,9 @@ from rfgs_core.limbs.evidence.entries import pairs_of
 from rfgs_core.limbs.evidence.levels import Levels
 from rfgs_core.measure.observations import Observations
 
-#: With fewer device pairs whether somebody sits moves the place: all are taken to stand.
-FEWEST_PAIRS = 4
+#: Of fewer device pairs that hear anything, whether somebody sits moves the place: all are taken
+#: to stand.
+FEWEST_PAIRS = 5
 #: Steps from a place to better ones, each halved where none is [m].
 _FIRST_STEP_M, _LAST_STEP_M = 0.16, 0.04
 _WAYS = np.array([[x, y] for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y], dtype=np.float64)
@@ -39,8 +40,8 @@ def likeliest_places(
     """Bodies moved to where evidence of them rises; who lies stays, or stands if that is likelier.
 
     Args:
-        observations: The frame; without phases, or of fewer than `FEWEST_PAIRS` device pairs,
-            nothing is changed.
+        observations: The frame; without phases, or where fewer than `FEWEST_PAIRS` device pairs
+            hear anything, nothing is changed.
         bodies: Where people were found, and who of them lies.
         axes_xy: Where each was found upright [m].
     """
@@ -63,13 +64,15 @@ def _moved(
     alone = [bodies.only(k) for k in range(len(bodies))]
     one, others = alone[body], alone[:body] + alone[body + 1 :]
     evidence = _PlaceEvidence(observations, upright_xy, others)
+    if len(evidence.pairs) < FEWEST_PAIRS:
+        return bodies
     found = evidence.at(upright_xy)
     here, likely = _climbed(evidence, observations, upright_xy, Bodies.together(others).axes_xy)
     if one.lies[0]:
         if likely <= evidence.of(one):
             return bodies
         return Bodies.together([*alone[:body], Bodies.standing(here[None]), *alone[body + 1 :]])
-    if likely - found <= TO_MOVE * (found - evidence.of(None)):
+    if likely - found <= TO_MOVE * max(found - evidence.of(None), 0.0):
         return bodies
     axes_xy = bodies.axes_xy.copy()
     axes_xy[body] = here
@@ -114,7 +117,7 @@ class _PlaceEvidence:
         self._bounds_m = observations.bounds_m
         self._floor_m = float(observations.bounds_m[0, 2])
         pairs = pairs_of(observations, middle_of(Bodies.standing(near[None]), self._floor_m))
-        self._pairs = [pair for pair in pairs if pair.change.any()]
+        self.pairs = [pair for pair in pairs if pair.change.any()]
         self._others = [self._parts(one) for one in others]
         self._known: dict[tuple[int, int], float] = {}
 
@@ -133,10 +136,10 @@ class _PlaceEvidence:
             Levels.fitted(
                 pair.change, [part for body in bodies for part in body[row]]
             ).log_likelihood
-            for row, pair in enumerate(self._pairs)
+            for row, pair in enumerate(self.pairs)
         )
 
     def _parts(self, one: Bodies) -> _Parts:
         """Covariances of each pair: of straight echoes, and of those by way of one wall."""
-        body = ExpectedEchoes.at(one, self._floor_m, self._pairs)
-        return [(body.echoes(pair), body.by_bounces(pair, self._bounds_m)) for pair in self._pairs]
+        body = ExpectedEchoes.at(one, self._floor_m, self.pairs)
+        return [(body.echoes(pair), body.by_bounces(pair, self._bounds_m)) for pair in self.pairs]

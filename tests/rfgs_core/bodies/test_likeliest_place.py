@@ -88,7 +88,8 @@ def test_without_phases_or_with_few_pairs_places_stay(empty: Observations) -> No
     guessed = np.array(ALONE[:1]) + 0.2
     pair, _ = seen.pairs
     few = replace(seen, links=seen.links & (pair >= 0) & (pair < FEWEST_PAIRS - 1))
-    for left in (few, replace(seen, kind="delay_power")):
+    silent = seen.with_delta(np.where((pair < FEWEST_PAIRS - 1)[..., None], seen.delta, 0))
+    for left in (few, silent, replace(seen, kind="delay_power")):
         np.testing.assert_array_equal(moved(left, guessed), guessed)
     assert (moved(seen, guessed) != guessed).any()
 

@@ -16,7 +16,8 @@ from jaxtyping import Complex64, Float64
 
 from rfgs_core.bodies.body_prior import Bodies
 from rfgs_core.bodies.expected_echoes import ExpectedEchoes, middle_of
-from rfgs_core.bodies.localise import BODY_RADIUS_M, SEPARATION_M
+from rfgs_core.bodies.gain import stands_clear
+from rfgs_core.bodies.localise import BODY_RADIUS_M
 from rfgs_core.limbs.evidence.entries import pairs_of
 from rfgs_core.limbs.evidence.levels import Levels
 from rfgs_core.measure.observations import Observations
@@ -67,7 +68,7 @@ def _moved(
     if len(evidence.pairs) < FEWEST_PAIRS:
         return bodies
     found = evidence.at(upright_xy)
-    here, likely = _climbed(evidence, observations, upright_xy, Bodies.together(others).axes_xy)
+    here, likely = _climbed(evidence, observations, upright_xy, Bodies.together(others))
     if one.lies[0]:
         if likely <= evidence.of(one):
             return bodies
@@ -83,7 +84,7 @@ def _climbed(
     evidence: _PlaceEvidence,
     observations: Observations,
     here: Float64[np.ndarray, "2"],
-    others_xy: Float64[np.ndarray, "other 2"],
+    others: Bodies,
 ) -> tuple[Float64[np.ndarray, "2"], float]:
     """The likeliest place uphill from one, in the room and apart from others."""
     low, high = observations.bounds_m[:, :2] + np.array([[BODY_RADIUS_M], [-BODY_RADIUS_M]])
@@ -91,8 +92,7 @@ def _climbed(
     while step_m >= _LAST_STEP_M:
         around = here + step_m * _WAYS
         inside = ((around >= low) & (around <= high)).all(axis=1)
-        apart_m = np.linalg.norm(around[:, None] - others_xy, axis=2).min(axis=1, initial=np.inf)
-        tried = around[inside & (apart_m >= SEPARATION_M)]
+        tried = [place for place in around[inside] if stands_clear(others, place)]
         values = [evidence.at(place) for place in tried]
         best = int(np.argmax(values)) if values else -1
         if values and values[best] > likely:

@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float64
 from rfgs_core.articulated import Body, Pose
 from rfgs_core.limbs.evidence.entries import End, Pair
 from rfgs_core.limbs.evidence.kernel import Facets, covariance
-from rfgs_core.worlds.figure import Figure, seen_from
+from rfgs_core.worlds.figure import Figure, look_cell, seen_among
 
 #: Facets lie as close as a tracer would set them for this wavelength [m]: phases are random.
 WAVELENGTH_M = 0.1
@@ -41,13 +41,14 @@ def posed(figure: Figure, pose: Pose, pairs: list[Pair]) -> Posed:
     """A body in a pose as the ends of some pairs see it."""
     standing = figure.posed(pose)
     facets = Facets(standing.points, standing.normals, np.sqrt(figure.areas_m2))
+    cell_m = look_cell(len(facets.points), float(figure.areas_m2.sum()))
     looks: dict[tuple[float, ...], Bool[np.ndarray, "facet"]] = {}
 
     def seen_by(end: End) -> Bool[np.ndarray, "facet"]:
         # Elements of one device lie within millimetres: one look does for them.
         place = tuple(np.round(end.centre, 2).tolist())
         if place not in looks:
-            looks[place] = seen_from(standing, figure.body.faces, end.centre)
+            looks[place] = seen_among(facets.points, facets.normals, end.centre, cell_m)
         return looks[place]
 
     return Posed(facets, {pair.devices: (seen_by(pair.tx), seen_by(pair.rx)) for pair in pairs})

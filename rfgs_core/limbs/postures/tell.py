@@ -28,6 +28,8 @@ from rfgs_core.limbs.propose import Joints
 from rfgs_core.measure.observations import Observations
 from rfgs_core.seeds import sub_seed
 
+#: Times that every frame breeds guesses of its own: one litter in three misses the likeliest.
+LITTERS = 3
 #: Guesses of each frame that are chosen from, and that its neighbours take up.
 KEPT, TAKEN = 60, 16
 #: Device pairs without which too many poses are as likely.
@@ -85,9 +87,13 @@ def tell(
         FrameSearch(one, np.asarray(xy, np.float64), figure, book, _rng(seed, frame))
         for frame, (one, xy) in enumerate(zip(seen, axes_xy, strict=True))
     ]
-    alone = in_frames(
-        lambda frame: searches[frame].bred(searches[frame].drawn()), len(seen), on_frame
-    )
+
+    def by_itself(frame: int) -> list[Guess]:
+        search = searches[frame]
+        litters = [spread_out(search.bred(search.drawn()), KEPT) for _ in range(LITTERS)]
+        return [guess for litter in litters for guess in litter]
+
+    alone = in_frames(by_itself, len(seen), on_frame)
 
     def again(frame: int) -> tuple[list[Guess], Guess]:
         search, guesses = searches[frame], spread_out(alone[frame], KEPT)

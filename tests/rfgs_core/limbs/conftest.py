@@ -17,8 +17,10 @@ from rfgs_core.radio import Radio, layout
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.placement import place_devices
 from rfgs_core.radio.presets import preset
+from rfgs_core.simulate.geometry.bvh import Bvh, build_bvh
+from rfgs_core.simulate.geometry.rays import blocked, new_stack
 from rfgs_core.simulate.surface.facets import facet_sum
-from rfgs_core.worlds.figure import Figure, seen_from
+from rfgs_core.worlds.figure import Figure, Posed
 
 BOUNDS_M = np.array([[-2.5, -2.5, 0.0], [2.5, 2.5, 2.6]])
 WAVELENGTH_M = 0.05
@@ -31,16 +33,25 @@ def _walker(wavelength_m: float = WAVELENGTH_M) -> tuple[Figure, Stride]:
     return Figure.of(body, wavelength_m), strides(body, 0.9, 1, seed=4)[0]
 
 
+def _sees(place: np.ndarray, posed: Posed, skin: Bvh) -> np.ndarray:
+    """Facets that face a place and that no triangle of the skin hides from it."""
+    stack = new_stack()
+    faces = np.einsum("fi,fi->f", place - posed.points, posed.normals) > 0.0
+    hidden = [blocked(skin, point, place, 4e-3, stack) for point in posed.points]
+    return faces & ~np.array(hidden)
+
+
 def _heard(pose: Pose, radio: Radio, figure: Figure) -> Observations:
     """What a radio hears of the walker's direct echoes in a pose."""
     placed = layout(radio, place_devices(radio, BOUNDS_M))
     posed = figure.posed(pose)
+    skin = build_bvh(figure.body.skin(pose)[figure.body.faces].astype(np.float64))
     csi = np.zeros((len(placed.tx_xyz), len(placed.rx_xyz), radio.num_subcarriers), complex)
     for a, b in placed.pairs_of(placed.measured)[1]:
         own = placed.links_between(a, b) & placed.measured
         tx, rx = np.flatnonzero(own.any(axis=1)), np.flatnonzero(own.any(axis=0))
         ends = placed.tx_xyz[tx], placed.rx_xyz[rx]
-        seen = [seen_from(posed, figure.body.faces, end.mean(axis=0)) for end in ends]
+        seen = [_sees(end.mean(axis=0), posed, skin) for end in ends]
         both = (seen[0] & seen[1]).astype(np.float64)
         csi[np.ix_(tx, rx)] = facet_sum(
             posed.points, posed.normals, figure.areas_m2, *ends, both, radio.freq_hz

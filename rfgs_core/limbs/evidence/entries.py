@@ -80,8 +80,7 @@ class Bands(NamedTuple):
         freq_hz: Float64[np.ndarray, "subcarrier"], visible: Bool[np.ndarray, "subcarrier"]
     ) -> Bands:
         """Blocks of equally spaced subcarriers that tell apart `COVERED_M` of path."""
-        cell_m = SPEED_OF_LIGHT / (float(freq_hz[1] - freq_hz[0]) * len(freq_hz))
-        count = int(np.clip(round(COVERED_M / cell_m), *BANDS))
+        count = int(np.clip(round(COVERED_M / path_resolution_m(freq_hz)), *BANDS))
         place = np.arange(len(freq_hz)) * count // len(freq_hz)
         block = np.full(len(freq_hz), -1, dtype=np.int64)
         block[visible] = np.unique(place[visible], return_inverse=True)[1]
@@ -102,6 +101,14 @@ class Pair(NamedTuple):
     """Entries in units of their root mean square."""
     scale: float
     """That root mean square."""
+
+
+def path_resolution_m(freq_hz: Float64[np.ndarray, "subcarrier"]) -> float:
+    """By how much paths must differ for a band of equally spaced subcarriers to resolve them [m].
+
+    The speed of light over the bandwidth.
+    """
+    return SPEED_OF_LIGHT / (float(freq_hz[1] - freq_hz[0]) * len(freq_hz))
 
 
 def pairs_of(observations: Observations, centre: Float[np.ndarray, "3"]) -> list[Pair]:

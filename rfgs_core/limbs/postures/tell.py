@@ -17,6 +17,7 @@ from jaxtyping import Float, Float64
 from rfgs_core.articulated import people
 from rfgs_core.encode.body_maps import views_of
 from rfgs_core.limbs.evidence.body import figure_of
+from rfgs_core.limbs.evidence.entries import path_resolution_m
 from rfgs_core.limbs.evidence.library import headings_of
 from rfgs_core.limbs.evidence.table import in_frames
 from rfgs_core.limbs.evidence.tell import stands
@@ -28,12 +29,16 @@ from rfgs_core.limbs.propose import Joints
 from rfgs_core.measure.observations import Observations
 from rfgs_core.seeds import sub_seed
 
-#: Times that every frame breeds guesses of its own: one litter in three misses the likeliest.
-LITTERS = 3
+#: Independent searches of each frame, whose guesses are pooled: one alone often ends beside the
+#: likeliest pose.
+RESTARTS = 3
 #: Guesses of each frame that are chosen from, and that its neighbours take up.
 KEPT, TAKEN = 60, 16
 #: Device pairs without which too many poses are as likely.
 FEWEST_PAIRS = 6
+#: Coarser bands do not resolve straight echoes and those off walls, which then pass for limbs:
+#: at 20 MHz (15 m) joints of who sits are further off than a standing body's, at 40 MHz nearer [m].
+COARSEST_M = 10.0
 #: The lead a frame that it takes for a heading, and for a pose: with less, joints are further off
 #: than a standing body's [nat].
 LEAST_LEAD, POSED_LEAD = 20.0, 40.0
@@ -55,7 +60,9 @@ class Told(NamedTuple):
 
 
 def can_tell(observations: Observations) -> bool:
-    """Whether enough device pairs of a frame are visible."""
+    """Whether enough device pairs of a frame are visible, and their band is wide enough."""
+    if path_resolution_m(observations.freq_hz) > COARSEST_M:
+        return False
     return len(views_of(observations.layout, observations.links)) >= FEWEST_PAIRS
 
 
@@ -90,8 +97,8 @@ def tell(
 
     def by_itself(frame: int) -> list[Guess]:
         search = searches[frame]
-        litters = [spread_out(search.bred(search.drawn()), KEPT) for _ in range(LITTERS)]
-        return [guess for litter in litters for guess in litter]
+        found = [spread_out(search.bred(search.drawn()), KEPT) for _ in range(RESTARTS)]
+        return [guess for guesses in found for guess in guesses]
 
     alone = in_frames(by_itself, len(seen), on_frame)
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from lit_bodies import echoing, lit
 
+from rfgs_core.bodies import likeliest_place as settling
 from rfgs_core.bodies.body_prior import Bodies
 from rfgs_core.bodies.likeliest_place import FEWEST_PAIRS, likeliest_places
 from rfgs_core.bodies.localise import (
@@ -18,8 +19,10 @@ from rfgs_core.bodies.localise import (
     locate_bodies,
     pair_maps,
 )
+from rfgs_core.fit.frame import start_frame
 from rfgs_core.measure.observations import Observations
 from rfgs_core.radio import preset
+from rfgs_core.settings import TrainConfig
 
 ROOM_M = np.array([[0.0, 0.0, 0.0], [5.0, 4.6, 2.4]])
 ALONE = [(1.4, 2.9), (3.5, 1.3), (2.4, 2.2), (3.8, 3.3)]
@@ -92,6 +95,41 @@ def test_without_phases_or_with_few_pairs_places_stay(empty: Observations) -> No
     for left in (few, silent, replace(seen, kind="delay_power")):
         np.testing.assert_array_equal(moved(left, guessed), guessed)
     assert (moved(seen, guessed) != guessed).any()
+
+
+def test_a_body_is_moved_for_enough_evidence_only(
+    empty: Observations, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen, guessed = in_a_room(empty, ALONE[:1], seed=0), np.array(ALONE[:1]) + 0.2
+    at, zero = evidence_of(seen, guessed)
+    found = moved(seen, guessed)
+    share = (at(found[0]) - at(guessed[0])) / (at(guessed[0]) - zero)
+    assert share > settling.TO_MOVE
+    for threshold, expected in ((0.99 * share, found), (1.01 * share, guessed)):
+        monkeypatch.setattr(settling, "TO_MOVE", threshold)
+        np.testing.assert_array_equal(moved(seen, guessed), expected)
+
+
+def evidence_of(seen: Observations, guessed: np.ndarray) -> tuple[Callable[..., float], float]:
+    """Of one body at a place, and of nobody; entries are steered to where it was guessed."""
+    evidence = settling._PlaceEvidence(seen, guessed[0], [])
+    return evidence.at, evidence.of(None)
+
+
+def test_a_frame_is_settled_unless_asked_not_to(empty: Observations) -> None:
+    seen, config = in_a_room(empty, ALONE[:1], seed=0), TrainConfig(num_gaussians=300)
+    by_map = locate_bodies(pair_maps(seen), seen.bounds_m, 1)
+
+    def placed(settle: bool) -> np.ndarray:
+        return start_frame(seen, config, 0, None, settle=settle).tracks.bodies.axes_xy
+
+    np.testing.assert_array_equal(placed(False), by_map)
+    np.testing.assert_array_equal(placed(True), moved(seen, by_map))
+    assert off_m(placed(True), ALONE[:1])[0] < off_m(by_map, ALONE[:1])[0]
+
+
+def test_nobody_is_left_nobody(empty: Observations) -> None:
+    assert len(moved(in_a_room(empty, ALONE[:1], seed=0), np.zeros((0, 2)))) == 0
 
 
 @pytest.mark.parametrize("lies", [True, False])

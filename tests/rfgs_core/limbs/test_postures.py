@@ -173,6 +173,16 @@ def test_one_radar_is_too_few(heard, seated) -> None:
     assert not can_tell(replace(frame, links=links))
 
 
+@pytest.mark.parametrize(("bandwidth_hz", "enough"), [(20e6, False), (40e6, True)])
+def test_a_band_that_resolves_no_walls_is_too_narrow(
+    heard, seated, bandwidth_hz: float, enough: bool
+) -> None:
+    frame = heard(seated, HEADING, PLACE)
+    count = len(frame.freq_hz)
+    narrow = replace(frame, freq_hz=5.8e9 + np.arange(count) * bandwidth_hz / count)
+    assert can_tell(narrow) is enough
+
+
 def test_nobody_jumps_between_two_frames(body) -> None:
     """A guess that is a little likelier, but somewhere else, is passed by."""
     here = body.joints17(upright(body))

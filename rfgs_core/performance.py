@@ -31,6 +31,8 @@ PICTURES: dict[Device, tuple[tuple[int, int], ...]] = {
 DISTANT = tuple((count, far_m) for count in (100_000, 1_000_000) for far_m in (5.0, 50.0, 500.0))
 #: What is as large as at most this grows linearly, up to the noise of timing.
 _LINEAR = 1.1
+#: Share of the time at the largest size that may be fixed for the exponent of the rest to be told.
+_MOST_FIXED = 0.5
 
 
 @dataclass(frozen=True)
@@ -248,7 +250,7 @@ def _growths(growths: Sequence[Growth]) -> str:
             f"{each.seconds[0]:.3g} s to {each.seconds[-1]:.3g} s",
             f"{each.exponent:.2f}",
             f"{each.law[0]:.3g} s",
-            f"{each.law[1]:.2f}",
+            f"{each.law[1]:.2f}" if each.law[0] < _MOST_FIXED * each.seconds[-1] else "–",
         )
         for each in growths
     ]
@@ -257,7 +259,8 @@ def _growths(growths: Sequence[Growth]) -> str:
         f"More than linear: {', '.join(steep)}."
         if steep
         else "Nothing grows more than linearly. Below 1, part of the work does not grow: time is "
-        "that part\nand a power of what grows."
+        "that part\nand a power of what grows, whose exponent has no meaning (–) where most of the "
+        "time at the largest size does not grow."
     )
     heads = ("what grows", "sizes", "CPU time", "exponent", "does not grow", "exponent of the rest")
     return f"## How cost grows\n\n{_table(heads, rows)}\n{said}\n"

@@ -36,7 +36,8 @@ class TrainArgs:
     out: Path
     """Folder of the run; with several sequences or radios, of their runs SEQUENCE-RADIO."""
     radio: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
-    """Which of the dataset's radios, for example wifi; repeat the option for several."""
+    """Which of the dataset's radios, for example wifi; repeat the option for several. May be left
+    out when there is only one."""
     sequence: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
     """Which sequence, or all; repeat the option for several. May be left out when there is only
     one."""

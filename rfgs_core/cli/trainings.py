@@ -202,17 +202,13 @@ def trainings(args: TrainArgs) -> list[Training]:
     """Trainings that are asked for: runs SEQUENCE-RADIO in OUT; of a single one OUT is the run.
 
     Raises:
-        RfgsError: There is no such dataset or sequence, it is not said which one is meant, or
-            runs would get the same name.
+        RfgsError: There is no such dataset or sequence, it is not said which one or which radio of
+            several is meant, or runs would get the same name.
     """
-    from rfgs_core.dataset import open_dataset
     from rfgs_core.errors import RfgsError
 
     sequences = _sequences(args)
-    if not args.radio:
-        there = open_dataset(args.dataset).sequence(sequences[0]).radios
-        raise RfgsError(f"--radio is missing; {args.dataset} has {', '.join(there)}")
-    radios = dict.fromkeys(args.radio)
+    radios = dict.fromkeys(args.radio or _only_radio(args.dataset, sequences[0]))
     pairs = [(sequence, radio) for sequence in sequences for radio in radios]
     if len(pairs) == 1:
         return [Training(args, *pairs[0], Path(args.out.name))]
@@ -225,6 +221,17 @@ def trainings(args: TrainArgs) -> list[Training]:
                 f"{other.sequence} would share this folder; train them one by one"
             )
     return chosen
+
+
+def _only_radio(dataset: Path, sequence: str) -> list[str]:
+    """The radio of a sequence that has one."""
+    from rfgs_core.dataset import open_dataset
+    from rfgs_core.errors import RfgsError
+
+    there = open_dataset(dataset).sequence(sequence).radios
+    if len(there) != 1:
+        raise RfgsError(f"--radio is missing; {dataset} has {', '.join(there)}")
+    return there
 
 
 def _sequences(args: TrainArgs) -> list[str]:

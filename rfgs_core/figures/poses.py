@@ -17,6 +17,8 @@ from rfgs_core.skeleton import PARENTS
 
 #: Frames shown as skeletons.
 SHOWN = 4
+#: Width of a skeleton's axes at least [m].
+_NARROWEST_M = 0.9
 
 
 def write_pose_chart(
@@ -36,6 +38,10 @@ def write_pose_chart(
             axes.set_aspect("equal")
             # Who lies is no taller than the ticks of an axis.
             axes.set_ylim(top=max(axes.get_ylim()[1], 1.0))
+            # Who stands is narrower than two labels of ticks.
+            low_m, high_m = axes.get_xlim()
+            short_m = 0.5 * max(_NARROWEST_M - (high_m - low_m), 0.0)
+            axes.set_xlim(low_m - short_m, high_m + short_m)
             axes.set_title(f"frame {estimate.frames[k]}")
             axes.set_xlabel("y [m]")
             if column == 0:

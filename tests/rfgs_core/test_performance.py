@@ -44,6 +44,9 @@ def test_every_number_stands_on_the_page() -> None:
     assert "| 100,000 | 512 × 512 | 0.41 s | 0.052 s | 0.31 s |" in text
     assert "| 100,000 | 50 m | 60 ms | 43 ms | 27,905 | 1e-06 |" in text
     assert re.search(r"\| law \| 100 to 10,000 \| 0.1 s to 8.1 s \| 0.95 \|", text)
+    # Where hardly anything grows, nothing is said of how it does.
+    assert re.search(r"\| law \|.*\| 0\.9\d \|\n", text)
+    assert re.search(r"\| flat \|.*\| 0\.1 s \| – \|\n", text)
     assert "1.2 GiB" in text and "Nothing grows more than linearly" in text
 
 

@@ -14,8 +14,9 @@ import pytest
 from rfgs_core.cli import main
 from rfgs_core.cli.train import TrainArgs
 from rfgs_core.cli.trainings import trainings
-from rfgs_core.dataset.schema import read_dataset_info
-from rfgs_core.dataset.writer import finish_dataset, write_dataset_info
+from rfgs_core.dataset.names import SequenceFiles
+from rfgs_core.dataset.schema import read_dataset_info, read_sequence_info
+from rfgs_core.dataset.writer import finish_dataset, write_dataset_info, write_sequence_info
 from rfgs_core.errors import RfgsError
 from rfgs_core.run import open_run
 from rfgs_core.schedule.archive import unpack
@@ -78,6 +79,21 @@ def test_a_sequence_called_all_is_one_sequence(tiny_dataset: Path, tmp_path: Pat
     write_dataset_info(data, replace(info, sequences=["a", "a-b"]))
     with pytest.raises(RfgsError, match="a-b-c: radio c of a-b and radio b-c of a would share"):
         trainings(replace(args, radio=("b-c", "c")))
+
+
+def test_a_radio_need_not_be_named_where_there_is_one(tiny_dataset: Path, tmp_path: Path) -> None:
+    data = Path(shutil.copytree(tiny_dataset, tmp_path / "dataset"))
+    args = TrainArgs(data, tmp_path / "run")
+    assert [one.radio for one in trainings(args)] == ["wifi"]
+    files = SequenceFiles(data / "tiny")
+    info = read_sequence_info(files.info)
+    radios, devices, rf = (
+        {**of, "uwb": of["wifi"]} for of in (info.radios, info.devices, info.splits["rf"])
+    )
+    splits = {**info.splits, "rf": rf}
+    write_sequence_info(files, replace(info, radios=radios, devices=devices, splits=splits))
+    with pytest.raises(RfgsError, match=r"--radio is missing; .* has uwb, wifi"):
+        trainings(args)
 
 
 @pytest.mark.parametrize(

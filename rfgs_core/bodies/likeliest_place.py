@@ -28,9 +28,6 @@ FEWEST_PAIRS = 5
 #: Steps from a place to better ones, each halved where none is [m].
 _FIRST_STEP_M, _LAST_STEP_M = 0.16, 0.04
 _WAYS = np.array([[x, y] for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y], dtype=np.float64)
-#: A body is moved for as much more evidence as this share of what it explains where it was found:
-#: which way it faces and what its limbs do, which is not known here, changes that as well.
-TO_MOVE = 0.02
 #: Times that each of several people is moved beside the others.
 _ROUNDS = 2
 
@@ -67,14 +64,11 @@ def _moved(
     evidence = _PlaceEvidence(observations, upright_xy, others)
     if len(evidence.pairs) < FEWEST_PAIRS:
         return bodies
-    found = evidence.at(upright_xy)
     here, likely = _climbed(evidence, observations, upright_xy, Bodies.together(others))
     if one.lies[0]:
         if likely <= evidence.of(one):
             return bodies
         return Bodies.together([*alone[:body], Bodies.standing(here[None]), *alone[body + 1 :]])
-    if likely - found <= TO_MOVE * max(found - evidence.of(None), 0.0):
-        return bodies
     axes_xy = bodies.axes_xy.copy()
     axes_xy[body] = here
     return replace(bodies, axes_xy=axes_xy)
@@ -129,9 +123,9 @@ class _PlaceEvidence:
             self._known[key] = self.of(Bodies.standing(place[None]))
         return self._known[key]
 
-    def of(self, one: Bodies | None) -> float:
-        """The same for a body that may lie, or for nobody, beside the others."""
-        bodies = self._others if one is None else [self._parts(one), *self._others]
+    def of(self, one: Bodies) -> float:
+        """The same for a body that may lie."""
+        bodies = [self._parts(one), *self._others]
         return sum(
             Levels.fitted(
                 pair.change, [part for body in bodies for part in body[row]]

@@ -97,23 +97,18 @@ def test_without_phases_or_with_few_pairs_places_stay(empty: Observations) -> No
     assert (moved(seen, guessed) != guessed).any()
 
 
-def test_a_body_is_moved_for_enough_evidence_only(
-    empty: Observations, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_body_ends_where_no_place_around_is_likelier(empty: Observations) -> None:
     seen, guessed = in_a_room(empty, ALONE[:1], seed=0), np.array(ALONE[:1]) + 0.2
-    at, zero = evidence_of(seen, guessed)
     found = moved(seen, guessed)
-    share = (at(found[0]) - at(guessed[0])) / (at(guessed[0]) - zero)
-    assert share > settling.TO_MOVE
-    for threshold, expected in ((0.99 * share, found), (1.01 * share, guessed)):
-        monkeypatch.setattr(settling, "TO_MOVE", threshold)
-        np.testing.assert_array_equal(moved(seen, guessed), expected)
-
-
-def evidence_of(seen: Observations, guessed: np.ndarray) -> tuple[Callable[..., float], float]:
-    """Of one body at a place, and of nobody; entries are steered to where it was guessed."""
+    # Entries are steered to where the body was guessed, as when it was moved.
     evidence = settling._PlaceEvidence(seen, guessed[0], [])
-    return evidence.at, evidence.of(None)
+    here = evidence.at(found[0])
+    assert here > evidence.at(guessed[0])
+    for angle in np.arange(8) * 0.25 * np.pi:
+        step_m = settling._LAST_STEP_M * np.sign(np.round([np.cos(angle), np.sin(angle)], 3))
+        assert evidence.at(found[0] + step_m) <= here
+    # From there it is moved no further, though entries are steered to another place.
+    assert np.linalg.norm(moved(seen, found) - found) < 2.0 * settling._LAST_STEP_M
 
 
 def test_a_frame_is_settled_unless_asked_not_to(empty: Observations) -> None:

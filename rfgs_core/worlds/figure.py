@@ -11,12 +11,16 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from jaxtyping import Float64, Int64
+from jaxtyping import Bool, Float32, Float64, Int64
 
 from rfgs_core.articulated import Body, Pose, people, skinned
+from rfgs_core.simulate.sight.bodies import picture
 from rfgs_core.simulate.surface.lloyd import triangle_areas
 from rfgs_core.simulate.surface.points import LIFT_M, SurfacePoints, surface_points
 
+#: Pixels of the picture that tells what the body hides of itself, and how far behind the nearest
+#: triangle of a pixel a facet may be [m].
+_PIXELS, _BEHIND_M = 96, 0.03
 #: Directions that share a cell, in distances between facets, cells along a side, and how far
 #: behind the nearest facet of its cell a facet may be and be seen [m]. Beside rays through the
 #: skin, 1 % of a body is seen that is not and 3 % is not seen that is.
@@ -41,6 +45,15 @@ class Posed(NamedTuple):
     """Facets, a millimetre outside the skin [m]."""
     normals: Float64[np.ndarray, "facet 3"]
     """Their unit normals."""
+
+
+class Skin(NamedTuple):
+    """All triangles of a posed body."""
+
+    vertices: Float32[np.ndarray, "V 3"]
+    """Where they are [m]."""
+    faces: Int64[np.ndarray, "face 3"]
+    """Vertices of each triangle."""
 
 
 @dataclass(frozen=True)
@@ -155,4 +168,42 @@ def seen_among(
     seen = np.zeros(len(points), dtype=np.bool_)
     for i in range(len(points)):
         seen[i] = cell[0, i] >= 0 and away[i] <= nearest[cell[0, i], cell[1, i]] + BEHIND_M
+    return seen
+
+
+def seen_from(
+    posed: Posed, skin: Skin, place: Float64[np.ndarray, "3"]
+) -> Bool[np.ndarray, "facet"]:
+    """Facets that face a place [m] and that no triangle of the skin hides from it."""
+    low, high = posed.points.min(axis=0), posed.points.max(axis=0)
+    centre, radius = 0.5 * (low + high), 0.55 * float(np.linalg.norm(high - low))
+    drawn = picture(*skin, place, centre, radius, _PIXELS)
+    return _in_view(posed.points, posed.normals, place, drawn.axes, drawn.per_pixel, drawn.depth)
+
+
+@numba.njit(cache=True, nogil=True)
+def _in_view(
+    points: np.ndarray,
+    normals: np.ndarray,
+    place: np.ndarray,
+    axes: np.ndarray,
+    per_pixel: float,
+    depth: np.ndarray,
+) -> np.ndarray:
+    """Whether each point faces the place of a picture and is among what is nearest in it."""
+    size = len(depth)
+    seen = np.zeros(len(points), dtype=np.bool_)
+    for i in range(len(points)):
+        way = points[i] - place
+        if way[0] * normals[i, 0] + way[1] * normals[i, 1] + way[2] * normals[i, 2] >= 0.0:
+            continue
+        forward = axes[2, 0] * way[0] + axes[2, 1] * way[1] + axes[2, 2] * way[2]
+        if forward <= 0.0:
+            continue
+        right = axes[0, 0] * way[0] + axes[0, 1] * way[1] + axes[0, 2] * way[2]
+        up = axes[1, 0] * way[0] + axes[1, 1] * way[1] + axes[1, 2] * way[2]
+        x = int(min(max(right / (forward * per_pixel) + 0.5 * size, 0.0), size - 1.0))
+        y = int(min(max(up / (forward * per_pixel) + 0.5 * size, 0.0), size - 1.0))
+        near = depth[y, x]
+        seen[i] = near <= 0.0 or forward <= 1.0 / near + _BEHIND_M
     return seen

@@ -102,7 +102,8 @@ class FrameSearch:
 
     def guess(self, pose: Pose, page: int, heading: float, spot: np.ndarray) -> Guess:
         """A guess with its evidence."""
-        body = posed(self._figure, pose.turned(about_z(heading)).moved(spot), self._pairs)
+        there = pose.turned(about_z(heading)).moved(spot)
+        body = posed(self._figure, there, self._pairs, by_skin=False)
         log = [
             log_evidence(pair.change, direct(body, pair, np.zeros(3)) + bounces, LEAST_NOISE)
             for pair, bounces in zip(self._pairs, self._bounces, strict=True)

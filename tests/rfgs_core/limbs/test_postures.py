@@ -117,6 +117,23 @@ def test_chance_comes_from_the_seed_alone(heard, seated, body, small_book, monke
     assert scores(1) == first and scores(2) != first
 
 
+def test_every_search_of_a_frame_begins_anew(heard, seated, small_book, monkeypatch) -> None:
+    few, draw, begun = ((2, 2, 0.1, 0.02),), FrameSearch.drawn, []
+    monkeypatch.setattr(searching, "DRAWN", 3)
+    monkeypatch.setattr(FrameSearch.bred, "__defaults__", (few,))
+    monkeypatch.setattr(telling, "LATER", few)
+    monkeypatch.setattr(PoseBook, "of", lambda *_: small_book)
+
+    def drawn(search: FrameSearch) -> list[searching.Guess]:
+        begun.append(draw(search))
+        return list(begun[-1])
+
+    monkeypatch.setattr(FrameSearch, "drawn", drawn)
+    tell([heard(seated, HEADING, PLACE)], PLACE[None, :2], 3)
+    assert len(begun) == telling.RESTARTS
+    assert len({guess.heading for guesses in begun for guess in guesses}) == 3 * telling.RESTARTS
+
+
 def test_who_stands_is_left_to_the_prior(heard, walker_body, small_book, monkeypatch) -> None:
     """Nobody is posed where standing is as likely."""
     monkeypatch.setattr(searching, "DRAWN", 40)

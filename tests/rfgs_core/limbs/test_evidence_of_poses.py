@@ -36,6 +36,18 @@ def facets() -> Facets:
     return Facets(points, normals, rng.uniform(0.02, 0.1, 30))
 
 
+def test_facets_hide_each_other_nearly_as_the_skin_hides_them(frame, stride) -> None:
+    figure, pairs = figure_of(people().body(np.zeros(0)), 0.14), pairs_of(frame, CENTRE)
+    pose = stride.poses[PHASE].moved(PLACE)
+    by_skin, by_facets = (posed(figure, pose, pairs, by_skin=skin) for skin in (True, False))
+    np.testing.assert_array_equal(by_skin.facets.points, by_facets.facets.points)
+    for devices, ends in by_skin.seen.items():
+        for one, other in zip(ends, by_facets.seen[devices], strict=True):
+            assert 0.2 < one.mean() < 0.5
+            # Half of all facets face a place: what only did so would be seen too often.
+            assert (one & ~other).mean() < 0.07 and (other & ~one).mean() < 0.07, devices
+
+
 def unit(v: np.ndarray) -> np.ndarray:
     return v / np.linalg.norm(v)
 

@@ -243,17 +243,7 @@ def _times(picture: Picture, device: Device) -> tuple[str, ...]:
 
 
 def _growths(growths: Sequence[Growth]) -> str:
-    rows = [
-        (
-            each.name,
-            f"{each.sizes[0]:,} to {each.sizes[-1]:,}",
-            f"{each.seconds[0]:.3g} s to {each.seconds[-1]:.3g} s",
-            f"{each.exponent:.2f}",
-            f"{each.law[0]:.3g} s",
-            f"{each.law[1]:.2f}" if each.law[0] < _MOST_FIXED * each.seconds[-1] else "–",
-        )
-        for each in growths
-    ]
+    rows = [_growth(each) for each in growths]
     steep = [each.name for each in growths if each.exponent > _LINEAR]
     said = (
         f"More than linear: {', '.join(steep)}."
@@ -264,6 +254,19 @@ def _growths(growths: Sequence[Growth]) -> str:
     )
     heads = ("what grows", "sizes", "CPU time", "exponent", "does not grow", "exponent of the rest")
     return f"## How cost grows\n\n{_table(heads, rows)}\n{said}\n"
+
+
+def _growth(each: Growth) -> tuple[str, ...]:
+    """A row of the table of growths."""
+    fixed_s, exponent = each.law
+    return (
+        each.name,
+        f"{each.sizes[0]:,} to {each.sizes[-1]:,}",
+        f"{each.seconds[0]:.3g} s to {each.seconds[-1]:.3g} s",
+        f"{each.exponent:.2f}",
+        f"{fixed_s:.3g} s",
+        f"{exponent:.2f}" if fixed_s < _MOST_FIXED * each.seconds[-1] else "–",
+    )
 
 
 def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

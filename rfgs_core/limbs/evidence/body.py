@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -49,17 +50,19 @@ def posed(figure: Figure, pose: Pose, pairs: list[Pair], *, by_skin: bool = True
     """
     standing = figure.posed(pose)
     facets = Facets(standing.points, standing.normals, np.sqrt(figure.areas_m2))
-    cell_m = look_cell(len(facets.points), float(figure.areas_m2.sum()))
-    skin = Skin(figure.body.skin(pose), figure.body.faces) if by_skin else None
+    if by_skin:
+        skin = Skin(figure.body.skin(pose), figure.body.faces)
+        look = functools.partial(seen_from, standing, skin)
+    else:
+        cell_m = look_cell(len(facets.points), float(figure.areas_m2.sum()))
+        look = functools.partial(seen_among, facets.points, facets.normals, cell_m=cell_m)
     looks: dict[tuple[float, ...], Bool[np.ndarray, "facet"]] = {}
 
     def seen_by(end: End) -> Bool[np.ndarray, "facet"]:
         # Elements of one device lie within millimetres: one look does for them.
         place = tuple(np.round(end.centre, 2).tolist())
-        if place not in looks and skin is not None:
-            looks[place] = seen_from(standing, skin, end.centre)
-        elif place not in looks:
-            looks[place] = seen_among(facets.points, facets.normals, end.centre, cell_m)
+        if place not in looks:
+            looks[place] = look(end.centre)
         return looks[place]
 
     return Posed(facets, {pair.devices: (seen_by(pair.tx), seen_by(pair.rx)) for pair in pairs})

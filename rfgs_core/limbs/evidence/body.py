@@ -4,15 +4,14 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float64
+from jaxtyping import Bool, Complex64, Float64
 
 from rfgs_core.articulated import Body, Pose
 from rfgs_core.limbs.evidence.entries import End, Pair
-from rfgs_core.limbs.evidence.kernel import Facets, covariance
+from rfgs_core.limbs.evidence.kernel import Facets, Images, covariance
 from rfgs_core.worlds.figure import Figure, Skin, look_cell, seen_among, seen_from
 
 #: Facets lie as close as a tracer would set them for this wavelength [m]: phases are random.
@@ -68,12 +67,12 @@ def posed(figure: Figure, pose: Pose, pairs: list[Pair], *, by_skin: bool = True
     return Posed(facets, {pair.devices: (seen_by(pair.tx), seen_by(pair.rx)) for pair in pairs})
 
 
-def direct(posed: Posed, pair: Pair, shift: np.ndarray) -> np.ndarray:
+def direct(posed: Posed, pair: Pair, shift: np.ndarray) -> Complex64[np.ndarray, "entry entry"]:
     """Covariance of the straight echoes of a posed body, moved a little by `shift` [3] m."""
     return covariance(pair, posed.facets.moved(shift), *posed.seen[pair.devices], LOBE_RAD)
 
 
-def by_bounces(facets: Facets, pair: Pair, images: Iterable[tuple[End, End]]) -> np.ndarray:
+def by_bounces(facets: Facets, pair: Pair, images: Images) -> Complex64[np.ndarray, "entry entry"]:
     """Covariance of the echoes by way of one wall on either leg, every wall a mirror.
 
     Args:
@@ -83,33 +82,25 @@ def by_bounces(facets: Facets, pair: Pair, images: Iterable[tuple[End, End]]) ->
     """
     few = facets.thinned(_EVERY)
     seen = np.ones(len(few.points), dtype=bool)
-    total = np.zeros((len(pair.change),) * 2, dtype=np.complex64)
-    for tx, rx in images:
-        total += covariance(pair, few, seen, seen, LOBE_RAD, tx, rx)
-    return total
+    return covariance(pair, few, seen, seen, LOBE_RAD, images)
 
 
 def images_of(
     pair: Pair, bounds_m: Float64[np.ndarray, "2 3"], centre: Float64[np.ndarray, "3"]
-) -> list[tuple[End, End]]:
-    """Both ends of a pair with one of them in the mirror of a wall, echoes of which count.
+) -> Images:
+    """Images of a pair by one wall, echoes of which count.
 
     Args:
         pair: The pair.
         bounds_m: Corners of the room [m].
         centre: Middle of the body [m].
     """
-    straight_m, images = _path_m(pair.tx, pair.rx, centre), []
+    away_m = [float(np.linalg.norm(end.centre - centre)) for end in (pair.tx, pair.rx)]
+    images = []
     for axis in range(3):
         for at_m in bounds_m[:, axis].tolist():
-            for ends in (
-                (pair.tx.mirrored(axis, at_m), pair.rx),
-                (pair.tx, pair.rx.mirrored(axis, at_m)),
-            ):
-                if _path_m(*ends, centre) - straight_m <= _LATEST_M:
-                    images.append(ends)
-    return images
-
-
-def _path_m(tx: End, rx: End, centre: np.ndarray) -> float:
-    return float(np.linalg.norm(tx.centre - centre) + np.linalg.norm(rx.centre - centre))
+            for which, end in enumerate((pair.tx, pair.rx)):
+                mirrored = end.mirrored(axis, at_m).centre
+                if float(np.linalg.norm(mirrored - centre)) - away_m[which] <= _LATEST_M:
+                    images.append((which, axis, at_m))
+    return Images.of(images)

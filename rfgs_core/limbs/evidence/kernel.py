@@ -23,9 +23,9 @@ from typing import Any, NamedTuple
 
 import numba
 import numpy as np
-from jaxtyping import Bool, Complex64, Complex128, Float64
+from jaxtyping import Bool, Complex64, Complex128, Float64, Int64
 
-from rfgs_core.limbs.evidence.entries import End, Pair
+from rfgs_core.limbs.evidence.entries import Pair
 from rfgs_core.vector_math import FAST_MATH, sine_cosine_of_turns
 from rfgs_core.worlds.echoes import shadowing
 
@@ -55,10 +55,30 @@ class Facets(NamedTuple):
         return Facets(points, normals, root * math.sqrt(every))
 
 
+class Images(NamedTuple):
+    """Images to a body and on: each with one leg by a mirror across one of the world's axes."""
+
+    end: Int64[np.ndarray, "image"]
+    """0 where the transmitter is mirrored, 1 where the receiver is, −1 where neither is."""
+    axis: Int64[np.ndarray, "image"]
+    """The world's axis across which the mirror lies."""
+    at_m: Float64[np.ndarray, "image"]
+    """Where on that axis [m]."""
+
+    @staticmethod
+    def of(images: list[tuple[int, int, float]]) -> Images:
+        """Of end, axis and place of each."""
+        end, axis, at_m = np.array(images, dtype=np.float64).reshape(-1, 3).T
+        return Images(end.astype(np.int64), axis.astype(np.int64), at_m.copy())
+
+
+#: Both ends as they are.
+STRAIGHT = Images.of([(-1, 0, 0.0)])
+
+
 def covariance(
     pair: Pair, facets: Facets, by_tx: Bool[np.ndarray, "facet"], by_rx: Bool[np.ndarray, "facet"],
-    lobe_rad: float,
-    tx: End | None = None, rx: End | None = None,
+    lobe_rad: float, images: Images = STRAIGHT,
 ) -> Complex64[np.ndarray, "entry entry"]:  # fmt: skip
     """Covariance of a pair's entries, without noise; only the upper triangle is filled.
 
@@ -68,12 +88,12 @@ def covariance(
         by_tx: Facets that the transmitter sees; those that face away are left out anyhow.
         by_rx: Facets that the receiver sees.
         lobe_rad: Width σ of the lobe around a facet's normal [rad].
-        tx: Image of the transmitter in a wall; by default itself.
-        rx: Image of the receiver.
+        images: Ends that are mirrored; the covariances by way of each are added up.
     """
-    tx, rx, bands = tx or pair.tx, rx or pair.rx, pair.bands
+    tx, rx, bands = pair.tx, pair.rx, pair.bands
     rows = _responses(
-        *facets, by_tx, by_rx, tx.xyz, rx.xyz, tx.steered_m, rx.steered_m, tx.block, rx.block,
+        *facets, by_tx, by_rx, *images, tx.xyz, rx.xyz, tx.steered_m, rx.steered_m, tx.block,
+        rx.block,
         tx.share, rx.share, bands.first_k, bands.step_k, bands.middle_k, bands.block, bands.share,
         lobe_rad,
     )  # fmt: skip
@@ -106,9 +126,10 @@ def log_evidence(
             known[step] = _with_noise(change, matrix, float(NOISE_SHARES[step]))
         return known[step]
 
-    # Evidence over the share of noise has one hill, which is climbed from the middle.
+    # Evidence over the share of noise has one hill, which is climbed from the middle, or from the
+    # least share that is allowed: what is asked for again and again is near its best there.
     first = int(np.searchsorted(NOISE_SHARES, 0.999 * least_noise))
-    place, steps = len(NOISE_SHARES) // 2, range(first, len(NOISE_SHARES))
+    place, steps = first or len(NOISE_SHARES) // 2, range(first, len(NOISE_SHARES))
     while True:
         best = max((s for s in (place, place - 1, place + 1) if s in steps), key=at)
         if best == place:
@@ -215,31 +236,48 @@ def _band_responses(
 @numba.njit(cache=True, nogil=True, fastmath=FAST_MATH)
 def _responses(
     points: np.ndarray, normals: np.ndarray, root_area: np.ndarray, by_tx: np.ndarray,
-    by_rx: np.ndarray, tx: np.ndarray, rx: np.ndarray, tx_steered: np.ndarray,
-    rx_steered: np.ndarray,
+    by_rx: np.ndarray, end: np.ndarray, axis: np.ndarray, at: np.ndarray, tx: np.ndarray,
+    rx: np.ndarray, tx_steered: np.ndarray, rx_steered: np.ndarray,
     tx_block: np.ndarray, rx_block: np.ndarray, tx_share: np.ndarray, rx_share: np.ndarray,
     first_k: float, step_k: float, middle_k: float, band: np.ndarray, band_share: np.ndarray,
     lobe: float,
 ) -> np.ndarray:  # fmt: skip
-    """Conjugate weighted responses of the facets that count, complex64, shape (entry, facet)."""
-    tx_mid, rx_mid = np.zeros(3), np.zeros(3)
-    for axis in range(3):
-        tx_mid[axis], rx_mid[axis] = tx[:, axis].mean(), rx[:, axis].mean()
+    """Conjugate weighted responses of what counts, complex64, shape (entry, image and facet)."""
+    mid, mirrored = np.zeros((2, 3)), np.zeros((2, 3))
+    for i in range(3):
+        mid[0, i], mid[1, i] = tx[:, i].mean(), rx[:, i].mean()
+    tx_m, rx_m = tx_steered.mean(), rx_steered.mean()
+    most, used = len(end) * len(points), 0
+    # Where facets are for each end: mirrored in its stead, which leaves distances the same.
+    sees = np.zeros((2, 3, most))
+    late, strength = np.zeros(most), np.zeros(most)
     weight, path = np.zeros(len(points)), np.zeros(len(points))
-    for i in range(len(points)):
-        if by_tx[i]:
-            weight[i], path[i] = _weight(points[i], normals[i], tx_mid, rx_mid, by_rx[i], lobe)
-            weight[i] *= root_area[i]
-    used = np.flatnonzero(weight > _WEAKEST * weight.max())
-    x, late, strength = np.zeros((3, len(used))), np.zeros(len(used)), np.zeros(len(used))
-    for row in range(len(used)):
-        x[0, row], x[1, row], x[2, row] = points[used[row]]
-        # Across the band only the length of the path counts, not that within the arrays.
-        late[row] = path[used[row]] - tx_steered.mean() - rx_steered.mean()
-        strength[row] = weight[used[row]]
+    for k in range(len(end)):
+        mirrored[:] = mid
+        if end[k] >= 0:
+            mirrored[end[k], axis[k]] = 2.0 * at[k] - mid[end[k], axis[k]]
+        weight[:] = 0.0
+        for i in range(len(points)):
+            if by_tx[i]:
+                weight[i], path[i] = _weight(
+                    points[i], normals[i], mirrored[0], mirrored[1], by_rx[i], lobe
+                )
+                weight[i] *= root_area[i]
+        weakest = _WEAKEST * weight.max()
+        for i in range(len(points)):
+            if weight[i] > weakest:
+                sees[0, :, used] = points[i]
+                sees[1, :, used] = points[i]
+                if end[k] >= 0:
+                    sees[end[k], axis[k], used] = 2.0 * at[k] - points[i, axis[k]]
+                # Across the band only the length of the path counts, not that within the arrays.
+                late[used] = path[i] - tx_m - rx_m
+                strength[used] = weight[i]
+                used += 1
     per_m = 1.0 / (2.0 * math.pi)
-    sent = _array_responses(x, tx, tx_steered, tx_block, tx_share, middle_k * per_m)
-    heard = _array_responses(x, rx, rx_steered, rx_block, rx_share, middle_k * per_m)
+    by_end, late, strength = sees[:, :, :used].copy(), late[:used], strength[:used]
+    sent = _array_responses(by_end[0], tx, tx_steered, tx_block, tx_share, middle_k * per_m)
+    heard = _array_responses(by_end[1], rx, rx_steered, rx_block, rx_share, middle_k * per_m)
     banded = _band_responses(late, (first_k - middle_k) * per_m, step_k * per_m, band, band_share)
     return _products(sent, heard, banded, strength.astype(np.float32))
 

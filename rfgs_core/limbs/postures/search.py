@@ -12,20 +12,22 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Complex64, Float64
 
 from rfgs_core.articulated import Pose
+from rfgs_core.articulated.bones import bone
 from rfgs_core.encode.body_maps import CENTRE_HEIGHT_M
 from rfgs_core.limbs.evidence.body import by_bounces, direct, images_of, posed
 from rfgs_core.limbs.evidence.entries import pairs_of
-from rfgs_core.limbs.evidence.kernel import log_evidence
+from rfgs_core.limbs.evidence.kernel import Facets, log_evidence
 from rfgs_core.limbs.evidence.library import about_z, upright
 from rfgs_core.limbs.postures.book import PoseBook, blend
 from rfgs_core.measure.observations import Observations
 from rfgs_core.worlds.figure import Figure
 
-#: Guesses that are drawn, and how far around the place that was found [m].
-DRAWN, AROUND_M = 400, 0.13
+#: Guesses that are drawn, and how far around the place that was found [m]: of who lies that may be
+#: anywhere along the body.
+DRAWN, AROUND_M, LYING_AROUND_M = 400, 0.13, 0.3
 #: Generations: how many have offspring, how many each, how far these turn [rad] and move [m].
 GENERATIONS = ((48, 5, 0.26, 0.06), (36, 5, 0.16, 0.04), (24, 6, 0.1, 0.025), (12, 10, 0.07, 0.015))
 #: Later generations of guesses that frames take from their neighbours.
@@ -40,7 +42,10 @@ _ON_THE_WAY = (0.15, 0.6)
 _RISES, _RISE_M = 0.3, 0.02
 #: Amplitude of echoes by way of walls, and the least share of noise: with less of it evidence is
 #: peaked so sharply that the model's own errors decide.
-_ALPHA, LEAST_NOISE = 0.3, 0.1
+ALPHA, LEAST_NOISE = 0.3, 0.1
+#: Cosine of the angle between a trunk and the vertical: below it somebody does not hold themselves
+#: upright, but lies, crawls, bows or falls.
+_UPRIGHT, _TRUNK = 0.7, bone("spine_middle")
 
 
 class Guess(NamedTuple):
@@ -93,20 +98,20 @@ class FrameSearch:
         self._figure, self._book, self._rng = figure, book, rng
         self._found = np.array([*axis_xy, floor_m])
         self._pairs = pairs_of(observations, centre)
+        self._images = [images_of(pair, observations.bounds_m, centre) for pair in self._pairs]
         stands = posed(figure, upright(figure.body).moved(self._found), self._pairs)
-        self._bounces = [
-            _ALPHA**2
-            * by_bounces(stands.facets, pair, images_of(pair, observations.bounds_m, centre))
-            for pair in self._pairs
-        ]
+        self._of_standing = self._bounces(stands.facets)
 
     def guess(self, pose: Pose, page: int, heading: float, spot: np.ndarray) -> Guess:
         """A guess with its evidence."""
         there = pose.turned(about_z(heading)).moved(spot)
         body = posed(self._figure, there, self._pairs, by_skin=False)
+        # Walls mirror who is not upright as they lie. Of all others they mirror somebody who stands
+        # at the place that was found: with images of their own they rise up to 0.2 m above it.
+        bounces = self._of_standing if is_upright(there) else self._bounces(body.facets)
         log = [
-            log_evidence(pair.change, direct(body, pair, np.zeros(3)) + bounces, LEAST_NOISE)
-            for pair, bounces in zip(self._pairs, self._bounces, strict=True)
+            log_evidence(pair.change, direct(body, pair, np.zeros(3)) + by_walls, LEAST_NOISE)
+            for pair, by_walls in zip(self._pairs, bounces, strict=True)
         ]
         return Guess(pose, page, heading, spot, np.array(log))
 
@@ -115,9 +120,10 @@ class FrameSearch:
         guesses = []
         for _ in range(DRAWN):
             page = int(self._rng.integers(len(self._book.poses)))
-            heading = self._rng.uniform(0.0, 2.0 * np.pi)
-            spot = self._found + np.append(self._rng.normal(0.0, AROUND_M, 2), 0.0)
-            guesses.append(self.guess(self._book.poses[page], page, heading, spot))
+            pose, heading = self._book.poses[page], self._rng.uniform(0.0, 2.0 * np.pi)
+            around_m = AROUND_M if is_upright(pose) else LYING_AROUND_M
+            spot = self._found + np.append(self._rng.normal(0.0, around_m, 2), 0.0)
+            guesses.append(self.guess(pose, page, heading, spot))
         return guesses
 
     def bred(
@@ -145,6 +151,11 @@ class FrameSearch:
         ]
         return max(tried, key=lambda guess: guess.score)
 
+    def _bounces(self, facets: Facets) -> list[Complex64[np.ndarray, "entry entry"]]:
+        """Covariance of what a body sends each pair by way of walls."""
+        both = zip(self._pairs, self._images, strict=True)
+        return [ALPHA**2 * by_bounces(facets, pair, images) for pair, images in both]
+
     def _child(self, parent: Guess, best: list[Guess], turn_rad: float, move_m: float) -> Guess:
         rng, book = self._rng, self._book
         pose, page, chance = parent.pose, parent.page, rng.uniform()
@@ -160,6 +171,11 @@ class FrameSearch:
         rise_m = rng.normal(0.0, _RISE_M) * (rng.uniform() < _RISES)
         spot = parent.spot + np.append(rng.normal(0.0, move_m, 2), rise_m)
         return self.guess(pose, page, parent.heading + rng.normal(0.0, turn_rad), spot)
+
+
+def is_upright(pose: Pose) -> bool:
+    """Whether the trunk is within 45° of the vertical."""
+    return float(pose.turns[_TRUNK, 2, 2]) > _UPRIGHT
 
 
 def spread_out(guesses: list[Guess], count: int) -> list[Guess]:

@@ -10,9 +10,23 @@ import numpy as np
 import pytest
 
 from rfgs_core.articulated import people
-from rfgs_core.limbs.evidence.body import LOBE_RAD, by_bounces, direct, figure_of, images_of, posed
+from rfgs_core.limbs.evidence.body import (
+    LOBE_RAD,
+    by_bounces,
+    direct,
+    figure_of,
+    images_of,
+    posed,
+)
 from rfgs_core.limbs.evidence.entries import End, Pair, pairs_of
-from rfgs_core.limbs.evidence.kernel import NOISE_SHARES, Facets, covariance, log_evidence
+from rfgs_core.limbs.evidence.kernel import (
+    NOISE_SHARES,
+    STRAIGHT,
+    Facets,
+    Images,
+    covariance,
+    log_evidence,
+)
 from rfgs_core.limbs.evidence.library import PHASES, Stride, strides, upright
 from rfgs_core.limbs.evidence.table import evidence_table, stacked
 from rfgs_core.measure.observations import Observations
@@ -89,7 +103,8 @@ def test_the_kernel_is_its_formula(frame, facets, pair: int, mirror: bool) -> No
     one = pairs_of(frame, CENTRE)[pair]
     rx = one.rx.mirrored(1, 2.5) if mirror else one.rx
     every = np.ones(len(facets.points), bool)
-    got = np.triu(covariance(one, facets, every, every, LOBE_RAD, rx=rx))
+    images = Images.of([(1, 1, 2.5)]) if mirror else STRAIGHT
+    got = np.triu(covariance(one, facets, every, every, LOBE_RAD, images))
     wanted = np.triu(plain(one, facets, one.tx, rx))
     # Arrays are steered at the middle of the band, so echoes from far aside are a little off.
     tolerance = 0.2 if mirror else 0.01
@@ -184,8 +199,11 @@ def test_a_wall_sends_what_images_of_the_ends_send(frame) -> None:
     bounds_m = np.array([[-60.0] * 3, [60.0, 2.5, 60.0]])
     few = there.facets.thinned(8)
     every = np.ones(len(few.points), bool)
-    images = (pair.tx.mirrored(1, 2.5), pair.rx), (pair.tx, pair.rx.mirrored(1, 2.5))
-    wanted = sum(covariance(pair, few, every, every, LOBE_RAD, *ends) for ends in images)
+    images = (
+        pair._replace(tx=pair.tx.mirrored(1, 2.5)),
+        pair._replace(rx=pair.rx.mirrored(1, 2.5)),
+    )
+    wanted = sum(covariance(image, few, every, every, LOBE_RAD) for image in images)
     got = by_bounces(there.facets, pair, images_of(pair, bounds_m, CENTRE))
     assert np.abs(got).max() > 0.0
     np.testing.assert_allclose(got, wanted, atol=1e-6 * np.abs(wanted).max())

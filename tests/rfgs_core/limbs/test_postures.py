@@ -8,20 +8,29 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rfgs_core.articulated import people
-from rfgs_core.limbs.evidence.body import figure_of
+from rfgs_core.articulated import Pose, people
+from rfgs_core.encode.body_maps import CENTRE_HEIGHT_M
+from rfgs_core.limbs.evidence.body import Posed, by_bounces, direct, figure_of, images_of, posed
+from rfgs_core.limbs.evidence.entries import pairs_of
+from rfgs_core.limbs.evidence.kernel import Images, log_evidence
 from rfgs_core.limbs.evidence.library import about_z, headings_of, over_origin, upright
 from rfgs_core.limbs.postures import book as books
 from rfgs_core.limbs.postures import search as searching
 from rfgs_core.limbs.postures import tell as telling
 from rfgs_core.limbs.postures.book import PoseBook, blend
 from rfgs_core.limbs.postures.chain import around, likeliest_path
-from rfgs_core.limbs.postures.search import FrameSearch, spread_out
+from rfgs_core.limbs.postures.search import FrameSearch, is_upright, spread_out
 from rfgs_core.limbs.postures.tell import can_tell, tell
 from rfgs_core.limbs.propose import Joints
 from rfgs_core.worlds.motion import random_motion
 
 PLACE, HEADING = np.array([0.3, -0.2, 0.0]), 2.0
+
+
+def about_y(angle_rad: float) -> np.ndarray:
+    """A turn around y."""
+    c, s = np.cos(angle_rad), np.sin(angle_rad)
+    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
 
 
 @pytest.fixture(scope="module")
@@ -115,6 +124,56 @@ def test_chance_comes_from_the_seed_alone(heard, seated, body, small_book, monke
     first = scores(1)
     assert first == sorted(first, reverse=True) and len(first) == 7
     assert scores(1) == first and scores(2) != first
+
+
+def test_walls_mirror_who_lies_as_they_lie(heard, seated, body, small_book) -> None:
+    """Evidence of a guess, term by term: who is upright is mirrored as somebody standing there."""
+    frame, figure = heard(seated, HEADING, PLACE), figure_of(body)
+    search = FrameSearch(frame, PLACE[:2], figure, small_book, np.random.default_rng(0))
+    middle = np.array([*PLACE[:2], CENTRE_HEIGHT_M])
+    pairs = pairs_of(frame, middle)
+
+    def evidence(here: Posed, mirrored: Posed) -> np.ndarray:
+        found = []
+        for pair in pairs:
+            images = images_of(pair, frame.bounds_m, middle)
+            echoes = direct(here, pair, np.zeros(3)) + searching.ALPHA**2 * sum(
+                by_bounces(mirrored.facets, pair, Images(*(part[[k]] for part in images)))
+                for k in range(len(images.end))
+            )
+            found.append(log_evidence(pair.change, echoes, searching.LEAST_NOISE))
+        return np.array(found)
+
+    back = about_y(-0.5 * np.pi)
+    lies = upright(body).turned(back, np.array([0.0, 0.0, 0.9])).moved(np.array([0.0, 0.0, -0.75]))
+    stands = posed(figure, upright(body).moved(PLACE), pairs)
+    for pose, own in ((small_book.poses[20], False), (lies, True)):
+        assert is_upright(pose) != own
+        guess = search.guess(pose, 20, HEADING, PLACE)
+        here = posed(figure, guess.in_world, pairs, by_skin=False)
+        wanted, other = evidence(here, stands), evidence(here, here)
+        if own:
+            wanted, other = other, wanted
+        np.testing.assert_allclose(guess.log, wanted, atol=0.05)
+        assert np.abs(guess.log - other).max() > 1.0
+
+
+def test_who_lies_is_sought_farther_from_where_they_were_found(
+    heard, seated, body, small_book, monkeypatch
+) -> None:
+    """The loudest place of a body that lies may be anywhere along it."""
+    monkeypatch.setattr(FrameSearch, "guess", lambda _, *guess: guess)
+    frame, figure = heard(seated, HEADING, PLACE), figure_of(body)
+    stands = upright(body)
+
+    def spread_m(pose: Pose) -> float:
+        book = PoseBook([pose], small_book.alike)
+        search = FrameSearch(frame, PLACE[:2], figure, book, np.random.default_rng(0))
+        return float(np.std([spot[:2] - PLACE[:2] for *_, spot in search.drawn()]))
+
+    assert spread_m(stands) == pytest.approx(searching.AROUND_M, rel=0.1)
+    lies = stands.turned(about_y(-0.5 * np.pi))
+    assert spread_m(lies) == pytest.approx(searching.LYING_AROUND_M, rel=0.1)
 
 
 def test_every_search_of_a_frame_begins_anew(heard, seated, small_book, monkeypatch) -> None:

@@ -88,7 +88,7 @@ def by_bounces(facets: Facets, pair: Pair, images: Images) -> Complex64[np.ndarr
 def images_of(
     pair: Pair, bounds_m: Float64[np.ndarray, "2 3"], centre: Float64[np.ndarray, "3"]
 ) -> Images:
-    """Images of a pair by one wall, echoes of which count.
+    """Images of a pair's ends in the walls, one end and wall at a time, echoes of which count.
 
     Args:
         pair: The pair.

@@ -43,9 +43,9 @@ _RISES, _RISE_M = 0.3, 0.02
 #: Amplitude of echoes by way of walls, and the least share of noise: with less of it evidence is
 #: peaked so sharply that the model's own errors decide.
 ALPHA, LEAST_NOISE = 0.3, 0.1
-#: Cosine of the angle between a trunk and the vertical: below it somebody does not hold themselves
-#: upright, but lies, crawls, bows or falls.
-_UPRIGHT, _TRUNK = 0.7, bone("spine_middle")
+#: Cosine of the angle between a trunk and the vertical below which somebody lies, crawls, bows or
+#: falls.
+_LEANS, _TRUNK = 0.7, bone("spine_middle")
 
 
 class Guess(NamedTuple):
@@ -106,8 +106,8 @@ class FrameSearch:
         """A guess with its evidence."""
         there = pose.turned(about_z(heading)).moved(spot)
         body = posed(self._figure, there, self._pairs, by_skin=False)
-        # Walls mirror who is not upright as they lie. Of all others they mirror somebody who stands
-        # at the place that was found: with images of their own they rise up to 0.2 m above it.
+        # Walls mirror who lies as they lie. Of who is upright they mirror somebody standing at the
+        # place that was found: with images of their own, upright bodies rise up to 0.2 m above it.
         bounces = self._of_standing if is_upright(there) else self._bounces(body.facets)
         log = [
             log_evidence(pair.change, direct(body, pair, np.zeros(3)) + by_walls, LEAST_NOISE)
@@ -175,7 +175,7 @@ class FrameSearch:
 
 def is_upright(pose: Pose) -> bool:
     """Whether the trunk is within 45° of the vertical."""
-    return float(pose.turns[_TRUNK, 2, 2]) > _UPRIGHT
+    return float(pose.turns[_TRUNK, 2, 2]) > _LEANS
 
 
 def spread_out(guesses: list[Guess], count: int) -> list[Guess]:

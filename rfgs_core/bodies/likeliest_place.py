@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where people are likeliest, each with what the walls send back of them.
 
-A map's peak is drawn aside by echoes off walls, the more so the fewer antennas tell directions.
-Here a place is as likely as what a standing body there explains of the channel, straight and by
+A map's peak is drawn aside by echoes off walls, the more so the fewer antennas tell directions, and
+its highest peak may be such an echo. Here a place is as likely as what a standing body there explains of the channel, straight and by
 way of one wall, of levels that are fitted for each device pair (see `limbs.evidence.levels`).
 """
 
@@ -12,12 +12,13 @@ from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
-from jaxtyping import Complex64, Float64
+from jaxtyping import Complex64, Float, Float64
 
 from rfgs_core.bodies.body_prior import Bodies
 from rfgs_core.bodies.expected_echoes import ExpectedEchoes, middle_of
+from rfgs_core.bodies.gain import FEWEST_PAIRS as FEWEST_TO_CHOOSE
 from rfgs_core.bodies.gain import stands_clear
-from rfgs_core.bodies.localise import BODY_RADIUS_M
+from rfgs_core.bodies.localise import BODY_RADIUS_M, NEAR_M, PairMaps, highest_peaks
 from rfgs_core.limbs.evidence.entries import pairs_of
 from rfgs_core.limbs.evidence.levels import Levels
 from rfgs_core.measure.observations import Observations
@@ -25,11 +26,38 @@ from rfgs_core.measure.observations import Observations
 #: Of fewer device pairs that hear anything, whether somebody sits moves the place: all are taken
 #: to stand.
 FEWEST_PAIRS = 5
+#: Peaks of the map that are asked for.
+_PEAKS = 3
 #: Steps from a place to better ones, each halved where none is [m].
 _FIRST_STEP_M, _LAST_STEP_M = 0.16, 0.04
 _WAYS = np.array([[x, y] for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y], dtype=np.float64)
 #: Times that each of several people is moved beside the others.
 _ROUNDS = 2
+
+
+def likeliest_peak(
+    observations: Observations,
+    maps: PairMaps,
+    near: Float[np.ndarray, "1 2"] | None = None,
+    reach_m: Float[np.ndarray, "1"] | float = NEAR_M,
+) -> Float64[np.ndarray, "1 2"]:
+    """Where a single upright person is: of the highest peaks of the map the likeliest.
+
+    Args:
+        observations: The frame; without phases, or of fewer than three device pairs that hear
+            anything, the highest peak is taken.
+        maps: Its matched-filter maps.
+        near: Where the person is expected; None for anywhere.
+        reach_m: How far around there to look [m].
+    """
+    count = _PEAKS if observations.kind == "complex" else 1
+    peaks = highest_peaks(maps, observations.bounds_m, count, near, reach_m)
+    if count == 1:
+        return peaks
+    evidence = _PlaceEvidence(observations, peaks[0], [])
+    if len(evidence.pairs) < FEWEST_TO_CHOOSE:
+        return peaks[:1]
+    return peaks[[int(np.argmax([evidence.at(place) for place in peaks]))]]
 
 
 def likeliest_places(

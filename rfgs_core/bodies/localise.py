@@ -178,10 +178,7 @@ def locate_bodies(
     near: Float[np.ndarray, "count 2"] | None = None,
     reach_m: Float[np.ndarray, "count"] | float = NEAR_M,
 ) -> Float64[np.ndarray, "count 2"]:
-    """Ground positions of upright bodies.
-
-    All bodies are found together and then separated: one after the other, the first could take
-    the place of the second.
+    """Ground positions of upright bodies, at the highest peaks of a map.
 
     Args:
         maps: Matched-filter maps of the frame.
@@ -194,6 +191,29 @@ def locate_bodies(
         One position per body [m], in the order of `near` (least sum of squared distances to
         it) or of falling score.
     """
+    found = highest_peaks(maps, bounds_m, count, near, reach_m)
+    return found if near is None else in_order_of(near, found)
+
+
+def highest_peaks(
+    maps: PairMaps,
+    bounds_m: Float64[np.ndarray, "2 3"],
+    count: int,
+    near: Float[np.ndarray, "body 2"] | None = None,
+    reach_m: Float[np.ndarray, "body"] | float = NEAR_M,
+) -> Float64[np.ndarray, "count 2"]:
+    """Peaks of a map scored for upright bodies, of falling score [m].
+
+    All are found together and then separated: one after the other, the first could take the place
+    of the second.
+
+    Args:
+        maps: Matched-filter maps of the frame.
+        bounds_m: Scene bounds [m].
+        count: How many peaks.
+        near: Where bodies are expected; None for anywhere.
+        reach_m: How far around each of `near` to look [m].
+    """
     low, high = bounds_m[:, :2] + np.array([[BODY_RADIUS_M], [-BODY_RADIUS_M]])
     axes = [np.arange(low[k], high[k] + 1e-9, GROUND_STEP_M) for k in range(2)]
     ground = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -203,8 +223,7 @@ def locate_bodies(
         within = np.maximum(reach_m, distance_m.min(axis=0))
         ground = ground[(distance_m <= within).any(axis=1)]
     score = _visible_side_score(maps, ground, float(bounds_m[0, 2]))
-    found = _means_around(ground, score, _separate_peaks(ground, score, count))
-    return found if near is None else in_order_of(near, found)
+    return _means_around(ground, score, _separate_peaks(ground, score, count))
 
 
 def in_order_of(

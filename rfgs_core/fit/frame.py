@@ -14,7 +14,7 @@ from torch import Tensor
 from rfgs_core.bodies.body_prior import outward_normals
 from rfgs_core.bodies.count import place_bodies
 from rfgs_core.bodies.gain import likelier_upright
-from rfgs_core.bodies.likeliest_place import likeliest_places
+from rfgs_core.bodies.likeliest_place import likeliest_peak, likeliest_places
 from rfgs_core.bodies.localise import NEAR_M, PairMaps, in_order_of, locate_bodies, pair_maps
 from rfgs_core.bodies.lying import with_lying
 from rfgs_core.bodies.motion_density import novelty, speeds_m_s, wanted_counts
@@ -265,11 +265,13 @@ def _followed(
     several = config.bodies > 1 and observations.kind == "complex"
     placed = place_bodies(observations, config.bodies, config, seed) if several else None
     near, reach_m = (None, NEAR_M) if before is None else before.expected(time_s)
-    if placed is None:
+    if placed is not None:
+        axes_xy = placed if near is None else in_order_of(near, placed)
+    elif config.bodies == 1:
+        axes_xy = likeliest_peak(observations, maps, near, reach_m)
+    else:
         axes_xy = locate_bodies(maps, bounds_m, config.bodies, near, reach_m)
         axes_xy = separated(observations, maps, axes_xy, config, seed, near, reach_m)
-    else:
-        axes_xy = placed if near is None else in_order_of(near, placed)
     lay = None if before is None else before.bodies
     bodies = with_lying(observations, maps, axes_xy, config, seed, lay)
     if placed is not None:

@@ -12,7 +12,7 @@ from lit_bodies import echoing, lit
 
 from rfgs_core.bodies import likeliest_place as settling
 from rfgs_core.bodies.body_prior import Bodies
-from rfgs_core.bodies.likeliest_place import FEWEST_PAIRS, likeliest_places
+from rfgs_core.bodies.likeliest_place import FEWEST_PAIRS, likeliest_peak, likeliest_places
 from rfgs_core.bodies.localise import (
     BODY_RADIUS_M,
     SEPARATION_M,
@@ -66,6 +66,63 @@ def test_echoes_off_walls_draw_nobody_aside(empty: Observations) -> None:
         by_evidence += off_m(moved(seen, found), [body]).tolist()
     assert np.mean(by_map) > 0.15, "the case is too easy"
     assert np.mean(by_evidence) < 0.5 * np.mean(by_map), by_evidence
+
+
+@pytest.fixture
+def three_radars(make_observations: Callable[..., Observations]) -> Observations:
+    radio = replace(preset("mmwave"), rx_cols=4, num_subcarriers=32)
+    whole = make_observations(radio=radio, bounds_m=ROOM_M)
+    return replace(whole, links=whole.links & (whole.pairs[0] < 3))
+
+
+def with_ghost(
+    empty: Observations, body: tuple[float, float], ghost: tuple[float, float], seed: int
+) -> Observations:
+    """A body, and somewhere else what looks like one, louder, to all radars but the last."""
+    pair, _ = empty.pairs
+    louder = 2.0 * np.where((pair < 2)[..., None], lit(empty, [ghost], seed + 50).delta, 0.0)
+    return empty.with_delta(lit(empty, [body], seed).delta + louder)
+
+
+def test_of_several_peaks_the_likeliest_is_taken(three_radars: Observations) -> None:
+    by_map, by_evidence = [], []
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        body, ghost = (tuple(rng.uniform([0.6, 0.6], ROOM_M[1, :2] - 0.6).tolist()) for _ in range(2))
+        seen = with_ghost(three_radars, body, ghost, seed)
+        maps = pair_maps(seen)
+        by_map += off_m(locate_bodies(maps, ROOM_M, 1), [body]).tolist()
+        by_evidence += off_m(likeliest_peak(seen, maps), [body]).tolist()
+    right, now_right = np.array(by_map) < 0.15, np.array(by_evidence) < 0.15
+    assert 2 <= right.sum() <= 3, "the case is too easy, or hopeless"
+    assert now_right[right].all()
+    assert now_right.sum() >= right.sum() + 2, by_evidence
+
+
+def test_only_peaks_where_somebody_is_expected_are_asked(three_radars: Observations) -> None:
+    body, ghost = (1.4, 2.9), (3.5, 1.3)
+    seen = with_ghost(three_radars, body, ghost, seed=1)
+    maps, reach_m = pair_maps(seen), np.array([0.6])
+    at_body, at_ghost = (
+        likeliest_peak(seen, maps, np.array([here]), reach_m) for here in (body, ghost)
+    )
+    assert off_m(at_body, [body])[0] < 0.15
+    assert off_m(at_ghost, [ghost])[0] <= 0.6
+
+
+def test_without_phases_or_with_two_pairs_the_highest_peak_is_taken(
+    three_radars: Observations,
+) -> None:
+    # The case above in which the map is wrong and evidence is not.
+    seen = with_ghost(three_radars, (2.54, 3.83), (1.15, 3.83), seed=1)
+    maps, (pair, _) = pair_maps(seen), seen.pairs
+    assert off_m(likeliest_peak(seen, maps), [(2.54, 3.83)])[0] < 0.15
+    two = replace(seen, links=seen.links & (pair < 2))
+    without_phases = replace(seen, kind="delay_power")
+    for left, shown in ((two, pair_maps(two)), (without_phases, maps)):
+        highest = locate_bodies(shown, ROOM_M, 1)
+        assert off_m(highest, [(2.54, 3.83)])[0] > 1.0
+        np.testing.assert_array_equal(likeliest_peak(left, shown), highest)
 
 
 def test_several_people_are_each_placed_beside_the_others(empty: Observations) -> None:

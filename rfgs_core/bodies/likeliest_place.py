@@ -2,8 +2,9 @@
 """Where people are likeliest, each with what the walls send back of them.
 
 A map's peak is drawn aside by echoes off walls, the more so the fewer antennas tell directions, and
-its highest peak may be such an echo. Here a place is as likely as what a standing body there explains of the channel, straight and by
-way of one wall, of levels that are fitted for each device pair (see `limbs.evidence.levels`).
+its highest peak may be such an echo. Here a place is as likely as what a standing body there
+explains of the channel, straight and by way of one wall, of levels that are fitted for each device
+pair (see `limbs.evidence.levels`).
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ from rfgs_core.limbs.evidence.tell import tell
 from rfgs_core.limbs.network import LimbNetwork
 from rfgs_core.limbs.postures.tell import can_tell, looks
 from rfgs_core.limbs.postures.tell import tell as tell_posture
-from rfgs_core.limbs.propose import Joints, of_walk_and_network, propose, smoothed
+from rfgs_core.limbs.propose import Joints, of_walk_and_network, propose_alone, smoothed
 from rfgs_core.limbs.skins import PosedPeople
 from rfgs_core.measure.observations import Observations, observe, packets_to_read
 from rfgs_core.seeds import sub_seed
@@ -204,8 +204,7 @@ def _on_bodies(joints: Joints) -> Joints:
 
 
 def _proposed(network: LimbNetwork, person: Person, seen: list[Observations]) -> Joints:
-    said = [propose(network, one, xy[None]) for one, xy in zip(seen, person.axes_xy, strict=True)]
-    return Joints(np.array([one.xyz for one in said]), np.array([one.sigma_m for one in said]))
+    return propose_alone(network, seen, person.axes_xy, person.time_s)
 
 
 def _walking(

@@ -21,7 +21,14 @@ from rfgs_core.limbs.postures.chain import GOES_M_S
 from rfgs_core.limbs.postures.tell import can_tell
 from rfgs_core.limbs.postures.tell import looks as posture_looks
 from rfgs_core.limbs.postures.tell import tell as tell_posture
-from rfgs_core.limbs.propose import SMOOTH_S, Joints, of_walk_and_network, propose, smoothed
+from rfgs_core.limbs.propose import (
+    SMOOTH_S,
+    Joints,
+    of_walk_and_network,
+    propose,
+    propose_alone,
+    smoothed,
+)
 from rfgs_core.limbs.skins import PosedPeople
 from rfgs_core.limbs.weights import Trained, own_network
 from rfgs_core.measure.observations import Observations
@@ -32,10 +39,11 @@ from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import TrainConfig
 
 _LOG = logging.getLogger(__name__)
-#: Limbs that are expected to be further off on average than this are left alone: joints of a
-#: standing body at the right place are 0.11 m off those of one who walks. But not those that are
-#: so many times further from a standing body than they are expected to be off: it is further off.
-_UNSURE_M, _FAR = 0.15, 1.2
+#: Limbs that are expected to be further off on average than this, and than this where somebody
+#: lies, are left alone: joints of a standing body at the right place are 0.11 m off those of one
+#: who walks, those of the prior of who lies some 0.4 m. But not those that are so many times further
+#: from a standing body than they are expected to be off: it is further off.
+_UNSURE_M, _UNSURE_LYING_M, _FAR = 0.15, 0.3, 1.2
 #: How often the network is asked anew without the echoes of the others as these are posed by then.
 _ROUNDS = 2
 
@@ -111,14 +119,15 @@ def find_limbs(
     joints = _together(told, alone, tracks)
     own = [frames.index(frame) for frame in run.frames]
     joints = Joints(joints.xyz[own], joints.sigma_m[own])
-    if not _of_use(joints, [alone[k] for k in own], [tracks[k] for k in own]):
+    alone, tracks = [alone[k] for k in own], [tracks[k] for k in own]
+    if not _of_use(joints, alone, tracks):
         _LOG.warning(
             "limbs are expected to be %.2f m off, more than %.2f m: bodies stay without",
             joints.sigma_m.mean(),
-            _UNSURE_M,
+            _unsure_m(tracks),
         )
         return None
-    limbs = Limbs(list(run.frames), [tracks[k] for k in own], joints, PosedPeople.through(joints))
+    limbs = Limbs(list(run.frames), tracks, joints, PosedPeople.through(joints))
     store_limbs(run.path, limbs)
     return limbs
 
@@ -219,11 +228,16 @@ def _by_network(
 ) -> list[Joints]:
     """Joints of each person in all frames, on curves through them."""
     time_s = np.array([track.time_s for track in tracks])
+    axes_xy = np.array([track.axes_xy for track in tracks])
+    if len(alone[0]) == 1:
+        seen = [frame[0] for frame in alone]
+        joints = propose_alone(trained.network, seen, axes_xy[:, 0], time_s)
+        return [smoothed(joints, time_s)]
     found = []
     for body in range(len(alone[0])):
         said = [
-            propose(trained.network, frame[body], track.axes_xy[[body]])
-            for frame, track in zip(alone, tracks, strict=True)
+            propose(trained.network, frame[body], place[[body]])
+            for frame, place in zip(alone, axes_xy, strict=True)
         ]
         joints = Joints(*(np.array(values) for values in zip(*said, strict=True)))
         found.append(smoothed(joints, time_s))
@@ -273,13 +287,19 @@ def _together(
 def _of_use(joints: Joints, alone: list[list[Observations]], tracks: list[Tracks]) -> bool:
     """Whether joints say more than that somebody stands, or lies as was found."""
     expected_m = float(joints.sigma_m.mean())
-    if expected_m <= _UNSURE_M:
+    if expected_m <= _unsure_m(tracks):
         return True
     if any(track.bodies.lies.any() for track in tracks):
         return False
     standing = _together([None] * joints.xyz.shape[1], alone, tracks)
     apart_m = np.linalg.norm(joints.xyz - standing.xyz, axis=-1).mean()
     return float(apart_m) > _FAR * expected_m
+
+
+def _unsure_m(tracks: list[Tracks]) -> float:
+    """How far off limbs may be expected to be on average, by who lies and who does not [m]."""
+    lies = np.array([track.bodies.lies for track in tracks])
+    return float(np.where(lies, _UNSURE_LYING_M, _UNSURE_M).mean())
 
 
 def frames_read(run: Run) -> list[int]:

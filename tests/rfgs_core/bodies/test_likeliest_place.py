@@ -88,7 +88,8 @@ def test_of_several_peaks_the_likeliest_is_taken(three_radars: Observations) -> 
     by_map, by_evidence = [], []
     for seed in range(6):
         rng = np.random.default_rng(seed)
-        body, ghost = (tuple(rng.uniform([0.6, 0.6], ROOM_M[1, :2] - 0.6).tolist()) for _ in range(2))
+        high = ROOM_M[1, :2] - 0.6
+        body, ghost = (tuple(rng.uniform([0.6, 0.6], high).tolist()) for _ in range(2))
         seen = with_ghost(three_radars, body, ghost, seed)
         maps = pair_maps(seen)
         by_map += off_m(locate_bodies(maps, ROOM_M, 1), [body]).tolist()

@@ -21,6 +21,7 @@ from rfgs_core.simulate.geometry.bvh import Bvh, build_bvh
 from rfgs_core.simulate.geometry.rays import blocked, new_stack
 from rfgs_core.simulate.surface.facets import facet_sum
 from rfgs_core.worlds.figure import Figure, Posed
+from rfgs_core.worlds.motion import random_motion
 
 BOUNDS_M = np.array([[-2.5, -2.5, 0.0], [2.5, 2.5, 2.6]])
 WAVELENGTH_M = 0.05
@@ -104,4 +105,16 @@ def heard_by_radars() -> tuple[Observations, np.ndarray]:
     # Facets of two wavelengths are fine enough for powers of beams.
     figure, stride = _walker(2.0 * SPEED_OF_LIGHT / radio.centre_hz)
     pose = stride.poses[3].turned(about_z(0.7)).moved(np.array([0.4, -0.3, 0.0]))
+    return _heard(pose, radio, figure), figure.body.joints17(pose)
+
+
+@pytest.fixture(scope="session")
+def who_lies_heard_by_radars() -> tuple[Observations, np.ndarray]:
+    """What mmWave radars hear of the walker lying on something low, and where joints are [m]."""
+    radio = replace(preset("mmwave"), num_subcarriers=80)
+    figure, _ = _walker(2.0 * SPEED_OF_LIGHT / radio.centre_hz)
+    lies = random_motion(np.random.default_rng(2), figure.body, "lie")
+    pose = lies.at(0.5 * lies.duration_s)
+    hips = figure.body.joints17(pose)[0]
+    pose = pose.moved(np.array([0.3 - hips[0], -0.2 - hips[1], 0.0]))
     return _heard(pose, radio, figure), figure.body.joints17(pose)

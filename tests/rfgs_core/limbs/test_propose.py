@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rfgs_core.limbs.propose import Joints, propose
+from rfgs_core.limbs.propose import Joints, propose, propose_alone
 from rfgs_core.limbs.weights import own_network
 from rfgs_core.measure.observations import Observations
 
@@ -39,3 +39,38 @@ def test_where_nothing_is_heard_joints_are_anywhere_within_a_metre(
     found = said(silent, np.array([0.5, 0.2]))
     np.testing.assert_allclose(found.xyz[0], np.broadcast_to([0.5, 0.2, 0.95], (17, 3)), atol=0.1)
     assert (found.sigma_m == 1.0).all()
+
+
+def said_alone(seen: list[Observations], axes_xy: np.ndarray) -> Joints:
+    trained = own_network(seen[0].freq_hz)
+    assert trained is not None
+    return propose_alone(trained.network, seen, axes_xy, np.arange(len(seen), dtype=np.float64))
+
+
+def test_beside_who_lies_heads_are_no_longer_taken_for_feet(
+    who_lies_heard_by_radars: tuple[Observations, np.ndarray],
+) -> None:
+    observations, joints = who_lies_heard_by_radars
+    places = joints[0, :2] + np.array([[-0.25, -0.25], [0.0, 0.35], [0.0, 0.0]])
+    once = np.array([said(observations, place).xyz[0] for place in places])
+    through = said_alone([observations] * 3, places)
+    alone = said_alone([observations], places[:1])
+    error_m = np.linalg.norm(once - joints, axis=2).mean(axis=1)
+    better_m = np.linalg.norm(through.xyz[:, 0] - joints, axis=2).mean(axis=1)
+    assert error_m[0] > 0.8, "the case is too easy"
+    assert better_m.max() < 0.35
+    assert better_m.mean() < 0.6 * error_m.mean()
+    assert np.linalg.norm(alone.xyz[0, 0] - joints, axis=1).mean() < 0.35
+    # How far they are expected to be off is told, too.
+    assert 0.5 < better_m.mean() / through.sigma_m.mean() < 2.0
+
+
+def test_whom_the_network_is_sure_of_it_is_asked_once(
+    heard_by_radars: tuple[Observations, np.ndarray],
+) -> None:
+    observations, joints = heard_by_radars
+    places = joints[:, :2].mean(axis=0) + np.array([[0.0, 0.0], [0.2, 0.1]])
+    alone = said_alone([observations] * 2, places)
+    once = [said(observations, place) for place in places]
+    np.testing.assert_array_equal(alone.xyz, [one.xyz for one in once])
+    np.testing.assert_array_equal(alone.sigma_m, [one.sigma_m for one in once])

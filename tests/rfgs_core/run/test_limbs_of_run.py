@@ -13,6 +13,8 @@ import torch
 from scipy.spatial import KDTree
 
 from rfgs_core.articulated import BONES, Pose, facets_of, people
+from rfgs_core.bodies.body_prior import Bodies
+from rfgs_core.bodies.tracks import Tracks
 from rfgs_core.cli.pose import PoseArgs
 from rfgs_core.cli.pose import run as pose
 from rfgs_core.dataset import open_dataset
@@ -125,6 +127,16 @@ def test_unsure_limbs_are_of_use_where_nobody_stands(
     save_network(network / "wifi.safetensors", saying(low_m, sigma_m), preset("wifi"), {})
     limbs = read_limbs(train(tiny_dataset, tmp_path / "unsure", CONFIG).path)
     assert (limbs is not None) is told
+
+
+@pytest.mark.parametrize(("sigma_m", "of_use"), [(0.14, True), (0.29, True), (0.31, False)])
+def test_of_who_lies_limbs_are_of_use_though_less_sure(sigma_m: float, of_use: bool) -> None:
+    """Joints of the prior of who lies are much further off than those of who stands."""
+    where = np.zeros((1, 2))
+    lies = Bodies(where, np.array([np.nan]), np.array([[0.3, 0.13]]))
+    tracks = [Tracks.begun(where, float(time)).laid(lies) for time in range(2)]
+    joints = Joints(np.zeros((2, 1, 17, 3)), np.full((2, 1, 17), sigma_m))
+    assert limbs_of_run._of_use(joints, [[], []], tracks) == of_use
 
 
 def test_a_single_unsure_frame_is_compared_with_standing_too(

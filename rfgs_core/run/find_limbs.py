@@ -41,8 +41,8 @@ from rfgs_core.settings import TrainConfig
 _LOG = logging.getLogger(__name__)
 #: Limbs that are expected to be further off on average than this, and than this where somebody
 #: lies, are left alone: joints of a standing body at the right place are 0.11 m off those of one
-#: who walks, those of the prior of who lies some 0.4 m. But not those that are so many times further
-#: from a standing body than they are expected to be off: it is further off.
+#: who walks, those of the prior of who lies some 0.4 m. But not those that are so many times
+#: further from a standing body than they are expected to be off: it is further off.
 _UNSURE_M, _UNSURE_LYING_M, _FAR = 0.15, 0.3, 1.2
 #: How often the network is asked anew without the echoes of the others as these are posed by then.
 _ROUNDS = 2

@@ -13,7 +13,6 @@ from jaxtyping import Float, Float64
 
 from rfgs_core.encode.body_maps import CENTRE_HEIGHT_M, View, body_maps, views_of
 from rfgs_core.limbs.network import LimbNetwork
-from rfgs_core.limbs.postures.chain import TEMPER, likeliest_path
 from rfgs_core.limbs.tokens import (
     MIRRORED,
     Packed,
@@ -37,16 +36,10 @@ _TURNED_AROUND = 0.25
 _SIDES_M = 0.06 * np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
 #: How often it is asked so, as long as the joints move by more than this [m].
 _ROUNDS, _SETTLED_M = 3, 0.1
-#: Of whom the network is less sure [m] it is asked again, from places beside the one found [m]:
-#: who lies is found so far off.
-_SURE_M = 0.1
-_BESIDE_M = 0.3 * np.array([[np.cos(a), np.sin(a)] for a in np.arange(8) * np.pi / 4])
-#: Within this ratio of σ it is as sure wherever it is asked.
-_AS_SURE = 1.05
 #: A filter of packets leaves holes where it heard noise, and the network has seen maps with noise:
-#: noise that is put back where the network is unsure, below each pair's peak, log10, and how often
-#: each is drawn.
-_PUT_BACK, _DRAWS = (-2.0, -1.5, -1.0), 4
+#: noise that is put back, below each pair's peak, log10, how often each is drawn, and how sure the
+#: network must be without any to be asked no more [m].
+_PUT_BACK, _DRAWS, SURE_M = (-2.0, -1.5, -1.0), 4, 0.1
 #: No joint is surer than this where joints are smoothed [m].
 _SUREST_M = 0.01
 
@@ -85,43 +78,6 @@ def propose(
     return Joints(np.array(xyz).reshape(-1, 17, 3), np.array(sigma).reshape(-1, 17))
 
 
-def propose_alone(
-    network: LimbNetwork,
-    seen: list[Observations],
-    axes_xy: Float[np.ndarray, "frame 2"],
-    time_s: Float64[np.ndarray, "frame"],
-) -> Joints:
-    """What the network makes of somebody through a sequence, with nobody else near.
-
-    Where it is unsure it begins again from eight places around, for beside the place of somebody
-    who lies it takes heads for feet. Of each frame that counts which is surest and goes on from
-    the frames before and after. Frames whose packets were filtered are asked once.
-
-    Args:
-        network: The network of this kind of radio.
-        seen: Frames in the order of time.
-        axes_xy: Where the person is in each [m].
-        time_s: Their times [s].
-
-    Returns:
-        Of all frames, shape (frame, 1, 17, ·).
-    """
-    told = []
-    for observations, place in zip(seen, np.asarray(axes_xy, np.float64), strict=True):
-        told.append(propose(network, observations, place[None]))
-        if told[-1].sigma_m.mean() > _SURE_M and observations.packets is None:
-            beside = propose(network, observations, place + _BESIDE_M)
-            told[-1] = _one_of(told[-1], beside)
-    # Seventeen joints of that σ; what is more certain is likelier.
-    score = [-17.0 / TEMPER * np.log(one.sigma_m.mean(axis=1)) for one in told]
-    path = likeliest_path(score, [one.xyz for one in told], time_s)
-    chosen = list(zip(told, path, strict=True))
-    return Joints(
-        np.array([one.xyz[[row]] for one, row in chosen]),
-        np.array([one.sigma_m[[row]] for one, row in chosen]),
-    )
-
-
 def glimpse(
     network: LimbNetwork,
     observations: Observations,
@@ -139,13 +95,6 @@ def glimpse(
     said = [_asked_at(network, one, views, place, 0) for place in np.asarray(axes_xy, np.float64)]
     xyz, sigma = zip(*said, strict=True) if said else ((), ())
     return Joints(np.array(xyz).reshape(-1, 17, 3), np.array(sigma).reshape(-1, 17))
-
-
-def _one_of(found: Joints, others: Joints) -> Joints:
-    """Both, one after the other, or the first alone if it makes no difference where it is asked."""
-    both = Joints(*(np.concatenate(values) for values in zip(found, others, strict=True)))
-    sigma_m = both.sigma_m.mean(axis=1)
-    return both if sigma_m.max() > _AS_SURE * sigma_m.min() else found
 
 
 def _asked_from(
@@ -216,7 +165,7 @@ def with_noise(
 ) -> tuple[Float64[np.ndarray, "17 3"], Float64[np.ndarray, "17"]]:
     """Mean joints and σ at the level of noise, or none, at which the network is surest."""
     means = [said(maps)]
-    if means[0][1].mean() < _SURE_M:
+    if means[0][1].mean() < SURE_M:
         return means[0]
     rng = np.random.default_rng(0)
     peak = maps.max(axis=(1, 2, 3), keepdims=True)

@@ -17,6 +17,7 @@ from rfgs_core.errors import RfgsFormatError
 from rfgs_core.fit.frame import followed
 from rfgs_core.limbs.evidence.tell import long_enough, looks, stands, tell
 from rfgs_core.limbs.evidence.track import course_of
+from rfgs_core.limbs.postures.alone import propose_alone
 from rfgs_core.limbs.postures.chain import GOES_M_S
 from rfgs_core.limbs.postures.tell import can_tell
 from rfgs_core.limbs.postures.tell import looks as posture_looks
@@ -26,7 +27,6 @@ from rfgs_core.limbs.propose import (
     Joints,
     of_walk_and_network,
     propose,
-    propose_alone,
     smoothed,
 )
 from rfgs_core.limbs.skins import PosedPeople

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the network makes of one person through a sequence, asked from places around if unsure.
+
+Beside the place of somebody who lies it takes heads for feet, and is the less sure.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float, Float64
+
+from rfgs_core.limbs.network import LimbNetwork
+from rfgs_core.limbs.postures.chain import TEMPER, likeliest_path
+from rfgs_core.limbs.propose import SURE_M, Joints, propose
+from rfgs_core.measure.observations import Observations
+
+#: Places from which it is asked again [m]: who lies is found so far off.
+_BESIDE_M = 0.3 * np.array([[np.cos(a), np.sin(a)] for a in np.arange(8) * np.pi / 4])
+#: Within this ratio of σ it is as sure wherever it is asked.
+_AS_SURE = 1.05
+
+
+def propose_alone(
+    network: LimbNetwork,
+    seen: list[Observations],
+    axes_xy: Float[np.ndarray, "frame 2"],
+    time_s: Float64[np.ndarray, "frame"],
+) -> Joints:
+    """Joints of somebody with nobody else near, whom the network might find instead.
+
+    Where it is less sure than `SURE_M` it begins again from eight places around. Of each frame
+    that counts which is surest and goes on from the frames before and after. Frames whose packets
+    were filtered are asked once.
+
+    Args:
+        network: The network of this kind of radio.
+        seen: Frames in the order of time.
+        axes_xy: Where the person is in each [m].
+        time_s: Their times [s].
+
+    Returns:
+        Of all frames, shape (frame, 1, 17, ·).
+    """
+    told = []
+    for observations, place in zip(seen, np.asarray(axes_xy, np.float64), strict=True):
+        one = propose(network, observations, place[None])
+        if one.sigma_m.mean() > SURE_M and observations.packets is None:
+            one = _together(one, propose(network, observations, place + _BESIDE_M))
+        told.append(one)
+    # Of seventeen joints with the same σ, what is more certain is likelier.
+    score = [-17.0 / TEMPER * np.log(one.sigma_m.mean(axis=1)) for one in told]
+    path = likeliest_path(score, [one.xyz for one in told], time_s)
+    chosen = list(zip(told, path.tolist(), strict=True))
+    return Joints(
+        np.array([one.xyz[[row]] for one, row in chosen]),
+        np.array([one.sigma_m[[row]] for one, row in chosen]),
+    )
+
+
+def _together(found: Joints, others: Joints) -> Joints:
+    """Both, one after the other, or the first alone if it makes no difference where it is asked."""
+    both = Joints(*(np.concatenate(values) for values in zip(found, others, strict=True)))
+    sigma_m = both.sigma_m.mean(axis=1)
+    return both if sigma_m.max() > _AS_SURE * sigma_m.min() else found

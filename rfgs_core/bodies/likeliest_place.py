@@ -19,7 +19,7 @@ from rfgs_core.bodies.body_prior import Bodies
 from rfgs_core.bodies.expected_echoes import ExpectedEchoes, middle_of
 from rfgs_core.bodies.gain import FEWEST_PAIRS as FEWEST_TO_CHOOSE
 from rfgs_core.bodies.gain import stands_clear
-from rfgs_core.bodies.localise import BODY_RADIUS_M, NEAR_M, PairMaps, highest_peaks
+from rfgs_core.bodies.localise import BODY_RADIUS_M, NEAR_M, SEPARATION_M, PairMaps, highest_peaks
 from rfgs_core.limbs.evidence.entries import pairs_of
 from rfgs_core.limbs.evidence.levels import Levels
 from rfgs_core.measure.observations import Observations
@@ -53,7 +53,10 @@ def likeliest_peak(
     """
     count = _PEAKS if observations.kind == "complex" else 1
     peaks = highest_peaks(maps, observations.bounds_m, count, near, reach_m)
-    if count == 1:
+    # Within a small reach the others may be on the slope of the highest.
+    apart = np.linalg.norm(peaks - peaks[0], axis=1) >= SEPARATION_M
+    peaks = np.vstack([peaks[:1], peaks[apart]])
+    if len(peaks) == 1:
         return peaks
     evidence = _PlaceEvidence(observations, peaks[0], [])
     if len(evidence.pairs) < FEWEST_TO_CHOOSE:

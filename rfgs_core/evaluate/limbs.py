@@ -158,7 +158,10 @@ def limb_table(
 
 
 def _by_network(network: LimbNetwork, person: Person, other: list[int]) -> dict[str, Joints]:
-    """Joints by the network, and those it gives to the radio of other frames."""
+    """Joints by the network, and those it gives to the radio of other frames.
+
+    Those of one frame are not smoothed; where it is unsure they are on the likeliest path.
+    """
     proposed = _proposed(network, person, person.seen)
     swapped = _proposed(network, person, [person.seen[k] for k in other])
     return {

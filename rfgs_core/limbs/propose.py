@@ -74,8 +74,7 @@ def propose(
         _asked_from(network, observations, views, place)
         for place in np.asarray(axes_xy, dtype=np.float64)
     ]
-    xyz, sigma = zip(*said, strict=True) if said else ((), ())
-    return Joints(np.array(xyz).reshape(-1, 17, 3), np.array(sigma).reshape(-1, 17))
+    return _of_bodies(said)
 
 
 def glimpse(
@@ -93,6 +92,13 @@ def glimpse(
     views = views_of(observations.layout, observations.links)
     one = replace(observations, packets=None)
     said = [_asked_at(network, one, views, place, 0) for place in np.asarray(axes_xy, np.float64)]
+    return _of_bodies(said)
+
+
+def _of_bodies(
+    said: list[tuple[Float64[np.ndarray, "17 3"], Float64[np.ndarray, "17"]]],
+) -> Joints:
+    """Joints and σ of some bodies, who may be none."""
     xyz, sigma = zip(*said, strict=True) if said else ((), ())
     return Joints(np.array(xyz).reshape(-1, 17, 3), np.array(sigma).reshape(-1, 17))
 

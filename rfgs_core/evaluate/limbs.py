@@ -162,8 +162,10 @@ def _by_network(network: LimbNetwork, person: Person, other: list[int]) -> dict[
 
     Those of one frame are not smoothed; where it is unsure they are on the likeliest path.
     """
-    proposed = _proposed(network, person, person.seen)
-    swapped = _proposed(network, person, [person.seen[k] for k in other])
+    proposed, swapped = (
+        propose_alone(network, seen, person.axes_xy, person.time_s)
+        for seen in (person.seen, [person.seen[k] for k in other])
+    )
     return {
         _SMOOTH: smoothed(proposed, person.time_s),
         "network, one frame": proposed,
@@ -205,10 +207,6 @@ def _swapped(person: Person, other: list[int]) -> list[Observations]:
 def _on_bodies(joints: Joints) -> Joints:
     """Joints of the bodies that are posed through them, as a run has them."""
     return Joints(PosedPeople.through(joints).joints17(), joints.sigma_m)
-
-
-def _proposed(network: LimbNetwork, person: Person, seen: list[Observations]) -> Joints:
-    return propose_alone(network, seen, person.axes_xy, person.time_s)
 
 
 def _walking(

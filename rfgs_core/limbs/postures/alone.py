@@ -13,6 +13,7 @@ from rfgs_core.limbs.network import LimbNetwork
 from rfgs_core.limbs.postures.chain import TEMPER, likeliest_path
 from rfgs_core.limbs.propose import SURE_M, Joints, propose
 from rfgs_core.measure.observations import Observations
+from rfgs_core.skeleton import JOINTS
 
 #: Places from which it is asked again [m]: who lies is found so far off.
 _BESIDE_M = 0.3 * np.array([[np.cos(a), np.sin(a)] for a in np.arange(8) * np.pi / 4])
@@ -47,8 +48,8 @@ def propose_alone(
         if one.sigma_m.mean() > SURE_M and observations.packets is None:
             one = _together(one, propose(network, observations, place + _BESIDE_M))
         told.append(one)
-    # Of seventeen joints with the same σ, what is more certain is likelier.
-    score = [-17.0 / TEMPER * np.log(one.sigma_m.mean(axis=1)) for one in told]
+    # Of joints with the same σ, what is more certain is likelier.
+    score = [-len(JOINTS) / TEMPER * np.log(one.sigma_m.mean(axis=1)) for one in told]
     path = likeliest_path(score, [one.xyz for one in told], time_s)
     chosen = list(zip(told, path.tolist(), strict=True))
     return Joints(

@@ -18,6 +18,7 @@ from rfgs_core.fit.frame import followed
 from rfgs_core.limbs.evidence.tell import long_enough, looks, stands, tell
 from rfgs_core.limbs.evidence.track import course_of
 from rfgs_core.limbs.postures.alone import propose_alone
+from rfgs_core.limbs.postures.arms import hanging
 from rfgs_core.limbs.postures.chain import GOES_M_S
 from rfgs_core.limbs.postures.tell import can_tell
 from rfgs_core.limbs.postures.tell import looks as posture_looks
@@ -253,10 +254,21 @@ def _asked_anew(
     on_frame: Callable[[], Any],
 ) -> list[Joints]:
     """What the network says without the echoes of the others, posed as it has said by then."""
+    said = _with_arms(said, tracks)
     for _ in range(_ROUNDS):
         joints = Joints(*(np.concatenate(values, axis=1) for values in zip(*said, strict=True)))
-        said = _by_network(trained, _without_others(seen, joints, config, on_frame), tracks)
+        alone = _without_others(seen, joints, config, on_frame)
+        said = _with_arms(_by_network(trained, alone, tracks), tracks)
     return said
+
+
+def _with_arms(said: list[Joints], tracks: list[Tracks]) -> list[Joints]:
+    """The same, arms hanging of who goes somewhere."""
+    time_s = np.array([track.time_s for track in tracks])
+    return [
+        hanging(joints, np.array([track.axes_xy[body] for track in tracks]), time_s)
+        for body, joints in enumerate(said)
+    ]
 
 
 def _without_others(

@@ -265,10 +265,7 @@ def _asked_anew(
 def _with_arms(said: list[Joints], tracks: list[Tracks]) -> list[Joints]:
     """The same, arms hanging of who goes somewhere."""
     time_s = np.array([track.time_s for track in tracks])
-    return [
-        hanging(joints, np.array([track.axes_xy[body] for track in tracks]), time_s)
-        for body, joints in enumerate(said)
-    ]
+    return [hanging(joints, time_s) for joints in said]
 
 
 def _without_others(

@@ -16,27 +16,27 @@ from rfgs_core.limbs.evidence.track import course_of
 from rfgs_core.limbs.propose import Joints, combined
 from rfgs_core.skeleton import JOINTS
 
-#: Who is as fast as this, and no faster, goes somewhere [m/s]; a place found wrongly jumps.
-_GOES_M_S, _FASTEST_M_S = 0.5, 3.0
+#: Whose hips are as fast as this, and no faster, goes somewhere [m/s]: who climbs or crawls is
+#: slower, and a place found wrongly jumps.
+_GOES_M_S, _FASTEST_M_S = 0.6, 3.0
 #: How far elbows and wrists of who goes are from hanging [m].
 _SWING_M = {"elbow": 0.07, "wrist": 0.12}
 #: As much farther they may be for each second before somebody goes and after that [m].
 _FARTHER_M_S = 0.1
 
 
-def hanging(joints: Joints, axes_xy: Float64[np.ndarray, "frame 2"], time_s: np.ndarray) -> Joints:
+def hanging(joints: Joints, time_s: Float64[np.ndarray, "frame"]) -> Joints:
     """Joints of one person, their arms hanging if they go somewhere upright and arms are unsure.
 
     Args:
         joints: Of all frames, shape (frame, 1, 17, ·).
-        axes_xy: Where the person is in each [m].
         time_s: Their times [s].
 
     Returns:
         The same for somebody who goes nowhere.
     """
     xyz = joints.xyz[:, 0]
-    _, speed_m_s = course_of(axes_xy, time_s)
+    _, speed_m_s = course_of(xyz[:, JOINTS.index("pelvis"), :2], time_s)
     stands = _upright(xyz)
     goes = stands & (speed_m_s >= _GOES_M_S) & (speed_m_s <= _FASTEST_M_S)
     if not goes.any():

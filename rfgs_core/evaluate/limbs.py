@@ -30,7 +30,7 @@ from rfgs_core.limbs.postures.alone import propose_alone
 from rfgs_core.limbs.postures.tell import can_tell, looks
 from rfgs_core.limbs.postures.tell import tell as tell_posture
 from rfgs_core.limbs.propose import Joints, of_walk_and_network, smoothed
-from rfgs_core.limbs.skins import PosedPeople
+from rfgs_core.limbs.skins import PosedPeople, shapes_of
 from rfgs_core.measure.observations import Observations, observe, packets_to_read
 from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import TrainConfig
@@ -141,9 +141,10 @@ def limb_table(
         told |= _by_postures(person, other, _SEED)
     if _SMOOTH in told and _EVIDENCE in told:
         both = of_walk_and_network(told[_EVIDENCE], told[_SMOOTH])
-        told = {"evidence and network together": _on_bodies(both)} | told
+        shapes = shapes_of(told[_SMOOTH])
+        told = {"evidence and network together": _on_bodies(both, shapes)} | told
     if _SMOOTH in told:
-        told[_SMOOTH] = _on_bodies(told[_SMOOTH])
+        told[_SMOOTH] = _on_bodies(told[_SMOOTH], shapes_of(told[_SMOOTH]))
     rows = others(person) | {name: joints.xyz[:, 0] for name, joints in told.items()}
     mean, phases = _walking(person, _SEED)
     own = people().body(np.zeros(0))
@@ -204,9 +205,9 @@ def _swapped(person: Person, other: list[int]) -> list[Observations]:
     ]
 
 
-def _on_bodies(joints: Joints) -> Joints:
+def _on_bodies(joints: Joints, shapes: Float64[np.ndarray, "1 K"] | None = None) -> Joints:
     """Joints of the bodies that are posed through them, as a run has them."""
-    return Joints(PosedPeople.through(joints).joints17(), joints.sigma_m)
+    return Joints(PosedPeople.through(joints, shapes).joints17(), joints.sigma_m)
 
 
 def _walking(

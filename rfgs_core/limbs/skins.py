@@ -16,14 +16,21 @@ from rfgs_core.seeds import sub_seed
 _SHAPE = 3
 #: σ of a joint that pulls at a body with weight 1 [m]; see `articulated.fit_pose`.
 _SUREST_M = 0.005
-#: Joints that are this unsure tell half of a person's shape [m]: means of what is not known lie
-#: nearer to each other than joints do, and would make everybody small.
-_HALF_SURE_M = 0.02
 
 
 def pulls(joints: Joints) -> Float64[np.ndarray, "*body 17"]:
     """How strongly each joint pulls at a body, at most 1; see `articulated.fit_pose`."""
     return np.minimum((_SUREST_M / joints.sigma_m) ** 2, 1.0)
+
+
+def shapes_of(said: Joints) -> Float64[np.ndarray, "body K"]:
+    """Shapes of people by how long their limbs are in what the network says of them.
+
+    Args:
+        said: Of all frames, shape (frame, body, 17, ·).
+    """
+    bodies = range(said.xyz.shape[1])
+    return np.array([fit_shape(said.xyz[:, b], _SHAPE, said.sigma_m[:, b]) for b in bodies])
 
 
 @dataclass(frozen=True)
@@ -52,26 +59,26 @@ class PosedPeople:
     """How each bone is turned against the world, from rest."""
 
     @staticmethod
-    def through(joints: Joints) -> PosedPeople:
+    def through(joints: Joints, shapes: Float64[np.ndarray, "body K"] | None = None) -> PosedPeople:
         """Bodies whose joints are where they are said to be, as far as bones allow.
 
         Args:
             joints: Of all frames, shape (frame, body, 17, ·).
+            shapes: Coefficients of each, see `shapes_of`; None for the mean shape.
         """
         frames, bodies = joints.xyz.shape[:2]
-        weight = pulls(joints)
-        told = 1.0 / (1.0 + (joints.sigma_m.mean(axis=(0, 2)) / _HALF_SURE_M) ** 2)
-        shapes, roots, turns = [], np.zeros((frames, bodies, 3)), []
+        if shapes is None:
+            shapes = np.zeros((bodies, len(people().components)))
+        weight, roots, turns = pulls(joints), np.zeros((frames, bodies, 3)), []
         for body in range(bodies):
-            shapes.append(told[body] * fit_shape(joints.xyz[:, body], _SHAPE))
-            figure = people().body(shapes[-1])
+            figure = people().body(shapes[body])
             own, pose = [], None
             for frame in range(frames):
                 pose = fit_pose(figure, joints.xyz[frame, body], weight[frame, body], pose)
                 roots[frame, body] = pose.root
                 own.append(pose.turns.astype(np.float32))
             turns.append(own)
-        return PosedPeople(np.array(shapes), roots, np.array(turns).swapaxes(0, 1))
+        return PosedPeople(shapes, roots, np.array(turns).swapaxes(0, 1))
 
     def body(self, number: int) -> Body:
         """One of the people at rest."""

@@ -30,7 +30,7 @@ from rfgs_core.limbs.propose import (
     propose,
     smoothed,
 )
-from rfgs_core.limbs.skins import PosedPeople
+from rfgs_core.limbs.skins import PosedPeople, shapes_of
 from rfgs_core.limbs.weights import Trained, own_network
 from rfgs_core.measure.observations import Observations
 from rfgs_core.run.folder import LIMBS_FILE, Run
@@ -105,10 +105,12 @@ def find_limbs(
     if walks:
         told = _by_evidence(alone, tracks, config.seed, on_frame)
         told = _by_postures(told, alone, tracks, config.seed, seeking)
+    shapes = None
     if trained is not None:
         said = _by_network(trained, alone, tracks)
         if only_people and len(said) > 1:
             said = _asked_anew(trained, seen, said, tracks, config, on_frame)
+        shapes = shapes_of(_side_by_side(said))
         told = [
             other if one is None else of_walk_and_network(one, other)
             for one, other in zip(told, said, strict=True)
@@ -128,7 +130,7 @@ def find_limbs(
             _unsure_m(tracks),
         )
         return None
-    limbs = Limbs(list(run.frames), tracks, joints, PosedPeople.through(joints))
+    limbs = Limbs(list(run.frames), tracks, joints, PosedPeople.through(joints, shapes))
     store_limbs(run.path, limbs)
     return limbs
 
@@ -256,8 +258,7 @@ def _asked_anew(
     """What the network says without the echoes of the others, posed as it has said by then."""
     said = _with_arms(said, tracks)
     for _ in range(_ROUNDS):
-        joints = Joints(*(np.concatenate(values, axis=1) for values in zip(*said, strict=True)))
-        alone = _without_others(seen, joints, config, on_frame)
+        alone = _without_others(seen, _side_by_side(said), config, on_frame)
         said = _with_arms(_by_network(trained, alone, tracks), tracks)
     return said
 
@@ -272,7 +273,8 @@ def _without_others(
     seen: list[Observations], joints: Joints, config: TrainConfig, on_frame: Callable[[], Any]
 ) -> list[list[Observations]]:
     """Each frame once for each person, without the echoes of the others in their poses."""
-    posed, count, alone = PosedPeople.through(joints), joints.xyz.shape[1], []
+    count, alone = joints.xyz.shape[1], []
+    posed = PosedPeople.through(joints, shapes_of(joints))
     for frame, observations in enumerate(seen):
         skin = posed.gaussians(frame, GAUSSIANS_PER_BODY * count, config.seed)
         alone.append(
@@ -290,7 +292,12 @@ def _together(
     for body, joints in enumerate(told):
         axes_xy = np.array([track.axes_xy[body] for track in tracks])
         whole.append(joints or stands([frame[body] for frame in alone], axes_xy))
-    return Joints(*(np.concatenate(values, axis=1) for values in zip(*whole, strict=True)))
+    return _side_by_side(whole)
+
+
+def _side_by_side(people: list[Joints]) -> Joints:
+    """Joints of several people, each of shape (frame, 1, 17, ·), as one of them all."""
+    return Joints(*(np.concatenate(values, axis=1) for values in zip(*people, strict=True)))
 
 
 def _of_use(joints: Joints, alone: list[list[Observations]], tracks: list[Tracks]) -> bool:

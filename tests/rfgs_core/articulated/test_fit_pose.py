@@ -8,9 +8,10 @@ import pytest
 
 from rfgs_core.articulated import Body, Pose, fit_pose, fit_shape, people
 from rfgs_core.errors import RfgsError
-from rfgs_core.skeleton import JOINTS
+from rfgs_core.skeleton import JOINTS, PARENTS
 
 RandomPose = Callable[[Body, np.random.Generator], Pose]
+SIDES = ("left", "right")
 
 
 def test_joints_of_random_poses_are_met(random_pose: RandomPose) -> None:
@@ -81,6 +82,43 @@ def test_lengths_of_limbs_tell_the_shape(random_pose: RandomPose) -> None:
         # Shins, fixed by what was fitted.
         legs = [np.linalg.norm(one.heads[15] - one.heads[16]) for one in (body, found)]
         assert legs[0] == pytest.approx(legs[1], abs=0.02)
+
+
+def test_unsure_joints_tell_little_of_the_shape(random_pose: RandomPose) -> None:
+    rng = np.random.default_rng(8)
+    arms = [JOINTS.index(f"{side}_{at}") for side in SIDES for at in ("elbow", "wrist")]
+    for height in (-1.5, 1.5):
+        body = people().body(np.array([height]))
+        joints = np.stack([body.joints17(random_pose(body, rng)) for _ in range(10)])
+        sigma = np.full(joints.shape[:2], 0.01)
+        sigma[:, arms] = 0.4
+        # The mean of a hand that may be anywhere is near the shoulder.
+        for side in SIDES:
+            shoulder = joints[:, JOINTS.index(f"{side}_shoulder")]
+            for at in ("elbow", "wrist"):
+                joints[:, JOINTS.index(f"{side}_{at}")] = shoulder
+        told, plain = (
+            people().body(fit_shape(joints, sigma_m=given)).height_m for given in (sigma, None)
+        )
+        assert told == pytest.approx(body.height_m, abs=0.02)
+        assert abs(plain - body.height_m) > 0.1
+
+
+def test_means_are_shorter_than_limbs(random_pose: RandomPose) -> None:
+    """Known to ±σ, ends of a limb of length L are √(L² - 0.45 (σ² + σ²)) apart."""
+    rng = np.random.default_rng(9)
+    body, sigma_m = people().body(np.array([1.0])), 0.08
+    joints = np.stack([body.joints17(random_pose(body, rng)) for _ in range(10)])
+    means = joints.copy()
+    for joint in range(1, 17):
+        limb = joints[:, joint] - joints[:, PARENTS[joint]]
+        length = np.linalg.norm(limb, axis=1, keepdims=True)
+        shorter = np.sqrt(np.maximum(length**2 - 0.9 * sigma_m**2, 0.0))
+        means[:, joint] = means[:, PARENTS[joint]] + limb * shorter / length
+    told = people().body(fit_shape(means, sigma_m=np.full(joints.shape[:2], sigma_m)))
+    plain = people().body(fit_shape(means))
+    assert told.height_m == pytest.approx(body.height_m, abs=0.02)
+    assert plain.height_m < body.height_m - 0.03
 
 
 def test_a_sequence_without_limbs_is_refused() -> None:

@@ -15,7 +15,7 @@ from rfgs_core.limbs.propose import (
     of_walk_and_network,
     smoothed,
 )
-from rfgs_core.limbs.skins import PosedPeople
+from rfgs_core.limbs.skins import PosedPeople, shapes_of
 from rfgs_core.worlds.motion import random_motion
 
 TIME_S = np.arange(9) * 0.1
@@ -118,14 +118,14 @@ def walk() -> tuple[Joints, np.ndarray]:
 
 def test_a_body_takes_the_poses_of_another(walk) -> None:
     joints, _ = walk
-    posed = PosedPeople.through(joints)
+    posed = PosedPeople.through(joints, shapes_of(joints))
     error = np.linalg.norm(posed.joints17() - joints.xyz, axis=-1)
     assert error.mean() < 0.02 and error.max() < 0.08
 
 
 def test_gaussians_keep_their_place_on_the_skin(walk) -> None:
     joints, _ = walk
-    posed = PosedPeople.through(joints)
+    posed = PosedPeople.through(joints, shapes_of(joints))
     first, last = (posed.gaussians(frame, 500, seed=3) for frame in (0, 4))
     np.testing.assert_array_equal(first.bone, last.bone)
     assert (first.points != last.points).any()

@@ -9,7 +9,7 @@ import numpy as np
 
 from rfgs_core.articulated import BONES, people
 from rfgs_core.limbs.propose import Joints
-from rfgs_core.limbs.skins import PosedPeople
+from rfgs_core.limbs.skins import PosedPeople, shapes_of
 from rfgs_core.motion_capture.bvh import read_bvh
 from rfgs_core.pose.bvh import write_bvh
 from rfgs_core.worlds.motion import random_motion
@@ -23,7 +23,8 @@ def posed() -> PosedPeople:
     body = people().random(rng)
     motion = random_motion(rng, body, "walk")
     xyz = np.array([[body.joints17(motion.at(0.3 + t))] for t in TIME_S])
-    return PosedPeople.through(Joints(xyz, np.full(xyz.shape[:3], 0.02)))
+    joints = Joints(xyz, np.full(xyz.shape[:3], 0.02))
+    return PosedPeople.through(joints, shapes_of(joints))
 
 
 def test_bones_come_back_where_they_were(tmp_path: Path) -> None:

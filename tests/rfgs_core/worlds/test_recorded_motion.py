@@ -16,7 +16,7 @@ from rfgs_core import open_dataset
 from rfgs_core.articulated import people
 from rfgs_core.errors import RfgsError
 from rfgs_core.limbs.propose import Joints
-from rfgs_core.limbs.skins import PosedPeople
+from rfgs_core.limbs.skins import PosedPeople, shapes_of
 from rfgs_core.motion_capture import read_recording
 from rfgs_core.pose.bvh import write_bvh
 from rfgs_core.radio.presets import preset
@@ -35,7 +35,8 @@ def walker() -> PosedPeople:
     motion = random_motion(rng, body, "walk")
     turn = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
     xyz = np.array([[body.joints17(motion.at(0.3 + t).turned(turn))] for t in TIME_S])
-    return PosedPeople.through(Joints(xyz, np.full(xyz.shape[:3], 0.02)))
+    joints = Joints(xyz, np.full(xyz.shape[:3], 0.02))
+    return PosedPeople.through(joints, shapes_of(joints))
 
 
 @pytest.fixture(scope="module")

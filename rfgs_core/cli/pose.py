@@ -20,7 +20,8 @@ class PoseArgs:
 
     The errors are printed beside those of a standing body of average height at the same place,
     which knows nothing of the limbs: only what beats it was seen by radio. RUN/pose.json holds
-    them.
+    them. Where the network told limbs, how tall people are is printed too, beside what the same
+    body shape has with the true limbs.
     """
 
     run: tyro.conf.Positional[Path]
@@ -72,6 +73,7 @@ def run(args: PoseArgs) -> int:
             f"posture right {scores['posture_right']:.2f} ({scores['seated']} of "
             f"{scores['people']} sit)\n"
         )
+    sys.stdout.write(_height(scores["heights_m"], scores["true_heights_m"]))
     sys.stdout.write(f"{args.run / 'pose.png'} written\n")
     return 0
 
@@ -81,3 +83,11 @@ def _each(people_m: list[float]) -> str:
     if len(people_m) < 2:
         return ""
     return "; each person " + ", ".join(f"{error:.3f}" for error in people_m) + " m"
+
+
+def _height(told_m: list[float] | None, true_m: list[float] | None) -> str:
+    """A line of how tall people are [m], where the network told."""
+    if told_m is None:
+        return ""
+    told, true = (", ".join(f"{one:.2f}" for one in each or []) for each in (told_m, true_m))
+    return f"height    {told} m" + (f"; by the true limbs {true} m\n" if true else "\n")

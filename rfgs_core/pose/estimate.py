@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float64
 
+from rfgs_core.articulated import people
 from rfgs_core.bodies.body_prior import Bodies
 from rfgs_core.errors import RfgsError
 from rfgs_core.pose.body import index_of, joints_of
@@ -57,6 +58,8 @@ class PoseEstimate:
     looks where the track leads [m]."""
     sigma_m: Float64[np.ndarray, "frame body 17"] | None = None
     """How far each joint is expected to be off [m]; None where the network did not tell limbs."""
+    heights_m: Float64[np.ndarray, "body"] | None = None
+    """How tall everybody is, by the limbs that the network told; None where it did not [m]."""
 
 
 def estimate_poses(run: Run, on_step: Callable[[], Any] = lambda: None) -> PoseEstimate:
@@ -128,9 +131,14 @@ def _told(
             own = float(np.arctan2(-left[0], left[1]))
             way = looks[0] if len(looks) == 1 else own
             baseline[k, body] = joints_of(standing(clouds[k][body], way), floor_m)
-    seated = np.array([[is_low(person, floor_m) for person in people] for people in joints])
-    sigma_m = limbs.joints.sigma_m
-    return PoseEstimate(limbs.frames, time_s, centroid, joints, seated, baseline, sigma_m)
+    seated = np.array([[is_low(person, floor_m) for person in frame] for frame in joints])
+    shapes, sigma_m, heights_m = limbs.people.coefficients, limbs.joints.sigma_m, None
+    # Evidence knows one shape, the mean.
+    if shapes.any():
+        heights_m = np.array([people().body(shape).height_m for shape in shapes])
+    return PoseEstimate(
+        limbs.frames, time_s, centroid, joints, seated, baseline, sigma_m, heights_m
+    )
 
 
 def _bodies(run: Run, frame: int) -> Bodies:

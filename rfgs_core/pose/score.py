@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float64, Int64
 from scipy.optimize import linear_sum_assignment
 
+from rfgs_core.articulated import fit_shape, people
 from rfgs_core.dataset import Sequence
 from rfgs_core.pose.estimate import PoseEstimate, is_low
 from rfgs_core.skeleton import JOINTS
@@ -22,7 +23,8 @@ def score_poses(estimate: PoseEstimate, sequence: Sequence) -> dict[str, Any]:
 
     Bodies are matched to people frame by frame by the distance on the ground between pelvis and
     pelvis. `mpjpe_m` is the mean distance per joint, `aligned_m` the same with pelvis on pelvis,
-    `people_m` that of each person who was matched, in the sequence's order;
+    `people_m` that of each person who was matched, in the sequence's order; `heights_m` how tall
+    each of these is said to be, `true_heights_m` how tall by their true limbs;
     `identity_kept` is the share of matches with the person that a body had at first, and
     `tracked` the share of people with their body within half a metre. `posture_right` is the share
     of matches of which the run says rightly whether they sit or lie, `seated` the number who do.
@@ -30,8 +32,8 @@ def score_poses(estimate: PoseEstimate, sequence: Sequence) -> dict[str, Any]:
     """
     truth = [sequence.joints(frame).astype(np.float64) for frame in estimate.frames]
     matches = [_matched(estimate.joints[k], true) for k, true in enumerate(truth)]
-    people = sum(int(np.isfinite(true[:, 0]).all(axis=1).sum()) for true in truth)
-    result: dict[str, Any] = {"frames": len(estimate.frames), "people": people}
+    present = sum(int(np.isfinite(true[:, 0]).all(axis=1).sum()) for true in truth)
+    result: dict[str, Any] = {"frames": len(estimate.frames), "people": present}
     for name, joints in (("fit", estimate.joints), ("standing", estimate.standing)):
         result[name] = _errors(joints, truth, matches)
     distance = [
@@ -39,7 +41,8 @@ def score_poses(estimate: PoseEstimate, sequence: Sequence) -> dict[str, Any]:
         for k, row in enumerate(matches)
         for body, person in row
     ]
-    result["tracked"] = float(np.sum(np.array(distance) < LOST_M) / people) if people else None
+    result |= _heights(estimate.heights_m, truth, matches)
+    result["tracked"] = float(np.sum(np.array(distance) < LOST_M) / present) if present else None
     result["identity_kept"] = identity_kept([[(int(b), int(p)) for b, p in row] for row in matches])
     floor_m = float(np.asarray(sequence.bounds_m)[0, 2])
     sits = [
@@ -82,6 +85,28 @@ def _errors(
         "joints_m": {name: float(each[:, j].mean()) for j, name in enumerate(JOINTS)},
         "people_m": [float(each[whose == person].mean()) for person in np.unique(whose)],
     }
+
+
+def _heights(
+    heights_m: Float64[np.ndarray, "body"] | None,
+    truth: list[Float64[np.ndarray, "person 17 3"]],
+    matches: list[Int64[np.ndarray, "match 2"]],
+) -> dict[str, list[float] | None]:
+    """Mean height of the bodies that were matched to each person, and theirs by their limbs.
+
+    Of people of whom nothing is known, the heights of all bodies.
+    """
+    if heights_m is None:
+        return {"heights_m": None, "true_heights_m": None}
+    if not sum(len(row) for row in matches):
+        return {"heights_m": heights_m.tolist(), "true_heights_m": None}
+    body, person = np.concatenate(matches).T
+    told = [float(heights_m[body[person == one]].mean()) for one in np.unique(person)]
+    true = [
+        float(people().body(fit_shape(np.array([frame[one] for frame in truth]))).height_m)
+        for one in np.unique(person)
+    ]
+    return {"heights_m": told, "true_heights_m": true}
 
 
 def identity_kept(matches: list[list[tuple[int, int]]]) -> float | None:

@@ -8,6 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from rfgs_core.articulated import people
+from rfgs_core.limbs.evidence.library import upright
 from rfgs_core.pose.body import (
     BONES,
     PARAMETERS,
@@ -145,12 +147,18 @@ def test_headings_follow_the_track_and_are_open_at_rest() -> None:
     assert headings_of(time_s[:1], walking[:1]) == [[0.0, np.pi / 2, np.pi, -np.pi / 2]]
 
 
-def scored(joints: np.ndarray, truth: np.ndarray, seated: np.ndarray | None = None) -> dict:
+def scored(
+    joints: np.ndarray,
+    truth: np.ndarray,
+    seated: np.ndarray | None = None,
+    heights_m: np.ndarray | None = None,
+) -> dict:
     """Scores of estimated joints (frame, body, 17, 3) against true ones, on a floor at 0.2 m."""
     sits = np.zeros(joints.shape[:2], bool) if seated is None else seated
     estimate = PoseEstimate(
         *(list(range(len(joints))), np.arange(len(joints)), joints[:, :, 0], joints, sits),
         joints + 0.3,
+        heights_m=heights_m,
     )
     bounds_m = np.array([[0.0, 0.0, 0.2], [4.0, 4.0, 2.4]])
     sequence = SimpleNamespace(
@@ -160,8 +168,8 @@ def scored(joints: np.ndarray, truth: np.ndarray, seated: np.ndarray | None = No
 
 
 def test_scores_of_shifted_and_swapped_people() -> None:
-    people = np.stack([joints_of(parameters(height=1.7, x=x), 0.0) for x in (0.0, 2.0)])
-    truth = np.stack([people, people, people])
+    both = np.stack([joints_of(parameters(height=1.7, x=x), 0.0) for x in (0.0, 2.0)])
+    truth = np.stack([both, both, both])
     shifted = scored(truth + np.array([0.0, 0.03, 0.04]), truth)
     assert shifted["fit"]["mpjpe_m"] == pytest.approx(0.05, abs=1e-6)
     assert shifted["fit"]["aligned_m"] == pytest.approx(0.0, abs=1e-6)
@@ -189,6 +197,24 @@ def test_postures_are_held_against_the_height_of_the_pelvis() -> None:
     truth = np.stack([np.stack([upright, on_a_chair])] * 2)
     found = scored(truth, truth, np.array([[False, True], [True, False]]))
     assert found["posture_right"] == pytest.approx(0.5) and found["seated"] == 2
+
+
+def test_heights_are_those_of_the_people_who_were_matched() -> None:
+    """Bodies come in the order of places, people in that of the scene."""
+    bodies = [people().body(np.array([height])) for height in (-1.5, 1.0)]
+    tall, small = (
+        np.repeat(body.joints17(upright(body))[None] + [x, 0.0, 0.2], 3, axis=0)
+        for body, x in zip(bodies[::-1], (0.0, 2.0), strict=True)
+    )
+    truth, found = np.stack([small, tall], axis=1), np.stack([tall, small], axis=1)
+    result = scored(found, truth, heights_m=np.array([1.81, 1.52]))
+    assert result["heights_m"] == pytest.approx([1.52, 1.81])
+    true_m = [body.height_m for body in bodies]
+    assert result["true_heights_m"] == pytest.approx(true_m, abs=0.03)
+    assert scored(found, truth)["heights_m"] is None
+    nothing_known = scored(found, np.full_like(truth, np.nan), heights_m=np.array([1.81, 1.52]))
+    assert nothing_known["heights_m"] == [1.81, 1.52]
+    assert nothing_known["true_heights_m"] is None
 
 
 def test_unknown_joints_have_no_error() -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -312,8 +313,9 @@ def test_frames_between_those_of_the_run_are_read_too(limbed: Run) -> None:
     assert frames_read(one) == ([1, 2] if apart_s <= 0.4 else [1])
 
 
-def test_poses_come_from_the_limbs(limbed: Run) -> None:
+def test_poses_come_from_the_limbs(limbed: Run, capsys: pytest.CaptureFixture[str]) -> None:
     assert pose(PoseArgs(limbed.path)) == 0
+    assert re.search(r"(?m)^height +[\d.]+ m; by the true limbs [\d.]+ m$", capsys.readouterr().out)
     limbs = read_limbs(limbed.path)
     assert limbs is not None
     with np.load(limbed.path / "pose.npz") as stored:

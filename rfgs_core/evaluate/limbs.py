@@ -26,9 +26,9 @@ from rfgs_core.fit.frame import followed
 from rfgs_core.limbs.evidence.library import headings_of, upright
 from rfgs_core.limbs.evidence.tell import tell
 from rfgs_core.limbs.network import LimbNetwork
-from rfgs_core.limbs.postures.alone import propose_alone
 from rfgs_core.limbs.postures.tell import can_tell, looks
 from rfgs_core.limbs.postures.tell import tell as tell_posture
+from rfgs_core.limbs.postures.through import propose_alone
 from rfgs_core.limbs.propose import Joints, of_walk_and_network, smoothed
 from rfgs_core.limbs.skins import PosedPeople, shapes_of
 from rfgs_core.measure.observations import Observations, observe, packets_to_read

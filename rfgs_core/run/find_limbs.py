@@ -17,17 +17,16 @@ from rfgs_core.errors import RfgsFormatError
 from rfgs_core.fit.frame import followed
 from rfgs_core.limbs.evidence.tell import long_enough, looks, stands, tell
 from rfgs_core.limbs.evidence.track import course_of
-from rfgs_core.limbs.postures.alone import propose_alone
-from rfgs_core.limbs.postures.arms import hanging
 from rfgs_core.limbs.postures.chain import GOES_M_S
+from rfgs_core.limbs.postures.going import hanging
 from rfgs_core.limbs.postures.tell import can_tell
 from rfgs_core.limbs.postures.tell import looks as posture_looks
 from rfgs_core.limbs.postures.tell import tell as tell_posture
+from rfgs_core.limbs.postures.through import propose_alone, propose_beside
 from rfgs_core.limbs.propose import (
     SMOOTH_S,
     Joints,
     of_walk_and_network,
-    propose,
     smoothed,
 )
 from rfgs_core.limbs.skins import PosedPeople, shapes_of
@@ -232,17 +231,11 @@ def _by_network(
     """Joints of each person in all frames, on curves through them."""
     time_s = np.array([track.time_s for track in tracks])
     axes_xy = np.array([track.axes_xy for track in tracks])
-    if len(alone[0]) == 1:
-        seen = [frame[0] for frame in alone]
-        joints = propose_alone(trained.network, seen, axes_xy[:, 0], time_s)
-        return [smoothed(joints, time_s)]
+    ask = propose_alone if len(alone[0]) == 1 else propose_beside
     found = []
     for body in range(len(alone[0])):
-        said = [
-            propose(trained.network, frame[body], place[[body]])
-            for frame, place in zip(alone, axes_xy, strict=True)
-        ]
-        joints = Joints(*(np.array(values) for values in zip(*said, strict=True)))
+        seen = [frame[body] for frame in alone]
+        joints = ask(trained.network, seen, axes_xy[:, body], time_s)
         found.append(smoothed(joints, time_s))
     return found
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rfgs_core.limbs.postures.alone import propose_alone
+from rfgs_core.limbs.postures.through import propose_alone
 from rfgs_core.limbs.propose import Joints, propose
 from rfgs_core.limbs.weights import own_network
 from rfgs_core.measure.observations import Observations

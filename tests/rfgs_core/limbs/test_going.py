@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Arms of who goes somewhere hang, as far as nothing surer is said of them."""
+"""Who goes somewhere looks there, their arms hanging, as far as nothing surer is said of them."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from rfgs_core.articulated import Body
-from rfgs_core.limbs.evidence.library import Stride, about_z
-from rfgs_core.limbs.postures.arms import hanging
+from rfgs_core.limbs.evidence.library import Stride, about_z, headings_of
+from rfgs_core.limbs.postures.going import facing, hanging
+from rfgs_core.limbs.postures.through import on_likeliest_path
 from rfgs_core.limbs.propose import Joints
+from rfgs_core.limbs.tokens import MIRRORED
 from rfgs_core.skeleton import JOINTS
 
 TIME_S = np.arange(8) * 0.2
@@ -49,6 +51,70 @@ def bent(walk: np.ndarray, sigma_m: float) -> Joints:
 def off(joints: Joints, truth: np.ndarray) -> np.ndarray:
     """How far wrists are off in each frame [m]."""
     return np.linalg.norm(joints.xyz - truth, axis=-1)[:, 0, WRISTS].mean(axis=1)
+
+
+def turned(walk: np.ndarray, degrees: float, sigma_m: float) -> Joints:
+    """Everything around the middle of the body, which is said of it, this far off."""
+    middle = walk.mean(axis=2, keepdims=True)
+    xyz = (walk - middle) @ about_z(np.radians(degrees)).T + middle
+    sigma = np.full(walk.shape[:3], sigma_m)
+    sigma[:, :, 0] = sigma_m / 3.0
+    return Joints(xyz, sigma)
+
+
+def heading_off(xyz: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    """By how many degrees a heading is off in each frame."""
+    off = headings_of(xyz[:, 0]) - headings_of(truth[:, 0])
+    return np.degrees(np.abs(np.angle(np.exp(1j * off))))
+
+
+def test_an_unsure_heading_of_who_goes_comes_near_the_way(walk: np.ndarray) -> None:
+    for degrees in (-50.0, 50.0):
+        said = turned(walk, degrees, 0.14)
+        told = facing(said, TIME_S)
+        # At either end the way is half as long.
+        assert heading_off(told.xyz, walk)[1:-1].max() < 15.0
+        assert heading_off(told.xyz, walk).max() < 20.0
+        error_m = np.linalg.norm(told.xyz - walk, axis=-1).mean()
+        assert error_m < 0.4 * np.linalg.norm(said.xyz - walk, axis=-1).mean()
+        np.testing.assert_array_equal(told.sigma_m, said.sigma_m)
+        np.testing.assert_allclose(told.xyz.mean(axis=2), said.xyz.mean(axis=2), atol=1e-9)
+
+
+def test_a_sure_heading_stays(walk: np.ndarray) -> None:
+    said = turned(walk, 10.0, 0.01)
+    assert heading_off(facing(said, TIME_S).xyz, said.xyz).max() < 2.0
+
+
+def test_who_surely_goes_sideways_or_is_slow_or_alone_in_time_keeps_their_heading(
+    walk: np.ndarray,
+) -> None:
+    for said in (turned(walk, 90.0, 0.05), turned(at_speed(walk, 0.5), 40.0, 0.14)):
+        np.testing.assert_array_equal(facing(said, TIME_S).xyz, said.xyz)
+    said = turned(walk[:1], 40.0, 0.14)
+    np.testing.assert_array_equal(facing(said, TIME_S[:1]).xyz, said.xyz)
+
+
+def test_a_back_taken_for_a_front_in_single_frames_is_noticed(walk: np.ndarray) -> None:
+    sigma_m = np.random.default_rng(0).uniform(0.05, 0.1, 17)
+    for wrong in ([3], [0], [2, 5]):
+        told = []
+        for frame, joints in enumerate(walk):
+            order = MIRRORED if frame in wrong else list(range(17))
+            told.append(Joints(joints[:, order], sigma_m[None, order]))
+        found = on_likeliest_path(told, TIME_S)
+        np.testing.assert_array_equal(found.xyz, walk)
+        np.testing.assert_array_equal(found.sigma_m, np.tile(sigma_m, (8, 1, 1)))
+
+
+def test_who_stands_or_lies_keeps_what_is_said(walk: np.ndarray) -> None:
+    stays = np.repeat(walk[:1, :, MIRRORED], len(walk), axis=0)
+    hips = walk[:1, :, :1]
+    lies = np.repeat((walk[:1] - hips) @ TIPPED.T + hips, len(walk), axis=0)
+    lies[4] = lies[4][:, MIRRORED]
+    for said in (stays, lies):
+        told = [Joints(joints, np.full((1, 17), 0.1)) for joints in said]
+        np.testing.assert_array_equal(on_likeliest_path(told, TIME_S).xyz, said)
 
 
 def test_unsure_arms_of_who_goes_come_near_the_true_ones(walk: np.ndarray) -> None:

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Who goes somewhere looks there, their arms hanging, as far as the network is not surer otherwise.
+
+The network looks at single frames and does not know who goes. Beside other people it is unsure
+which way somebody faces, and bends arms to where something is left of these, of which it is surer
+than it should be.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from jaxtyping import Bool, Float64
+
+from rfgs_core.articulated import people
+from rfgs_core.limbs.evidence.library import about_z, headings_of
+from rfgs_core.limbs.evidence.library import upright as standing
+from rfgs_core.limbs.evidence.track import course_of
+from rfgs_core.limbs.propose import Joints, combined
+from rfgs_core.skeleton import JOINTS
+
+_PELVIS = JOINTS.index("pelvis")
+#: Whose hips are as fast as this, and no faster, goes somewhere [m/s]: who climbs or crawls is
+#: slower, and a place found wrongly jumps.
+_GOES_M_S, _FASTEST_M_S = 0.6, 3.0
+#: How far off the network's headings are for each metre that joints are [rad/m], in random worlds.
+_HEADING_RAD_M = 5.0
+#: How far hips and shoulders turn from the way in a gait [rad].
+_GAIT_RAD = 0.2
+#: How many of those who go do not look there.
+_ASTRAY = 0.03
+#: How far elbows and wrists of who goes are from hanging [m].
+_SWING_M = {"elbow": 0.07, "wrist": 0.12}
+#: As much farther they may be for each second before somebody goes and after that [m].
+_FARTHER_M_S = 0.1
+
+
+def facing(joints: Joints, time_s: Float64[np.ndarray, "frame"]) -> Joints:
+    """Joints of one person, turned to where they go as far as they may be off.
+
+    The way that somebody faces is normal around where they go, and around what is said of it;
+    where both are too far apart, somebody goes backwards or sideways and is left alone.
+
+    Args:
+        joints: Of all frames, shape (frame, 1, 17, ·).
+        time_s: Their times [s].
+
+    Returns:
+        The same for somebody who goes nowhere.
+    """
+    xyz, sigma_m = joints.xyz[:, 0].copy(), joints.sigma_m[:, 0]
+    course, speed_m_s, goes = _going(xyz, time_s)
+    off = np.angle(np.exp(1j * (course - headings_of(xyz))))
+    for frame in np.flatnonzero(goes):
+        said_rad = _HEADING_RAD_M * float(sigma_m[frame].mean())
+        near = time_s[max(frame - 1, 0) : frame + 2]
+        way_m = speed_m_s[frame] * (near[-1] - near[0])
+        course_rad = math.hypot(_GAIT_RAD, float(sigma_m[frame, _PELVIS]) / way_m)
+        both_rad = math.hypot(said_rad, course_rad)
+        ahead = math.exp(-0.5 * (off[frame] / both_rad) ** 2) / (math.sqrt(2 * math.pi) * both_rad)
+        if ahead < _ASTRAY / (2 * math.pi):
+            continue
+        turn = about_z(off[frame] * (said_rad / both_rad) ** 2)
+        middle = xyz[frame].mean(axis=0)
+        xyz[frame] = (xyz[frame] - middle) @ turn.T + middle
+    return Joints(xyz[:, None], joints.sigma_m)
+
+
+def hanging(joints: Joints, time_s: Float64[np.ndarray, "frame"]) -> Joints:
+    """Joints of one person, their arms hanging if they go somewhere upright and arms are unsure.
+
+    Args:
+        joints: Of all frames, shape (frame, 1, 17, ·).
+        time_s: Their times [s].
+
+    Returns:
+        The same for somebody who goes nowhere.
+    """
+    xyz = joints.xyz[:, 0]
+    _, _, goes = _going(xyz, time_s)
+    if not goes.any():
+        return joints
+    stands = upright(xyz)
+    since_s = np.abs(time_s[:, None] - time_s[goes]).min(axis=1)
+    own = people().body(np.zeros(0))
+    rest = own.joints17(standing(own))
+    turns = np.array([about_z(heading) for heading in headings_of(xyz) - headings_of(rest[None])])
+    hang, sigma_m = xyz.copy(), np.full(xyz.shape[:2], np.inf)
+    for joint, name in enumerate(JOINTS):
+        side, _, part = name.partition("_")
+        if part in _SWING_M:
+            shoulder = JOINTS.index(f"{side}_shoulder")
+            hang[:, joint] = xyz[:, shoulder] + turns @ (rest[joint] - rest[shoulder])
+            sigma_m[stands, joint] = _SWING_M[part] + _FARTHER_M_S * since_s[stands]
+    return combined(joints, Joints(hang[:, None], sigma_m[:, None]))
+
+
+def upright(xyz: Float64[np.ndarray, "pose 17 3"]) -> Bool[np.ndarray, "pose"]:
+    """Whose trunk is less than 45° from the vertical."""
+    trunk = xyz[:, JOINTS.index("thorax")] - xyz[:, _PELVIS]
+    return trunk[:, 2] > np.sqrt(0.5) * np.linalg.norm(trunk, axis=1)
+
+
+def _going(
+    xyz: Float64[np.ndarray, "frame 17 3"], time_s: Float64[np.ndarray, "frame"]
+) -> tuple[Float64[np.ndarray, "frame"], Float64[np.ndarray, "frame"], Bool[np.ndarray, "frame"]]:
+    """Which way hips go [rad], how fast [m/s], and in which frames somebody goes upright."""
+    course, speed_m_s = course_of(xyz[:, _PELVIS, :2], time_s)
+    goes = upright(xyz) & (speed_m_s >= _GOES_M_S) & (speed_m_s <= _FASTEST_M_S)
+    return course, speed_m_s, goes

@@ -24,7 +24,8 @@ _PELVIS = JOINTS.index("pelvis")
 #: Whose hips are as fast as this, and no faster, goes somewhere [m/s]: who climbs or crawls is
 #: slower, and a place found wrongly jumps.
 _GOES_M_S, _FASTEST_M_S = 0.6, 3.0
-#: How far off the network's headings are for each metre that joints are [rad/m], in random worlds.
+#: How far off the network's headings are for each metre that it expects joints to be [rad/m]: in
+#: random worlds three of single people, three and five of several.
 _HEADING_RAD_M = 5.0
 #: How far hips and shoulders turn from the way in a gait [rad].
 _GAIT_RAD = 0.2

@@ -16,8 +16,7 @@ from rfgs_core.bodies.tracks import Tracks
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.fit.frame import followed
 from rfgs_core.limbs.evidence.tell import long_enough, looks, stands, tell
-from rfgs_core.limbs.evidence.track import course_of
-from rfgs_core.limbs.postures.chain import GOES_M_S
+from rfgs_core.limbs.evidence.track import GOES_M_S, course_of
 from rfgs_core.limbs.postures.going import hanging
 from rfgs_core.limbs.postures.tell import can_tell
 from rfgs_core.limbs.postures.tell import looks as posture_looks

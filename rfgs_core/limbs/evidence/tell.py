@@ -27,7 +27,7 @@ from rfgs_core.limbs.evidence.library import (
     upright,
 )
 from rfgs_core.limbs.evidence.table import evidence_table, in_frames, stacked
-from rfgs_core.limbs.evidence.track import Way, way_of
+from rfgs_core.limbs.evidence.track import Way, looks_of, way_of
 from rfgs_core.limbs.propose import Joints
 from rfgs_core.measure.observations import Observations
 from rfgs_core.worlds.figure import Figure
@@ -148,12 +148,13 @@ def stands(
     Args:
         seen: Frames in the order of time.
         axes_xy: Where the person was found in each [m].
-        heading: Which way they face [rad]; None: the way of the places.
+        heading: Which way they face [rad]; None: the way of the places, where they go.
     """
-    way = way_of(np.asarray(axes_xy, np.float64), np.array([one.time_s for one in seen]))
+    time_s = np.array([one.time_s for one in seen])
+    way = way_of(np.asarray(axes_xy, np.float64), time_s)
     body = people().body(np.zeros(0))
     own, floor_m = body.joints17(upright(body)), float(seen[0].bounds_m[0, 2])
-    facing = way.heading if heading is None else heading
+    facing = looks_of(way, time_s) if heading is None else heading
     turned = np.array([own @ about_z(one).T for one in facing])
     spots = np.column_stack([way.xy, np.full(len(way.xy), floor_m)])
     xyz = (turned + spots[:, None])[:, None]

@@ -10,6 +10,9 @@ from jaxtyping import Float, Float64
 
 #: Frames this far apart smooth each other [s].
 _SMOOTH_S = 1.0
+#: Who is as fast as this or faster goes somewhere, and looks there [m/s]; the places found of who
+#: stays are off by some 0.1 m.
+GOES_M_S = 0.3
 
 
 class Way(NamedTuple):
@@ -38,6 +41,25 @@ def way_of(places: Float[np.ndarray, "frame 2"], time_s: Float64[np.ndarray, "fr
             velocity[frame] = _fit(since, places[near], 1)[1]
     heading = np.arctan2(velocity[:, 1], velocity[:, 0])
     return Way(xy, heading, np.linalg.norm(velocity, axis=1))
+
+
+def looks_of(way: Way, time_s: Float64[np.ndarray, "frame"]) -> Float64[np.ndarray, "frame"]:
+    """Which way somebody looks: where they go, and while they stay, as when they last or next go.
+
+    While somebody stays, the way that places go is what these are off by.
+
+    Args:
+        way: Where they are and go.
+        time_s: Times of the frames [s].
+
+    Returns:
+        Headings [rad]; of who never goes anywhere, those of the way.
+    """
+    goes = np.flatnonzero(way.speed_m_s >= GOES_M_S)
+    if not len(goes):
+        return way.heading
+    nearest = np.abs(time_s[:, None] - time_s[goes]).argmin(axis=1)
+    return way.heading[goes[nearest]]
 
 
 def course_of(

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float64, Int64
 
 from rfgs_core.limbs.evidence.library import headings_of
+from rfgs_core.limbs.evidence.track import GOES_M_S
 
 #: Evidence counts a share of this: models err more than evidence knows of.
 TEMPER = 1.0 / 15.0
@@ -20,9 +21,8 @@ TEMPER = 1.0 / 15.0
 _SPEED_M_S, _APART_M = 0.8, 0.08
 #: What it costs to move so far [nat].
 _COST = 4.0
-#: Who is as fast as this or faster looks where they go [m/s], and what it costs to go backwards at
-#: twice the speed or more [nat].
-GOES_M_S, _BACKWARDS = 0.3, 16.0
+#: What it costs to go backwards at twice `GOES_M_S` or more [nat].
+_BACKWARDS = 16.0
 #: Guesses within this of the path count as the same pose [m].
 _SAME_M = 0.2
 

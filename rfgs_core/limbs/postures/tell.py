@@ -21,9 +21,9 @@ from rfgs_core.limbs.evidence.entries import path_resolution_m
 from rfgs_core.limbs.evidence.library import headings_of
 from rfgs_core.limbs.evidence.table import in_frames
 from rfgs_core.limbs.evidence.tell import stands
-from rfgs_core.limbs.evidence.track import course_of
+from rfgs_core.limbs.evidence.track import GOES_M_S, course_of
 from rfgs_core.limbs.postures.book import PoseBook
-from rfgs_core.limbs.postures.chain import GOES_M_S, TEMPER, around, likeliest_path
+from rfgs_core.limbs.postures.chain import TEMPER, around, likeliest_path
 from rfgs_core.limbs.postures.search import LATER, FrameSearch, Guess, spread_out
 from rfgs_core.limbs.propose import Joints
 from rfgs_core.measure.observations import Observations

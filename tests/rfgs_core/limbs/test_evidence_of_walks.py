@@ -15,7 +15,7 @@ from rfgs_core.limbs.evidence import tell as telling
 from rfgs_core.limbs.evidence.follow import stood, walked
 from rfgs_core.limbs.evidence.library import PHASES, about_z, headings_of, strides, upright
 from rfgs_core.limbs.evidence.tell import best_walk, tell
-from rfgs_core.limbs.evidence.track import course_of, way_of
+from rfgs_core.limbs.evidence.track import course_of, looks_of, way_of
 from rfgs_core.skeleton import JOINTS
 
 SHIFTS = np.array([[0.0, 0.0, 0.0], [0.04, 0.0, 0.0], [-0.04, 0.0, 0.0]])
@@ -63,6 +63,23 @@ def test_a_course_is_known_where_frames_are_seconds_apart() -> None:
     np.testing.assert_allclose(heading, 0.75 * np.pi)
     np.testing.assert_allclose(speed_m_s, np.sqrt(0.5))
     assert course_of(places[:1], time_s[:1])[1].tolist() == [0.0]
+
+
+def test_who_stops_looks_as_they_went_and_who_starts_as_they_will() -> None:
+    time_s = np.arange(12) * 0.8
+    ahead = np.array([np.cos(2.0), np.sin(2.0)])
+    for goes in (slice(None, 6), slice(6, None)):
+        speed_m_s = np.zeros(12)
+        speed_m_s[goes] = 0.7
+        truth = np.cumsum(speed_m_s * 0.8)[:, None] * ahead
+        places = truth + np.random.default_rng(1).normal(0.0, 0.05, truth.shape)
+        way = way_of(places, time_s)
+        off = np.abs(np.angle(np.exp(1j * (looks_of(way, time_s) - 2.0))))
+        assert off.max() < 0.35
+        # Of who stays the places found lead anywhere.
+        assert np.abs(np.angle(np.exp(1j * (way.heading - 2.0)))).max() > 1.0
+    still = way_of(np.random.default_rng(2).normal(0.0, 0.02, (12, 2)), time_s)
+    np.testing.assert_array_equal(looks_of(still, time_s), still.heading)
 
 
 def test_strides_start_with_the_left_foot_ahead_and_face_along_x() -> None:

@@ -12,9 +12,8 @@ from jaxtyping import Float, Float64
 
 from rfgs_core.limbs.network import LimbNetwork
 from rfgs_core.limbs.postures.chain import TEMPER, likeliest_path
-from rfgs_core.limbs.postures.going import facing, upright
+from rfgs_core.limbs.postures.going import facing, fronts
 from rfgs_core.limbs.propose import SURE_M, Joints, propose
-from rfgs_core.limbs.tokens import MIRRORED
 from rfgs_core.measure.observations import Observations
 from rfgs_core.skeleton import JOINTS
 
@@ -22,8 +21,6 @@ from rfgs_core.skeleton import JOINTS
 _BESIDE_M = 0.3 * np.array([[np.cos(a), np.sin(a)] for a in np.arange(8) * np.pi / 4])
 #: Within this ratio of σ it is as sure wherever it is asked.
 _AS_SURE = 1.05
-#: What it costs to take its front for a back [nat]: so it errs in 5 of 120 frames of random worlds.
-_TURNED = 3.0
 
 
 def propose_alone(
@@ -53,7 +50,15 @@ def propose_alone(
         if one.sigma_m.mean() > SURE_M and observations.packets is None:
             one = _together(one, propose(network, observations, place + _BESIDE_M))
         told.append(one)
-    return on_likeliest_path(told, time_s)
+    # Of joints with the same σ, what is more certain is likelier.
+    score = [-len(JOINTS) / TEMPER * np.log(one.sigma_m.mean(axis=1)) for one in told]
+    path = likeliest_path(score, [one.xyz for one in told], time_s)
+    chosen = list(zip(told, path.tolist(), strict=True))
+    joints = Joints(
+        np.array([one.xyz[[row]] for one, row in chosen]),
+        np.array([one.sigma_m[[row]] for one, row in chosen]),
+    )
+    return fronts(joints, time_s)
 
 
 def propose_beside(
@@ -77,34 +82,8 @@ def propose_beside(
         propose(network, observations, place[None])
         for observations, place in zip(alone, axes_xy, strict=True)
     ]
-    return facing(on_likeliest_path(told, time_s), time_s)
-
-
-def on_likeliest_path(told: list[Joints], time_s: Float64[np.ndarray, "frame"]) -> Joints:
-    """One of several guesses of each frame, as it is or, of who is upright, its front for a back.
-
-    Args:
-        told: Guesses of each frame, shapes (guess, 17, ·).
-        time_s: Their times [s].
-
-    Returns:
-        Of all frames, shape (frame, 1, 17, ·).
-    """
-    both, score = [], []
-    for one in told:
-        # Whose left is taken for the right looks the other way and is in the same place.
-        other = Joints(one.xyz[:, MIRRORED], one.sigma_m[:, MIRRORED])
-        both.append(Joints(*(np.concatenate(way) for way in zip(one, other, strict=True))))
-        # Of joints with the same σ, what is more certain is likelier.
-        surer = -len(JOINTS) * np.log(one.sigma_m.mean(axis=1))
-        turned = np.where(upright(one.xyz), surer - _TURNED, -np.inf)
-        score.append(np.concatenate([surer, turned]) / TEMPER)
-    path = likeliest_path(score, [one.xyz for one in both], time_s)
-    chosen = list(zip(both, path.tolist(), strict=True))
-    return Joints(
-        np.array([one.xyz[[row]] for one, row in chosen]),
-        np.array([one.sigma_m[[row]] for one, row in chosen]),
-    )
+    joints = Joints(*(np.array(values) for values in zip(*told, strict=True)))
+    return facing(fronts(joints, time_s), time_s)
 
 
 def _together(found: Joints, others: Joints) -> Joints:

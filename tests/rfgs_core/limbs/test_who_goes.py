@@ -8,8 +8,7 @@ import pytest
 
 from rfgs_core.articulated import Body
 from rfgs_core.limbs.evidence.library import Stride, about_z, headings_of
-from rfgs_core.limbs.postures.going import facing, hanging
-from rfgs_core.limbs.postures.through import on_likeliest_path
+from rfgs_core.limbs.postures.going import facing, fronts, hanging
 from rfgs_core.limbs.propose import Joints
 from rfgs_core.limbs.tokens import MIRRORED
 from rfgs_core.skeleton import JOINTS
@@ -96,25 +95,27 @@ def test_who_surely_goes_sideways_or_is_slow_or_alone_in_time_keeps_their_headin
 
 
 def test_a_back_taken_for_a_front_in_single_frames_is_noticed(walk: np.ndarray) -> None:
-    sigma_m = np.random.default_rng(0).uniform(0.05, 0.1, 17)
-    for wrong in ([3], [0], [2, 5]):
-        told = []
-        for frame, joints in enumerate(walk):
-            order = MIRRORED if frame in wrong else list(range(17))
-            told.append(Joints(joints[:, order], sigma_m[None, order]))
-        found = on_likeliest_path(told, TIME_S)
+    sigma_m = np.tile(np.random.default_rng(0).uniform(0.05, 0.1, 17), (8, 1, 1))
+    for wrong in ([3], [0], [2, 5], [6, 7]):
+        said = Joints(walk.copy(), sigma_m.copy())
+        for values in said:
+            values[wrong] = values[wrong][:, :, MIRRORED]
+        found = fronts(said, TIME_S)
         np.testing.assert_array_equal(found.xyz, walk)
-        np.testing.assert_array_equal(found.sigma_m, np.tile(sigma_m, (8, 1, 1)))
+        np.testing.assert_array_equal(found.sigma_m, sigma_m)
 
 
-def test_who_stands_or_lies_keeps_what_is_said(walk: np.ndarray) -> None:
+def test_who_stands_or_lies_or_sits_down_keeps_what_is_said(walk: np.ndarray) -> None:
     stays = np.repeat(walk[:1, :, MIRRORED], len(walk), axis=0)
     hips = walk[:1, :, :1]
     lies = np.repeat((walk[:1] - hips) @ TIPPED.T + hips, len(walk), axis=0)
     lies[4] = lies[4][:, MIRRORED]
-    for said in (stays, lies):
-        told = [Joints(joints, np.full((1, 17), 0.1)) for joints in said]
-        np.testing.assert_array_equal(on_likeliest_path(told, TIME_S).xyz, said)
+    # Half a metre backwards in a second, as onto a chair, and up again.
+    backwards = 0.25 * (1.0 - np.cos(np.linspace(0.0, 2.0 * np.pi, 21)))
+    sits = np.repeat(walk[:1], 21, axis=0) - backwards[:, None, None, None] * WAY
+    for xyz, time_s in ((stays, TIME_S), (lies, TIME_S), (sits, np.arange(21) * 0.1)):
+        said = Joints(xyz, np.full(xyz.shape[:3], 0.1))
+        np.testing.assert_array_equal(fronts(said, time_s).xyz, xyz)
 
 
 def test_unsure_arms_of_who_goes_come_near_the_true_ones(walk: np.ndarray) -> None:

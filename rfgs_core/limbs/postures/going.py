@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Who goes somewhere looks there, their arms hanging, as far as the network is not surer otherwise.
 
-The network looks at single frames and does not know who goes. Beside other people it is unsure
+The network looks at single frames and does not know who goes. Now and then it takes a back for a
+front. Beside other people it is unsure
 which way somebody faces, and bends arms to where something is left of these, of which it is surer
 than it should be.
 """
@@ -36,8 +37,6 @@ _ASTRAY, _HEADED_RAD = 0.03, 0.5
 _SWING_M = {"elbow": 0.07, "wrist": 0.12}
 #: As much farther they may be for each second before somebody goes and after that [m].
 _FARTHER_M_S = 0.1
-
-
 #: What it costs to take the network's front for a back [nat]: so it errs in 5 of 120 frames of
 #: random worlds.
 _TURNED = 3.0
@@ -56,6 +55,9 @@ def fronts(joints: Joints, time_s: Float64[np.ndarray, "frame"]) -> Joints:
     Args:
         joints: Of all frames, shape (frame, 1, 17, ·).
         time_s: Their times [s].
+
+    Returns:
+        The same, turned where that is likelier. Who walks backwards all the time is turned, too.
     """
     xyz = joints.xyz[:, 0]
     both = headings_of(xyz)[:, None] + [0.0, np.pi]

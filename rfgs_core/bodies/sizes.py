@@ -37,21 +37,21 @@ _VARIANCE = 0.3
 
 
 def looks(people: int, frames: int) -> int:
-    """How often `sizes` calls `on_frame`."""
-    return frames * _rounds(people)
+    """How often `sizes` calls `on_look`."""
+    return frames * people * _rounds(people)
 
 
 def sizes(
     seen: list[Observations],
     axes_xy: Float[np.ndarray, "frame body 2"],
-    on_frame: Callable[[], Any] = lambda: None,
+    on_look: Callable[[], Any] = lambda: None,
 ) -> Float64[np.ndarray, "body 1"]:
     """Size of each person, the first coefficient of `articulated.ShapeSpace`.
 
     Args:
         seen: Frames.
         axes_xy: Where people were found in each [m].
-        on_frame: Called as frames are done; see `looks`.
+        on_look: Called as each person is done in each frame; see `looks`.
 
     Returns:
         Standard deviations from the mean adult; zero of who is about as tall, of who is hardly
@@ -59,15 +59,15 @@ def sizes(
     """
     places = np.asarray(axes_xy, dtype=np.float64)
     found = np.zeros(places.shape[1])
-    for _ in range(_rounds(len(found))):
+    frames, people = places.shape[:2]
+    for _ in range(_rounds(people)):
         known = np.round(found, 1)
-        told = np.array(
-            in_frames(
-                lambda frame, known=known: _in_frame(seen[frame], places[frame], known),
-                len(seen),
-                on_frame,
-            )
-        )
+
+        def look(one: int, known: np.ndarray = known) -> float:
+            frame, body = divmod(one, people)
+            return _in_frame(seen[frame], places[frame], known, body)
+
+        told = np.array(in_frames(look, frames * people, on_look)).reshape(frames, people)
         found = np.array([_of_frames(own) for own in told.T])
     return found[:, None]
 
@@ -89,27 +89,24 @@ def _in_frame(
     observations: Observations,
     axes_xy: Float64[np.ndarray, "body 2"],
     known: Float64[np.ndarray, "body"],
-) -> Float64[np.ndarray, "body"]:
-    """The likeliest size of each person beside the others as known; NaN of who is not upright."""
-    found = np.full(len(known), np.nan)
-    for body in range(len(known)):
-        evidence = EchoEvidence(observations, axes_xy[body])
-        if len(evidence.pairs) < FEWEST_PAIRS:
-            continue
-        one = Bodies.standing(axes_xy[[body]])
-        others = [
-            evidence.parts(Bodies.standing(axes_xy[[k]]), float(known[k]))
-            for k in range(len(known))
-            if k != body
-        ]
-        on_ground = _logs(evidence, one, others, 0.0, tuple(_SIZES.tolist()))
-        off = [
-            _logs(evidence, one, others, rise, _FEW_SIZES)
-            for rise in (_OFF_GROUND_M, -_OFF_GROUND_M)
-        ]
-        if on_ground.max() >= np.max(off):
-            found[body] = _peak(on_ground)
-    return found
+    body: int,
+) -> float:
+    """The likeliest size of one person beside the others as known; NaN if they are not upright."""
+    evidence = EchoEvidence(observations, axes_xy[body])
+    if len(evidence.pairs) < FEWEST_PAIRS:
+        return np.nan
+    standing = [Bodies.standing(place[None]) for place in axes_xy]
+    others = [
+        evidence.parts(one, float(size))
+        for k, (one, size) in enumerate(zip(standing, known, strict=True))
+        if k != body
+    ]
+    on_ground = _logs(evidence, standing[body], others, 0.0, tuple(_SIZES.tolist()))
+    off = [
+        _logs(evidence, standing[body], others, rise_m, _FEW_SIZES).max()
+        for rise_m in (_OFF_GROUND_M, -_OFF_GROUND_M)
+    ]
+    return _peak(on_ground) if on_ground.max() >= max(off) else np.nan
 
 
 def _logs(

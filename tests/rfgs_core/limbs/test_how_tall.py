@@ -72,7 +72,7 @@ def test_a_child_beside_an_adult(heard_of: Hears) -> None:
     places = np.stack([PLACES, -PLACES - 0.6], axis=1)
     done: list[int] = []
     small, tall = sizes(frames, places, lambda: done.append(1))[:, 0]
-    assert len(done) == looks(2, 2) == 4
+    assert len(done) == looks(2, 2) == 8
     assert height_m(small) < height_m(0.0) - 0.1 and tall - small > 1.0
 
 

@@ -3,8 +3,8 @@
 
 Who stands is heard up to the top of the head: a body of another size explains less of the channel,
 by ten nat a frame and more for each decimetre. Only frames in which somebody is upright on the
-ground have a say. There a body is likelier on the ground than above it, as of who is on stairs, or
-sunk into it, as of who sits.
+ground, and loud enough, have a say. There a body is likelier on the ground than above it, as of
+who is on stairs, or sunk into it, as of who sits.
 """
 
 from __future__ import annotations
@@ -26,12 +26,14 @@ from rfgs_core.measure.observations import Observations
 _SIZES, _FEW_SIZES = np.arange(-3.0, 3.5), (-2.0, 0.0, 2.0)
 #: Who is likelier this far above or below is not upright on the ground [m].
 _OFF_GROUND_M = 0.4
+#: By how much the likeliest size leads the unlikeliest at least: with less, noise decides [nat].
+_LEAST_LEAD = 20.0
 #: Times that people are sized beside the others.
 _ROUNDS = 2
 #: Share of the frames in which somebody must be upright.
 _LEAST_SHARE = 0.25
-#: Variance of a size found, against that between people: so much is it drawn to the mean. Of
-#: twenty people heights found are 0.09 m off, root mean square, and 0.066 m drawn so. Who is
+#: Variance of a size found, against that between people: so much is it drawn to the mean. Of 24
+#: people heights found are 0.09 m off, root mean square, and 0.066 m drawn so. Who is
 #: nearer to the mean than its root is taken to be of mean size.
 _VARIANCE = 0.3
 
@@ -77,7 +79,7 @@ def _rounds(people: int) -> int:
 
 
 def _of_frames(told: Float64[np.ndarray, "frame"]) -> float:
-    """The size of somebody by those of all frames, NaN where they are not upright."""
+    """The size of somebody by those of all frames, NaN where none is told."""
     upright = told[np.isfinite(told)]
     if not len(upright) or len(upright) < _LEAST_SHARE * len(told):
         return 0.0
@@ -91,7 +93,10 @@ def _in_frame(
     known: Float64[np.ndarray, "body"],
     body: int,
 ) -> float:
-    """The likeliest size of one person beside the others as known; NaN if they are not upright."""
+    """The likeliest size of one person beside the others as known; NaN if none is told.
+
+    None is of who is not upright on the ground, or hardly heard.
+    """
     evidence = EchoEvidence(observations, axes_xy[body])
     if len(evidence.pairs) < FEWEST_PAIRS:
         return np.nan
@@ -106,7 +111,8 @@ def _in_frame(
         _logs(evidence, standing[body], others, rise_m, _FEW_SIZES).max()
         for rise_m in (_OFF_GROUND_M, -_OFF_GROUND_M)
     ]
-    return _peak(on_ground) if on_ground.max() >= max(off) else np.nan
+    heard = np.ptp(on_ground) >= _LEAST_LEAD and on_ground.max() >= max(off)
+    return _peak(on_ground) if heard else np.nan
 
 
 def _logs(

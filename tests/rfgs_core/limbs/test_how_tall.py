@@ -108,6 +108,18 @@ def test_few_device_pairs_tell_no_size(heard_of: Hears) -> None:
     assert found.tolist() == [[0.0]] and len(done) == 1
 
 
+def test_noise_tells_no_size(heard_of: Hears) -> None:
+    """Of a child far below the noise nothing is said."""
+    body, rng = dressed(2, child=True), np.random.default_rng(7)
+    quiet = heard_of(body, standing(body, PLACES[0], 0.4))
+    noise = rng.standard_normal((2, *quiet.delta.shape))
+    level = np.sqrt(np.mean(np.abs(quiet.delta) ** 2))
+    for loud, told in ((0.03, True), (10.0, False)):
+        noisy = quiet.delta + loud * level * (noise[0] + 1j * noise[1]).astype(np.complex64)
+        found = sizes([quiet.with_delta(noisy)], PLACES[:1, None])
+        assert (found[0, 0] < -0.5) == told and found.any() == told
+
+
 def test_a_size_is_between_those_that_are_tried() -> None:
     tried = np.arange(-3.0, 3.5)
     assert sizing._peak(-((tried - 0.3) ** 2)) == pytest.approx(0.3)

@@ -19,6 +19,7 @@ from jaxtyping import Float, Float64
 from rfgs_core.bodies.body_prior import Bodies
 from rfgs_core.bodies.echo_evidence import EchoEvidence, Parts
 from rfgs_core.bodies.likeliest_place import FEWEST_PAIRS
+from rfgs_core.limbs.evidence.entries import path_resolution_m
 from rfgs_core.limbs.evidence.table import in_frames
 from rfgs_core.measure.observations import Observations
 
@@ -26,6 +27,10 @@ from rfgs_core.measure.observations import Observations
 _SIZES, _FEW_SIZES = np.arange(-3.0, 3.5), (-2.0, 0.0, 2.0)
 #: Who is likelier this far above or below is not upright on the ground [m].
 _OFF_GROUND_M = 0.4
+#: Coarser bands and fewer links of a device pair do not tell straight echoes from those off walls.
+#: At 40 MHz (7.5 m), or with 2 × 2 receiving elements, sizes found are farther off than the mean;
+#: with 4 × 4, a quarter of them hidden, they are nearer [m].
+_COARSEST_M, _FEWEST_LINKS = 5.0, 12
 #: By how much the likeliest size leads the unlikeliest at least: with less, noise decides [nat].
 _LEAST_LEAD = 20.0
 #: Times that people are sized beside the others.
@@ -57,7 +62,8 @@ def sizes(
 
     Returns:
         Standard deviations from the mean adult; zero of who is about as tall, of who is hardly
-        ever upright, and where fewer than `FEWEST_PAIRS` device pairs hear anything.
+        ever upright, and where fewer than `FEWEST_PAIRS` device pairs hear anything, most have
+        fewer than 12 links, or the band is narrower than 60 MHz.
     """
     places = np.asarray(axes_xy, dtype=np.float64)
     found = np.zeros(places.shape[1])
@@ -97,6 +103,8 @@ def _in_frame(
 
     None is of who is not upright on the ground, or hardly heard.
     """
+    if not _resolves(observations):
+        return np.nan
     evidence = EchoEvidence(observations, axes_xy[body])
     if len(evidence.pairs) < FEWEST_PAIRS:
         return np.nan
@@ -113,6 +121,14 @@ def _in_frame(
     ]
     heard = np.ptp(on_ground) >= _LEAST_LEAD and on_ground.max() >= max(off)
     return _peak(on_ground) if heard else np.nan
+
+
+def _resolves(observations: Observations) -> bool:
+    """Whether band and arrays tell straight echoes from those off walls."""
+    layout, links = observations.layout, observations.links
+    many = [np.sum(layout.links_between(*pair) & links) for pair in observations.pairs[1]]
+    fine = path_resolution_m(observations.freq_hz) <= _COARSEST_M
+    return fine and bool(many) and float(np.median(many)) >= _FEWEST_LINKS
 
 
 def _logs(

@@ -100,7 +100,7 @@ def heard() -> Callable[[Pose, float, np.ndarray], Observations]:
 @pytest.fixture(scope="session")
 def heard_of() -> Callable[[Body, Pose], Observations]:
     """What Wi-Fi hears of anybody in a pose."""
-    radio = replace(preset("wifi"), rx_rows=2, rx_cols=3)
+    radio = replace(preset("wifi"), rx_rows=4, rx_cols=3)
     return lambda body, pose: _heard(pose, radio, Figure.of(body, WAVELENGTH_M))
 
 

@@ -108,6 +108,17 @@ def test_few_device_pairs_tell_no_size(heard_of: Hears) -> None:
     assert found.tolist() == [[0.0]] and len(done) == 1
 
 
+def test_few_links_and_narrow_bands_tell_no_size(heard_of: Hears) -> None:
+    body = dressed(2, child=True)
+    seen = heard_of(body, standing(body, PLACES[0], 0.4))
+    rows = np.zeros_like(seen.links)
+    rows[:, ::2] = True
+    narrow = replace(seen, freq_hz=seen.freq_hz[0] + 0.25 * (seen.freq_hz - seen.freq_hz[0]))
+    for one in (replace(seen, links=seen.links & rows), narrow):
+        assert sizes([one], PLACES[:1, None]).tolist() == [[0.0]]
+    assert sizes([seen], PLACES[:1, None])[0, 0] < -0.5
+
+
 def test_noise_tells_no_size(heard_of: Hears) -> None:
     """Of a child far below the noise nothing is said."""
     body, rng = dressed(2, child=True), np.random.default_rng(7)

@@ -55,14 +55,13 @@ class ShapeSpace:
     drawn: dict[str, tuple[np.ndarray, np.ndarray]]
     """Mean [K] and triangular root of the covariance [K, K] of coefficients: adults, children."""
 
-    def body(self, coefficients: np.ndarray | None = None) -> Body:
+    def body(self, coefficients: np.ndarray) -> Body:
         """The naked body of some coefficients.
 
         Args:
-            coefficients: How far from the mean adult [standard deviations], shape [K] or fewer;
-                None: not at all. The first is how tall and big somebody is, 0.164 m each.
+            coefficients: How far from the mean adult [standard deviations], shape [K] or fewer.
         """
-        points = self._points(np.zeros(0) if coefficients is None else coefficients)
+        points = self._points(coefficients)
         count = len(points) - len(BONES)
         return self._standing(points[:count], points[count:])
 

@@ -35,17 +35,9 @@ class ExpectedEchoes(NamedTuple):
     ways: list[Posed]
 
     @staticmethod
-    def at(one: Bodies, floor_m: float, pairs: list[Pair], size: float = 0.0) -> ExpectedEchoes:
-        """A single body as some pairs see it; who sits is taken to stand.
-
-        Args:
-            one: The body.
-            floor_m: Height of the ground [m].
-            pairs: The pairs.
-            size: How far it is from the mean adult in size [standard deviations]; see
-                `articulated.ShapeSpace`.
-        """
-        figure = _figure(size)
+    def at(one: Bodies, floor_m: float, pairs: list[Pair]) -> ExpectedEchoes:
+        """A single body as some pairs see it; who sits is taken to stand."""
+        figure = _figure()
         pose = upright(figure.body)
         if one.lies[0]:
             way_rad = float(one.ways[0, 0])
@@ -85,7 +77,7 @@ def _about_hips(figure: Figure, pose: Pose) -> Pose:
     return pose.moved(-figure.body.joints17(pose)[0]).turned(_ON_BACK)
 
 
-@functools.lru_cache(maxsize=32)
-def _figure(size: float) -> Figure:
-    """A body of some size and the mean shape otherwise."""
-    return figure_of(people().body(np.array([size])))
+@functools.cache
+def _figure() -> Figure:
+    """The mean body."""
+    return figure_of(people().body(np.zeros(0)))

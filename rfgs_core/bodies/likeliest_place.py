@@ -10,15 +10,18 @@ pair (see `limbs.evidence.levels`).
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
-from jaxtyping import Float, Float64
+from jaxtyping import Complex64, Float, Float64
 
 from rfgs_core.bodies.body_prior import Bodies
-from rfgs_core.bodies.echo_evidence import EchoEvidence
+from rfgs_core.bodies.expected_echoes import ExpectedEchoes, middle_of
 from rfgs_core.bodies.gain import FEWEST_PAIRS as FEWEST_TO_CHOOSE
 from rfgs_core.bodies.gain import stands_clear
 from rfgs_core.bodies.localise import BODY_RADIUS_M, NEAR_M, SEPARATION_M, PairMaps, highest_peaks
+from rfgs_core.limbs.evidence.entries import pairs_of
+from rfgs_core.limbs.evidence.levels import Levels
 from rfgs_core.measure.observations import Observations
 
 #: Of fewer device pairs that hear anything, whether somebody sits moves the place: all are taken
@@ -125,15 +128,23 @@ def _climbed(
     return here, likely
 
 
+#: Of each device pair the covariances of a body's straight echoes, and of those off one wall.
+_Parts: TypeAlias = list[
+    tuple[Complex64[np.ndarray, "entry entry"], Complex64[np.ndarray, "entry entry"]]
+]
+
+
 class _PlaceEvidence:
     """How likely a frame is with somebody at a place beside others; what was tried is kept."""
 
     def __init__(
         self, observations: Observations, near: Float64[np.ndarray, "2"], others: list[Bodies]
     ) -> None:
-        self._echoes = EchoEvidence(observations, near)
-        self.pairs = self._echoes.pairs
-        self._others = [self._echoes.parts(one) for one in others]
+        self._bounds_m = observations.bounds_m
+        self._floor_m = float(observations.bounds_m[0, 2])
+        pairs = pairs_of(observations, middle_of(Bodies.standing(near[None]), self._floor_m))
+        self.pairs = [pair for pair in pairs if pair.change.any()]
+        self._others = [self._parts(one) for one in others]
         self._known: dict[tuple[int, int], float] = {}
 
     def at(self, place: Float64[np.ndarray, "2"]) -> float:
@@ -146,4 +157,15 @@ class _PlaceEvidence:
 
     def of(self, one: Bodies) -> float:
         """The same for a body that may lie."""
-        return self._echoes.log([self._echoes.parts(one), *self._others])
+        bodies = [self._parts(one), *self._others]
+        return sum(
+            Levels.fitted(
+                pair.change, [part for body in bodies for part in body[row]]
+            ).log_likelihood
+            for row, pair in enumerate(self.pairs)
+        )
+
+    def _parts(self, one: Bodies) -> _Parts:
+        """Covariances of each pair: of straight echoes, and of those by way of one wall."""
+        body = ExpectedEchoes.at(one, self._floor_m, self.pairs)
+        return [(body.echoes(pair), body.by_bounces(pair, self._bounds_m)) for pair in self.pairs]

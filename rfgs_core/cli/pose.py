@@ -86,7 +86,7 @@ def _each(people_m: list[float]) -> str:
 
 
 def _height(told_m: list[float] | None, true_m: list[float] | None) -> str:
-    """A line of how tall people are [m], where it is told."""
+    """A line of how tall people are [m], where the network told."""
     if told_m is None:
         return ""
     told, true = (", ".join(f"{one:.2f}" for one in each or []) for each in (told_m, true_m))

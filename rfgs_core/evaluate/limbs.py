@@ -16,8 +16,6 @@ from jaxtyping import Float, Float64
 from tqdm import tqdm
 
 from rfgs_core.articulated import fit_pose, people
-from rfgs_core.bodies.sizes import looks as size_looks
-from rfgs_core.bodies.sizes import sizes
 from rfgs_core.bodies.tracks import Tracks
 from rfgs_core.dataset import Sequence
 from rfgs_core.dataset.observed import Observed
@@ -138,7 +136,9 @@ def limb_table(
     # Frames from the other half of the sequence.
     other = [(k + len(frames) // 2) % len(frames) for k in range(len(frames))]
     told = {} if network is None else _by_network(network, person, other)
-    told |= _by_evidence(person, other, _SEED, sized=network is None)
+    told |= _by_evidence(person, other, _SEED)
+    if _EVIDENCE not in told and can_tell(person.seen[0]):
+        told |= _by_postures(person, other, _SEED)
     if _SMOOTH in told and _EVIDENCE in told:
         both = of_walk_and_network(told[_EVIDENCE], told[_SMOOTH])
         shapes = shapes_of(told[_SMOOTH])
@@ -174,32 +174,27 @@ def _by_network(network: LimbNetwork, person: Person, other: list[int]) -> dict[
     }
 
 
-def _by_evidence(person: Person, other: list[int], seed: int, *, sized: bool) -> dict[str, Joints]:
-    """Joints by evidence, and by that of other frames' radio, where they are told.
+def _by_evidence(person: Person, other: list[int], seed: int) -> dict[str, Joints]:
+    """Joints by evidence, and by that of other frames' radio, where they are told."""
+    swapped = _swapped(person, other)
+    rows = {_EVIDENCE: person.seen, "evidence, radio of another frame": swapped}
+    told = {name: tell(seen, person.axes_xy, seed) for name, seen in rows.items()}
+    return {name: one.joints for name, one in told.items() if one is not None}
 
-    Of a walk, or else of any pose; of bodies of the size that is told, if it is asked for.
-    """
-    tried = (person.seen, _swapped(person, other))
-    shapes = [_shape(person, seen) if sized else np.zeros(1) for seen in tried]
-    both = list(zip(tried, shapes, strict=True))
-    names = (_EVIDENCE, "evidence, radio of another frame")
-    walks = [tell(seen, person.axes_xy, seed, shape=shape) for seen, shape in both]
-    found = {name: one.joints for name, one in zip(names, walks, strict=True) if one is not None}
-    if _EVIDENCE in found or not can_tell(person.seen[0]):
-        return found
-    names = ("evidence of any pose", "evidence of any pose, radio of another frame")
-    with tqdm(total=len(names) * looks(len(person.seen)), desc="seeking postures") as bar:
-        for name, (seen, shape) in zip(names, both, strict=True):
-            told = tell_posture(seen, person.axes_xy, seed, bar.update, shape)
+
+def _by_postures(person: Person, other: list[int], seed: int) -> dict[str, Joints]:
+    """The same by evidence of any pose."""
+    rows = {
+        "evidence of any pose": person.seen,
+        "evidence of any pose, radio of another frame": _swapped(person, other),
+    }
+    found = {}
+    with tqdm(total=len(rows) * looks(len(person.seen)), desc="seeking postures") as bar:
+        for name, seen in rows.items():
+            told = tell_posture(seen, person.axes_xy, seed, bar.update)
             if told is not None:
-                found[name] = _on_bodies(told.joints, shape[None])
+                found[name] = _on_bodies(told.joints)
     return found
-
-
-def _shape(person: Person, seen: list[Observations]) -> Float64[np.ndarray, "1"]:
-    """Shape of the person by how tall the evidence has them."""
-    with tqdm(total=size_looks(1, len(seen)), desc="how tall") as bar:
-        return sizes(seen, person.axes_xy[:, None], bar.update)[0]
 
 
 def _swapped(person: Person, other: list[int]) -> list[Observations]:

@@ -52,11 +52,6 @@ class Joints(NamedTuple):
     sigma_m: Float64[np.ndarray, "*frame body 17"]
     """How far each is expected to be off [m]."""
 
-    @staticmethod
-    def side_by_side(people: list[Joints]) -> Joints:
-        """Those of several people, each of shape (frame, 1, 17, ·), as of them all."""
-        return Joints(*(np.concatenate(values, axis=1) for values in zip(*people, strict=True)))
-
 
 def propose(
     network: LimbNetwork, observations: Observations, axes_xy: Float[np.ndarray, "body 2"]

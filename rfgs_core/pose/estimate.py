@@ -57,9 +57,9 @@ class PoseEstimate:
     """Joints of the baseline: a standing body of average height at the same centroid, which
     looks where the track leads [m]."""
     sigma_m: Float64[np.ndarray, "frame body 17"] | None = None
-    """How far each joint is expected to be off [m]; None where limbs were not told."""
+    """How far each joint is expected to be off [m]; None where the network did not tell limbs."""
     heights_m: Float64[np.ndarray, "body"] | None = None
-    """How tall everybody is, 1.71 m of whom it is not told; None where it is of nobody [m]."""
+    """How tall everybody is, by the limbs that the network told; None where it did not [m]."""
 
 
 def estimate_poses(run: Run, on_step: Callable[[], Any] = lambda: None) -> PoseEstimate:
@@ -133,7 +133,7 @@ def _told(
             baseline[k, body] = joints_of(standing(clouds[k][body], way), floor_m)
     seated = np.array([[is_low(person, floor_m) for person in frame] for frame in joints])
     shapes, sigma_m, heights_m = limbs.people.coefficients, limbs.joints.sigma_m, None
-    # Nobody differs from the mean, or nobody knows.
+    # Evidence knows one shape, the mean.
     if shapes.any():
         heights_m = np.array([people().body(shape).height_m for shape in shapes])
     return PoseEstimate(

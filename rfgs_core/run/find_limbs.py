@@ -11,22 +11,26 @@ import numpy as np
 from jaxtyping import Float64
 
 from rfgs_core.bodies.localise import pair_maps
-from rfgs_core.bodies.separation import each_alone
-from rfgs_core.bodies.sizes import looks as size_looks
-from rfgs_core.bodies.sizes import sizes
+from rfgs_core.bodies.separation import GAUSSIANS_PER_BODY, each_alone, each_alone_posed
 from rfgs_core.bodies.tracks import Tracks
 from rfgs_core.errors import RfgsFormatError
 from rfgs_core.fit.frame import followed
 from rfgs_core.limbs.evidence.tell import long_enough, looks, stands, tell
 from rfgs_core.limbs.evidence.track import GOES_M_S, course_of
+from rfgs_core.limbs.postures.going import hanging
 from rfgs_core.limbs.postures.tell import can_tell
 from rfgs_core.limbs.postures.tell import looks as posture_looks
 from rfgs_core.limbs.postures.tell import tell as tell_posture
-from rfgs_core.limbs.propose import SMOOTH_S, Joints, of_walk_and_network
+from rfgs_core.limbs.postures.through import propose_alone, propose_beside
+from rfgs_core.limbs.propose import (
+    SMOOTH_S,
+    Joints,
+    of_walk_and_network,
+    smoothed,
+)
 from rfgs_core.limbs.skins import PosedPeople, shapes_of
 from rfgs_core.limbs.weights import Trained, own_network
 from rfgs_core.measure.observations import Observations
-from rfgs_core.run.ask_network import ROUNDS, asked_anew, by_network
 from rfgs_core.run.folder import LIMBS_FILE, Run
 from rfgs_core.run.limbs import REMEDY, Limbs, read_limbs, store_limbs
 from rfgs_core.run.people import known_people
@@ -39,6 +43,8 @@ _LOG = logging.getLogger(__name__)
 #: who walks, those of the prior of who lies some 0.4 m. But not those that are so many times
 #: further from a standing body than they are expected to be off: it is further off.
 _UNSURE_M, _UNSURE_LYING_M, _FAR = 0.15, 0.3, 1.2
+#: How often the network is asked anew without the echoes of the others as these are posed by then.
+_ROUNDS = 2
 
 
 def limbs_wanted(run: Run, config: TrainConfig) -> bool:
@@ -94,26 +100,24 @@ def find_limbs(
     only_people = len(alone[0]) == known_people(run)
     walks = only_people and evidence_tells(run, frames)
     told: list[Joints | None] = [None] * len(alone[0])
-    shapes = np.zeros((len(told), 1))
-    if walks and trained is None:
-        shapes = sizes(seen, np.array([track.axes_xy for track in tracks]), on_frame)
     if walks:
-        told = _by_evidence(alone, tracks, shapes, config.seed, on_frame)
-        told = _by_postures(told, alone, tracks, shapes, config.seed, seeking)
+        told = _by_evidence(alone, tracks, config.seed, on_frame)
+        told = _by_postures(told, alone, tracks, config.seed, seeking)
+    shapes = None
     if trained is not None:
-        said = by_network(trained, alone, tracks)
+        said = _by_network(trained, alone, tracks)
         if only_people and len(said) > 1:
-            said = asked_anew(trained, seen, said, tracks, config, on_frame)
-        shapes = shapes_of(Joints.side_by_side(said))
+            said = _asked_anew(trained, seen, said, tracks, config, on_frame)
+        shapes = shapes_of(_side_by_side(said))
         told = [
             other if one is None else of_walk_and_network(one, other)
             for one, other in zip(told, said, strict=True)
         ]
     if walks and not any(told):
-        told = _upright(alone, tracks, shapes)
+        told = _upright(alone, tracks)
     if not any(told):
         return None
-    joints = _together(told, alone, tracks, shapes)
+    joints = _together(told, alone, tracks)
     own = [frames.index(frame) for frame in run.frames]
     joints = Joints(joints.xyz[own], joints.sigma_m[own])
     alone, tracks = [alone[k] for k in own], [tracks[k] for k in own]
@@ -156,9 +160,7 @@ def looks_at(run: Run, trained: Trained | None) -> int:
     """How often `find_limbs` calls `on_frame`, if somebody walks wherever evidence may tell."""
     frames, people = frames_read(run), known_people(run)
     by_evidence = people * looks(len(frames)) if evidence_tells(run, frames) else 0
-    if by_evidence and trained is None:
-        by_evidence += size_looks(people, len(frames))
-    rounds = ROUNDS if trained is not None and people > 1 else 0
+    rounds = _ROUNDS if trained is not None and people > 1 else 0
     return (1 + rounds) * len(frames) + by_evidence
 
 
@@ -175,17 +177,13 @@ def _alone(
 
 
 def _by_evidence(
-    alone: list[list[Observations]],
-    tracks: list[Tracks],
-    shapes: Float64[np.ndarray, "body K"],
-    seed: int,
-    on_frame: Callable[[], Any],
+    alone: list[list[Observations]], tracks: list[Tracks], seed: int, on_frame: Callable[[], Any]
 ) -> list[Joints | None]:
     """Joints of each person in all frames; None of somebody of whom evidence tells nothing."""
     axes_xy = np.array([track.axes_xy for track in tracks])
     found = []
-    for body, shape in enumerate(shapes):
-        told = tell([frame[body] for frame in alone], axes_xy[:, body], seed, on_frame, shape)
+    for body in range(axes_xy.shape[1]):
+        told = tell([frame[body] for frame in alone], axes_xy[:, body], seed, on_frame)
         found.append(None if told is None else told.joints)
     return found
 
@@ -194,7 +192,6 @@ def _by_postures(
     told: list[Joints | None],
     alone: list[list[Observations]],
     tracks: list[Tracks],
-    shapes: Float64[np.ndarray, "body K"],
     seed: int,
     seeking: Callable[[int], Callable[[], Any]],
 ) -> list[Joints | None]:
@@ -207,41 +204,92 @@ def _by_postures(
         return told
     on_frame = seeking(posture_looks(len(alone)))
     axes_xy = np.array([track.axes_xy[0] for track in tracks])
-    one = tell_posture([frame[0] for frame in alone], axes_xy, seed, on_frame, shapes[0])
+    one = tell_posture([frame[0] for frame in alone], axes_xy, seed, on_frame)
     return [None if one is None else one.joints]
 
 
-def _upright(
-    alone: list[list[Observations]], tracks: list[Tracks], shapes: Float64[np.ndarray, "body K"]
-) -> list[Joints | None]:
+def _upright(alone: list[list[Observations]], tracks: list[Tracks]) -> list[Joints | None]:
     """Bodies that stand, facing the way they go, where nobody stays; else nothing is known.
 
     Who goes neither sits nor lies, and a body that stands is nearer to them than the prior.
     """
     time_s = np.array([track.time_s for track in tracks])
     upright: list[Joints | None] = []
-    for body, shape in enumerate(shapes):
+    for body in range(len(alone[0])):
         axes_xy = np.array([track.axes_xy[body] for track in tracks])
         heading, speed_m_s = course_of(axes_xy, time_s)
         if speed_m_s.min() < GOES_M_S:
             return [None] * len(alone[0])
-        upright.append(stands([frame[body] for frame in alone], axes_xy, heading, shape))
+        upright.append(stands([frame[body] for frame in alone], axes_xy, heading))
     return upright
 
 
-def _together(
-    told: list[Joints | None],
-    alone: list[list[Observations]],
+def _by_network(
+    trained: Trained, alone: list[list[Observations]], tracks: list[Tracks]
+) -> list[Joints]:
+    """Joints of each person in all frames, on curves through them."""
+    time_s = np.array([track.time_s for track in tracks])
+    axes_xy = np.array([track.axes_xy for track in tracks])
+    ask = propose_alone if len(alone[0]) == 1 else propose_beside
+    found = []
+    for body in range(len(alone[0])):
+        seen = [frame[body] for frame in alone]
+        joints = ask(trained.network, seen, axes_xy[:, body], time_s)
+        found.append(smoothed(joints, time_s))
+    return found
+
+
+def _asked_anew(
+    trained: Trained,
+    seen: list[Observations],
+    said: list[Joints],
     tracks: list[Tracks],
-    shapes: Float64[np.ndarray, "body K"],
+    config: TrainConfig,
+    on_frame: Callable[[], Any],
+) -> list[Joints]:
+    """What the network says without the echoes of the others, posed as it has said by then."""
+    said = _with_arms(said, tracks)
+    for _ in range(_ROUNDS):
+        alone = _without_others(seen, _side_by_side(said), config, on_frame)
+        said = _with_arms(_by_network(trained, alone, tracks), tracks)
+    return said
+
+
+def _with_arms(said: list[Joints], tracks: list[Tracks]) -> list[Joints]:
+    """The same, arms hanging of who goes somewhere."""
+    time_s = np.array([track.time_s for track in tracks])
+    return [hanging(joints, time_s) for joints in said]
+
+
+def _without_others(
+    seen: list[Observations], joints: Joints, config: TrainConfig, on_frame: Callable[[], Any]
+) -> list[list[Observations]]:
+    """Each frame once for each person, without the echoes of the others in their poses."""
+    count, alone = joints.xyz.shape[1], []
+    posed = PosedPeople.through(joints, shapes_of(joints))
+    for frame, observations in enumerate(seen):
+        skin = posed.gaussians(frame, GAUSSIANS_PER_BODY * count, config.seed)
+        alone.append(
+            each_alone_posed(observations, skin.points, skin.normals, skin.body, count, config)
+        )
+        on_frame()
+    return alone
+
+
+def _together(
+    told: list[Joints | None], alone: list[list[Observations]], tracks: list[Tracks]
 ) -> Joints:
     """Everybody's joints, standing where nothing is known of somebody."""
     whole = []
     for body, joints in enumerate(told):
         axes_xy = np.array([track.axes_xy[body] for track in tracks])
-        seen = [frame[body] for frame in alone]
-        whole.append(joints or stands(seen, axes_xy, shape=shapes[body]))
-    return Joints.side_by_side(whole)
+        whole.append(joints or stands([frame[body] for frame in alone], axes_xy))
+    return _side_by_side(whole)
+
+
+def _side_by_side(people: list[Joints]) -> Joints:
+    """Joints of several people, each of shape (frame, 1, 17, ·), as one of them all."""
+    return Joints(*(np.concatenate(values, axis=1) for values in zip(*people, strict=True)))
 
 
 def _of_use(joints: Joints, alone: list[list[Observations]], tracks: list[Tracks]) -> bool:
@@ -251,8 +299,7 @@ def _of_use(joints: Joints, alone: list[list[Observations]], tracks: list[Tracks
         return True
     if any(track.bodies.lies.any() for track in tracks):
         return False
-    bodies = joints.xyz.shape[1]
-    standing = _together([None] * bodies, alone, tracks, np.zeros((bodies, 1)))
+    standing = _together([None] * joints.xyz.shape[1], alone, tracks)
     apart_m = np.linalg.norm(joints.xyz - standing.xyz, axis=-1).mean()
     return float(apart_m) > _FAR * expected_m
 

@@ -123,7 +123,6 @@ def tell(
     axes_xy: Float[np.ndarray, "frame 2"],
     seed: int = 0,
     on_frame: Callable[[], Any] = lambda: None,
-    shape: Float64[np.ndarray, "K"] | None = None,
 ) -> Told | None:
     """Joints of one person; None where nobody walks or it cannot be told.
 
@@ -132,9 +131,8 @@ def tell(
         axes_xy: Where the person was found in each [m].
         seed: Seed of the strides.
         on_frame: Called as frames are done.
-        shape: Of the body, see `articulated.ShapeSpace`; None: of the mean adult.
     """
-    found = best_walk(seen, axes_xy, seed, on_frame, shape)
+    found = best_walk(seen, axes_xy, seed, on_frame)
     if found is None or found.lead <= 0.0 or found.agree < _AGREE:
         return None
     return found
@@ -144,7 +142,6 @@ def stands(
     seen: list[Observations],
     axes_xy: Float[np.ndarray, "frame 2"],
     heading: Float64[np.ndarray, "frame"] | None = None,
-    shape: Float64[np.ndarray, "K"] | None = None,
 ) -> Joints:
     """Joints of somebody of whom no walk is told: a body that stands.
 
@@ -152,11 +149,10 @@ def stands(
         seen: Frames in the order of time.
         axes_xy: Where the person was found in each [m].
         heading: Which way they face [rad]; None: the way of the places, where they go.
-        shape: Of the body; None: of the mean adult.
     """
     time_s = np.array([one.time_s for one in seen])
     way = way_of(np.asarray(axes_xy, np.float64), time_s)
-    body = people().body(shape)
+    body = people().body(np.zeros(0))
     own, floor_m = body.joints17(upright(body)), float(seen[0].bounds_m[0, 2])
     facing = looks_of(way, time_s) if heading is None else heading
     turned = np.array([own @ about_z(one).T for one in facing])
@@ -170,7 +166,6 @@ def best_walk(
     axes_xy: Float[np.ndarray, "frame 2"],
     seed: int = 0,
     on_frame: Callable[[], Any] = lambda: None,
-    shape: Float64[np.ndarray, "K"] | None = None,
 ) -> Told | None:
     """The likeliest walk, whether or not it stands out; None where nobody walks."""
     time_s = np.array([one.time_s for one in seen])
@@ -179,7 +174,7 @@ def best_walk(
     way = way_of(np.asarray(axes_xy, np.float64), time_s)
     if not np.quantile(way.speed_m_s, _SLOW_SHARE) > SLOWEST_M_S:
         return None
-    case = _Case(seen, figure_of(people().body(shape)), way)
+    case = _Case(seen, figure_of(people().body(np.zeros(0))), way)
     found = strides(case.body, float(np.median(way.speed_m_s)), STRIDES, seed)
     if not found:
         return None

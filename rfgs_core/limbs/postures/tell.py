@@ -76,7 +76,6 @@ def tell(
     axes_xy: Float[np.ndarray, "frame 2"],
     seed: int = 0,
     on_frame: Callable[[], Any] = lambda: None,
-    shape: Float64[np.ndarray, "K"] | None = None,
 ) -> Told | None:
     """The likeliest poses of one person; None where they do not stand out from standing.
 
@@ -88,9 +87,8 @@ def tell(
         axes_xy: Where the person was found in each [m].
         seed: Seed of the guesses.
         on_frame: Called as frames are done, twice each.
-        shape: Of the body, see `articulated.ShapeSpace`; None: of the mean adult.
     """
-    body = people().body(shape)
+    body = people().body(np.zeros(0))
     figure, book = figure_of(body, _WAVELENGTH_M), PoseBook.of(body, seed)
     searches = [
         FrameSearch(one, np.asarray(xy, np.float64), figure, book, _rng(seed, frame))
@@ -125,7 +123,7 @@ def tell(
         return None
     if lead > POSED_LEAD:
         return Told(told, lead)
-    upright = stands(seen, axes_xy, _facing(told.xyz[:, 0], seen, axes_xy), shape)
+    upright = stands(seen, axes_xy, _facing(told.xyz[:, 0], seen, axes_xy))
     floor_m = float(seen[0].bounds_m[0, 2])
     low = told.xyz[:, 0, 0, 2] - floor_m < _UPRIGHT * (upright.xyz[:, 0, 0, 2] - floor_m)
     return None if low.any() else Told(upright, lead)

@@ -98,13 +98,6 @@ def heard() -> Callable[[Pose, float, np.ndarray], Observations]:
 
 
 @pytest.fixture(scope="session")
-def heard_of() -> Callable[[Body, Pose], Observations]:
-    """What Wi-Fi hears of anybody in a pose."""
-    radio = replace(preset("wifi"), rx_rows=4, rx_cols=3)
-    return lambda body, pose: _heard(pose, radio, Figure.of(body, WAVELENGTH_M))
-
-
-@pytest.fixture(scope="session")
 def heard_by_radars() -> tuple[Observations, np.ndarray]:
     """What mmWave radars hear of the walker at some moment of a step, and where joints are [m]."""
     # So few subcarriers tell delays apart up to 20 ns, more than the room is long.

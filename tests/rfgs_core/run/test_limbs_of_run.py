@@ -28,7 +28,6 @@ from rfgs_core.limbs.network import LimbNetwork
 from rfgs_core.limbs.postures.tell import Told as Posture
 from rfgs_core.limbs.propose import Joints
 from rfgs_core.limbs.weights import save_network
-from rfgs_core.pose import estimate_poses
 from rfgs_core.radio.presets import preset
 from rfgs_core.run import Run
 from rfgs_core.run import find_limbs as limbs_of_run
@@ -162,7 +161,7 @@ def test_without_a_network_evidence_tells_who_walks(
 ) -> None:
     asked: list[int] = []
 
-    def tell(seen: list, axes_xy: np.ndarray, *_: object) -> Told | None:
+    def tell(seen: list, axes_xy: np.ndarray, seed: int, on_frame: Callable) -> Told | None:
         asked.append(len(seen))
         body = people().body(np.zeros(0))
         upright = body.joints17(Pose(body.heads[0], body.neutral))
@@ -194,7 +193,9 @@ def test_who_does_not_walk_may_do_something_else(
     body, asked = people().body(np.zeros(0)), 0
     upright = body.joints17(Pose(body.heads[0], body.neutral))
 
-    def tell_posture(seen: list, axes_xy: np.ndarray, *_: object) -> Posture | None:
+    def tell_posture(
+        seen: list, axes_xy: np.ndarray, seed: int, on_frame: Callable
+    ) -> Posture | None:
         nonlocal asked
         asked += 1
         xyz = upright + np.column_stack([axes_xy, np.full(len(axes_xy), -0.4)])[:, None, None]
@@ -291,7 +292,6 @@ def test_of_whom_nothing_is_told_stands_facing_the_way_if_everybody_goes(
     limbs = read_limbs(train(tiny_dataset, tmp_path / "run", CONFIG).path)
     assert (limbs is not None) == (speed_m_s > 0.5)
     if limbs is not None:
-        assert not limbs.people.coefficients.any()
         np.testing.assert_allclose(np.cos(headings_of(limbs.joints.xyz[:, 0]) - 2.0), 1.0)
         found = np.array([track.axes_xy[0] for track in limbs.tracks])
         assert np.linalg.norm(limbs.joints.xyz[:, 0, 0, :2] - found, axis=1).max() < 0.1
@@ -329,37 +329,3 @@ def test_a_damaged_file_is_named(limbed: Run) -> None:
     (limbed.path / LIMBS_FILE).write_bytes(b"PK\x03\x04 nothing")
     with pytest.raises(RfgsFormatError, match=rf"{LIMBS_FILE}.*run the same `rfgs train` again"):
         read_limbs(limbed.path)
-
-
-def test_who_is_small_is_sought_and_posed_small(
-    train, tiny_dataset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Without a network evidence tells how tall people are."""
-    small, asked = np.array([[-1.5]]), []
-
-    def nothing(_seen: list, _axes_xy: np.ndarray, _seed: int, _on: Callable, shape) -> None:
-        asked.append(shape)
-
-    def goes(places: np.ndarray, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return np.zeros(len(places)), np.ones(len(places))
-
-    monkeypatch.setattr(weights, "OWN", tmp_path / "none")
-    monkeypatch.setattr(limbs_of_run, "long_enough", lambda time_s: True)
-    monkeypatch.setattr(limbs_of_run, "sizes", lambda seen, axes_xy, on_frame: small)
-    monkeypatch.setattr(limbs_of_run, "tell", nothing)
-    monkeypatch.setattr(limbs_of_run, "can_tell", lambda _: True)
-    monkeypatch.setattr(limbs_of_run, "tell_posture", nothing)
-    monkeypatch.setattr(limbs_of_run, "course_of", goes)
-    run = train(tiny_dataset, tmp_path / "run", CONFIG)
-    assert [one.tolist() for one in asked] == small.tolist() * 2
-    limbs = read_limbs(run.path)
-    assert limbs is not None and limbs.people.coefficients.tolist() == small.tolist()
-    body = people().body(small[0])
-    assert body.height_m < 1.5
-    top = limbs.people.joints17()[..., 2].max()
-    assert top == pytest.approx(
-        body.joints17(Pose(body.heads[0], body.neutral))[:, 2].max(), abs=0.02
-    )
-    estimate = estimate_poses(run)
-    assert estimate.heights_m is not None
-    np.testing.assert_allclose(estimate.heights_m, body.height_m)

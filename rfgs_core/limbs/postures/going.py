@@ -2,9 +2,8 @@
 """Who goes somewhere looks there, their arms hanging, as far as the network is not surer otherwise.
 
 The network looks at single frames and does not know who goes. Now and then it takes a back for a
-front. Beside other people it is unsure
-which way somebody faces, and bends arms to where something is left of these, of which it is surer
-than it should be.
+front. Beside other people it is unsure which way somebody faces, and bends arms to where something
+is left of these, of which it is surer than it should be.
 """
 
 from __future__ import annotations

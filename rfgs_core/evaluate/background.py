@@ -20,12 +20,12 @@ from rfgs_core.dataset.sequence import Sequence
 from rfgs_core.evaluate.baselines.gaussian_process import krige, krige_level
 from rfgs_core.evaluate.baselines.interpolation import completed, fill
 from rfgs_core.evaluate.baselines.plain import inverse_distance, linear
-from rfgs_core.evaluate.baselines.spectrum import spectral
 from rfgs_core.evaluate.evidence import Evidence
 from rfgs_core.evaluate.geometry import reference_points
 from rfgs_core.evaluate.rf import RF_KEYS, frame_rf, pool_rf, snr_db
 from rfgs_core.evaluate.scene import Scene
 from rfgs_core.measure.direct_path import direct_background
+from rfgs_core.measure.spectrum import spectral
 from rfgs_core.radio.levels import power_of
 from rfgs_core.run.calibration import read_calibration
 from rfgs_core.run.static import has_static_set, read_static_set

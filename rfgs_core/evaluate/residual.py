@@ -22,9 +22,9 @@ from jaxtyping import Bool, Complex, Complex64, Float64
 from scipy.optimize import nnls
 
 from rfgs_core.evaluate.baselines.interpolation import completed, fill
-from rfgs_core.evaluate.baselines.spectrum import spectral
 from rfgs_core.evaluate.evidence import Evidence
 from rfgs_core.measure.observations import Kept
+from rfgs_core.measure.spectrum import spectral
 
 #: Row of the prediction of the Gaussians by themselves.
 GAUSSIANS_ALONE = "gaussians_alone"

@@ -8,17 +8,12 @@ determines, so only the level of the nearest visible pair's channel is adapted.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
-from jaxtyping import Complex, Int
+from jaxtyping import Complex
 
 from rfgs_core.evaluate.evidence import BaselineResult, Evidence
+from rfgs_core.measure.completion import Interpolator, fill_columns, fill_subcarriers
 from rfgs_core.radio.levels import decibels, power_of
-
-#: Values at `wanted` coordinates from values at `known` ones: (values [known, sample], known
-#: [known, dim], wanted [wanted, dim]) to [wanted, sample].
-Interpolator = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
 WHY_NO_SCORE = "interpolates channels and says nothing about space"
 
@@ -56,8 +51,8 @@ def fill(
         seen = evidence.link_visible[tx, rx].any(axis=0)
         if not seen.any():
             continue
-        block = _fill_subcarriers(field[tx, rx[:, seen]], subcarrier_visible, along)
-        block = _fill_columns(block, layout.rx_column[rx[0]], seen, along)
+        block = fill_subcarriers(field[tx, rx[:, seen]], subcarrier_visible, along)
+        block = fill_columns(block, layout.rx_column[rx[0]], seen, along)
         out[tx, rx] = pairs[pair] = block
     _fill_pairs(out, pairs, evidence, level_db)
     out[~layout.measured] = 0.0
@@ -81,47 +76,6 @@ def completed(
         if not evidence.link_visible[block].any():
             residual[block] = 0.0
     return predicted + residual
-
-
-def _fill_subcarriers(
-    block: Complex[np.ndarray, "tx rx subcarrier"],
-    subcarrier_visible: np.ndarray,
-    along: Interpolator,
-) -> Complex[np.ndarray, "tx rx subcarrier"]:
-    """Fills hidden subcarriers of links that are otherwise visible."""
-    subcarriers = np.arange(block.shape[2], dtype=np.float64)[:, None]
-    out = np.nan_to_num(block, nan=0.0)
-    if not subcarrier_visible.all():
-        values = block[:, :, subcarrier_visible].reshape(-1, int(subcarrier_visible.sum())).T
-        filled = along(values, subcarriers[subcarrier_visible], subcarriers[~subcarrier_visible])
-        out[:, :, ~subcarrier_visible] = filled.T.reshape(*block.shape[:2], -1)
-    return out
-
-
-def _fill_columns(
-    visible: Complex[np.ndarray, "tx seen subcarrier"],
-    column: Int[np.ndarray, "rx"],
-    seen: np.ndarray,
-    along: Interpolator,
-) -> Complex[np.ndarray, "tx rx subcarrier"]:
-    """Fills hidden columns of one device's array, each row from its own visible elements."""
-    num_tx, _, num_subcarriers = visible.shape
-    out = np.zeros((num_tx, len(column), num_subcarriers), dtype=visible.dtype)
-    out[:, seen] = visible
-    hidden = np.flatnonzero(~seen)
-    if len(hidden) == 0:
-        return out
-    known_columns, wanted_columns = np.unique(column[seen]), np.unique(column[hidden])
-    # Elements are numbered column by column, so reshaping gives rows in equal order.
-    by_column = np.stack([out[:, column == c] for c in known_columns])
-    filled = along(
-        by_column.reshape(len(known_columns), -1),
-        known_columns[:, None].astype(np.float64),
-        wanted_columns[:, None].astype(np.float64),
-    ).reshape(len(wanted_columns), *by_column.shape[1:])
-    for index, c in enumerate(wanted_columns):
-        out[:, column == c] = filled[index]
-    return out
 
 
 def _fill_pairs(

@@ -13,11 +13,11 @@ from rfgs_core.evaluate.baselines import BASELINES
 from rfgs_core.evaluate.baselines.clean import SEPARATION_M
 from rfgs_core.evaluate.baselines.gaussian_process import krige
 from rfgs_core.evaluate.baselines.plain import linear, nearest
-from rfgs_core.evaluate.baselines.spectrum import _like, _likeliest, spectral
 from rfgs_core.evaluate.evidence import Evidence
 from rfgs_core.evaluate.geometry import best_voxels
 from rfgs_core.evaluate.rf import frame_rf, rf_values
 from rfgs_core.evaluate.verdicts import leak
+from rfgs_core.measure.spectrum import _like, _likeliest, spectral
 
 Make = Callable[..., object]
 ONE = np.array([[2.0, 1.7, 1.2]])

@@ -197,7 +197,10 @@ def _material(trained: Run, frame: int, args: PredictArgs) -> str:
         name = other.config.radio
         radio, layout = other.sequence.radio_spec(name), other.sequence.layout(name)
         gaussians = other.head.radio_gaussians(other.moving(frame))
-        parts.append(levels_of(gaussians, layout, radio.freq_hz))
+        heard = levels_of(gaussians, layout, radio.freq_hz)
+        if heard is None:
+            return f"material: not judged; no device of {name} hears its own echoes"
+        parts.append(heard)
     levels = Levels.join(parts)
     rows = trained.sequence.instances
     surface_m2 = sum(float(row.get("nominal_surface_m2") or 0.0) for row in rows)

@@ -62,13 +62,19 @@ class Levels:
 
 def levels_of(
     gaussians: RadioGaussians, layout: Layout, freq_hz: Float[np.ndarray, "subcarrier"]
-) -> Levels:
+) -> Levels | None:
     """Radar cross-section of the Gaussians together, averaged over a radio's monostatic links.
 
-    Each device pair counts as one independent look: the elements of an array see nearly the
-    same speckle.
+    Each device counts as one independent look: the elements of an array see nearly the same
+    speckle. Between devices a body's mean cross-section is not that of backscatter, which the
+    model above is about.
+
+    Returns:
+        None where no device hears itself.
     """
-    pairs = layout.device_pairs
+    pairs = [(a, b) for a, b in layout.device_pairs if a == b]
+    if not pairs:
+        return None
     rows = [_some_links(layout, a, b) for a, b in pairs]
     tx, rx = np.concatenate(rows, axis=1)
     links = Links(torch.from_numpy(layout.tx_xyz[tx]), torch.from_numpy(layout.rx_xyz[rx]))

@@ -67,7 +67,7 @@ def error_db(said: Observations, whole: Observations, where: np.ndarray) -> floa
     return float(20.0 * np.log10(error / np.linalg.norm(whole.delta[where])))
 
 
-@pytest.mark.parametrize(("radio", "columns_db"), [("mmwave", -15.0), ("wifi", -15.0)])
+@pytest.mark.parametrize(("radio", "columns_db"), [("mmwave", -45.0), ("wifi", -25.0)])
 def test_hidden_columns_and_subcarriers_are_told(radio: str, columns_db: float) -> None:
     whole = heard(radio)
     seen = held_out(whole)
@@ -75,7 +75,7 @@ def test_hidden_columns_and_subcarriers_are_told(radio: str, columns_db: float) 
     visible = seen.links[..., None] & seen.subcarriers
     np.testing.assert_array_equal(said.delta[visible], whole.delta[visible])
     assert said.subcarriers.all()
-    assert error_db(said, whole, seen.links[..., None] & ~seen.subcarriers) < -40.0
+    assert error_db(said, whole, seen.links[..., None] & ~seen.subcarriers) < -80.0
     assert error_db(said, whole, said.links & ~seen.links) < columns_db
     # A pair that shows nothing stays hidden, and so does what is no link at all.
     assert said.pairs[1] == seen.pairs[1]
@@ -104,7 +104,7 @@ def test_arrays_with_other_gaps_stay_as_they_are(lost: str) -> None:
         links[:, first & (placed.rx_column > 0)] = False
     said = complete(less(whole, links, held_out(whole).subcarriers))
     np.testing.assert_array_equal(said.links, links)
-    assert error_db(said, whole, links) < -40.0
+    assert error_db(said, whole, links) < -80.0
     assert (said.delta[~links] == 0.0).all()
 
 
@@ -119,6 +119,6 @@ def test_noise_is_not_carried_on() -> None:
     hidden = (said.links[..., None] & said.subcarriers) & ~(
         seen.links[..., None] & seen.subcarriers
     )
-    assert np.mean(np.abs(said.delta[hidden]) ** 2) < 0.5 * np.mean(
+    assert np.mean(np.abs(said.delta[hidden]) ** 2) < 0.1 * np.mean(
         np.abs(whole.delta[hidden]) ** 2
     )

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -75,10 +77,28 @@ def test_a_point_target_has_its_cross_section(make_points) -> None:
     elements = layout(radio, place_devices(radio, bounds_m))
     gaussians = make_points([[2.0, 1.5, 1.0]], [0.25j])
     found = levels_of(gaussians, elements, radio.freq_hz)
+    assert found is not None
     np.testing.assert_allclose(found.rcs_m2, [0.0625], rtol=2e-3)
     np.testing.assert_allclose(found.freq_hz, [5.8e9])
-    # 16 device pairs, each one look: 4.34 dB / 4.
-    np.testing.assert_allclose(found.speckle_db, [1.086], rtol=1e-3)
+    # Four devices that hear themselves, each one look: 4.34 dB / 2.
+    np.testing.assert_allclose(found.speckle_db, [2.171], rtol=1e-3)
     wide = levels_of(gaussians, elements, np.linspace(3.1e9, 10.6e9, 32))
-    assert len(wide.freq_hz) == 4
+    assert wide is not None and len(wide.freq_hz) == 4
     np.testing.assert_allclose(wide.rcs_m2, 0.0625, rtol=5e-3)
+
+
+def test_only_backscatter_is_judged(make_points) -> None:
+    """What devices hear of each other has another mean, and is left out."""
+    radio = preset("wifi")
+    bounds_m = np.array([[0.0, 0.0, 0.0], [4.0, 3.5, 2.5]])
+    elements = layout(radio, place_devices(radio, bounds_m))
+    gaussians = make_points([[2.0, 1.5, 1.0], [1.2, 2.0, 1.1]], [0.25, 0.25])
+    own = elements.links_between(0, 0)
+    for device in range(1, 4):
+        own = own | elements.links_between(device, device)
+    every = levels_of(gaussians, elements, radio.freq_hz)
+    alone = levels_of(gaussians, replace(elements, measured=own), radio.freq_hz)
+    assert every is not None and alone is not None
+    np.testing.assert_allclose(every.rcs_m2, alone.rcs_m2)
+    between = replace(elements, measured=elements.measured & ~own)
+    assert levels_of(gaussians, between, radio.freq_hz) is None

@@ -21,6 +21,8 @@ from rfgs_core.radio.levels import amplitude_of, decibels, power_of
 DIRECT_LIMITS = (0.4, 2.5)
 #: Power that may arrive before the direct path, relative to the strongest arrival.
 EARLY_LIMIT = power_of(-25.0)
+#: How much less counts what may as well be late by nearly a whole period of the profile.
+LATE_SHARE = power_of(-10.0)
 #: Energy of all links relative to free space; reflections that add in phase stay below it.
 ENERGY_LIMIT = 6.0
 #: Peak power gain of Sionna's antenna patterns.
@@ -77,7 +79,7 @@ def _early_faults(
     for a, b in layout.device_pairs:
         tx, rx = layout.block_of(a, b)
         distance_m = np.linalg.norm(layout.tx_xyz[tx] - layout.rx_xyz[rx], axis=-1)
-        early = _early_power(sequence, radio, static[tx, rx], float(distance_m.min()))
+        early = _early_power(sequence, radio, static[tx, rx], distance_m)
         if early > EARLY_LIMIT:
             yield (
                 f"{where}: devices {a} to {b}: {decibels(early):.0f} dB arrive before the "
@@ -152,19 +154,25 @@ def blocked(start: np.ndarray, end: np.ndarray, triangles: np.ndarray) -> bool:
     return bool((hit & (np.abs(det) >= 1e-12)).any())
 
 
-def _early_power(sequence: Sequence, radio: str, links: np.ndarray, nearest_m: float) -> float:
-    """Strongest arrival earlier than light allows, relative to the strongest of all."""
+def _early_power(
+    sequence: Sequence, radio: str, links: np.ndarray, distance_m: np.ndarray
+) -> float:
+    """Strongest arrival earlier than light allows, relative to the strongest of all.
+
+    A profile repeats every c / subcarrier spacing, so its last third is also negative delay. Where
+    phases run backwards the direct path stands there, as far from the end as devices are apart, and
+    then everything else. Walls seen by three reflections may stand there too, if they are weak.
+    """
     spec = sequence.radio_spec(radio)
     subcarriers = spec.num_subcarriers
     profile = delay_profile(links, hann_to_zero(subcarriers))
     power = (np.abs(profile) ** 2).mean(axis=(0, 1))
     cell_m = SPEED_OF_LIGHT / spec.bandwidth_hz
     length_m = np.arange(subcarriers) * cell_m
-    # The last third of the profile is negative delay: no path of a checked scene is that long.
-    length_m = np.where(
-        length_m > 2 / 3 * spec.unambiguous_path_m, length_m - subcarriers * cell_m, length_m
-    )
-    early = power[length_m < nearest_m - HANN_LOBE * cell_m]
+    period_m = spec.unambiguous_path_m
+    length_m = np.where(length_m > 2.0 / 3.0 * period_m, length_m - period_m, length_m)
+    share = np.where(length_m < -(float(distance_m.max()) + cell_m), LATE_SHARE, 1.0)
+    early = (power * share)[length_m < float(distance_m.min()) - HANN_LOBE * cell_m]
     return float(early.max() / power.max()) if len(early) else 0.0
 
 

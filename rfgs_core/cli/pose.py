@@ -71,11 +71,21 @@ def run(args: PoseArgs) -> int:
         sys.stdout.write(
             f"tracked {scores['tracked']:.2f}, identity kept {scores['identity_kept']:.2f}, "
             f"posture right {scores['posture_right']:.2f} ({scores['seated']} of "
-            f"{scores['people']} sit)\n"
+            f"{scores['people']} sit)\n{_missed(scores['matched'], scores['people'])}"
         )
     sys.stdout.write(_height(scores["heights_m"], scores["true_heights_m"]))
     sys.stdout.write(f"{args.run / 'pose.png'} written\n")
     return 0
+
+
+def _missed(matched: int, present: int) -> str:
+    """A line that errors leave some people out, if they do."""
+    if matched >= present:
+        return ""
+    return (
+        f"errors    of {matched} of {present} people, each counted in every frame: the others have "
+        "no body\n"
+    )
 
 
 def _each(people_m: list[float]) -> str:

@@ -21,7 +21,9 @@ def verdicts(metrics: dict[str, Any]) -> list[str]:
     result = [_against(metrics, "matched_filter", "f10")]
     result += _error_share(metrics)
     result += [_against(metrics, "template", key) for key in ("f05", "f10")]
-    result += _other_geometry(metrics)
+    for key in ("f05", "f10"):
+        result += _other_geometry(metrics, key)
+    result += [_nothing_found(metrics)]
     result += [_rf(metrics, key) for key in ("element_snr_db", "subcarrier_snr_db")]
     result += [_leak(metrics, key) for key in ("element_snr_db", "subcarrier_snr_db")]
     result += [_picture(metrics)]
@@ -39,7 +41,7 @@ def _baseline(metrics: dict[str, Any], name: str, group: str, key: str) -> float
 def _against(metrics: dict[str, Any], name: str, key: str) -> str:
     """Geometry against one baseline."""
     own, other = _value(metrics, "geometry", key), _baseline(metrics, name, "geometry", key)
-    label = key.upper().replace("F0", "F")
+    label = _label(key)
     if own is None or other is None:
         return f"{OPEN}{label} against {name}: one of the two could not be computed."
     numbers = f"{label} {own:.3f} against {other:.3f} of {name} ({own - other:+.3f})"
@@ -94,18 +96,35 @@ def _error_share(metrics: dict[str, Any]) -> list[str]:
     return [f"{LOST}{text}; the target is a third. {_why(metrics, 'f10', other)}"]
 
 
-def _other_geometry(metrics: dict[str, Any]) -> list[str]:
-    """Further baselines with a better F10; the ceiling is no competitor."""
-    own = _value(metrics, "geometry", "f10")
+def _other_geometry(metrics: dict[str, Any], key: str) -> list[str]:
+    """Further baselines with a better F-score; the ceiling is no competitor."""
+    own = _value(metrics, "geometry", key)
     better = []
     for name in metrics["baselines"]:
-        other = _baseline(metrics, name, "geometry", "f10")
-        known = name in ("matched_filter", "template", "oracle_init")
+        other = _baseline(metrics, name, "geometry", key)
+        known = name in ("template", "oracle_init") or (name == "matched_filter" and key == "f10")
         if not known and own is not None and other is not None and other >= own:
             better.append(f"{name} ({other:.3f})")
     if not better or own is None:
         return []
-    return [f"{LOST}F10 {own:.3f} against {', '.join(better)}."]
+    return [f"{LOST}{_label(key)} {own:.3f} against {', '.join(better)}."]
+
+
+def _label(key: str) -> str:
+    """F5 of f05."""
+    return key.upper().replace("F0", "F")
+
+
+def _nothing_found(metrics: dict[str, Any]) -> str:
+    """That distances leave frames out, if they do; F-scores are zero there."""
+    rows = [row.get("geometry") or {} for row in metrics.get("frames", [])]
+    empty = sum(row.get("f10") is not None and row.get("centroid_m") is None for row in rows)
+    if not empty:
+        return ""
+    return (
+        f"{OPEN}in {empty} of {len(rows)} frames nothing was found; centroid, height and Chamfer "
+        "distance are means over the others."
+    )
 
 
 def _rf(metrics: dict[str, Any], key: str) -> str:

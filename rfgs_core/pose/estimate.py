@@ -133,8 +133,8 @@ def _told(
             baseline[k, body] = joints_of(standing(clouds[k][body], way), floor_m)
     seated = np.array([[is_low(person, floor_m) for person in frame] for frame in joints])
     shapes, sigma_m, heights_m = limbs.people.coefficients, limbs.joints.sigma_m, None
-    # Evidence knows one shape, the mean.
-    if shapes.any():
+    # Evidence knows one shape, the mean, give or take rounding.
+    if not np.allclose(shapes, 0.0):
         heights_m = np.array([people().body(shape).height_m for shape in shapes])
     return PoseEstimate(
         limbs.frames, time_s, centroid, joints, seated, baseline, sigma_m, heights_m

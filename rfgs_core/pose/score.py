@@ -23,7 +23,8 @@ def score_poses(estimate: PoseEstimate, sequence: Sequence) -> dict[str, Any]:
 
     Bodies are matched to people frame by frame by the distance on the ground between pelvis and
     pelvis. `mpjpe_m` is the mean distance per joint, `aligned_m` the same with pelvis on pelvis,
-    `people_m` that of each person who was matched, in the sequence's order; `heights_m` how tall
+    `people_m` that of each person who was matched, in the sequence's order; they are those of
+    `matched` of the `people`, each counted in every frame; `heights_m` how tall
     each of these is said to be, `true_heights_m` how tall by their true limbs;
     `identity_kept` is the share of matches with the person that a body had at first, and
     `tracked` the share of people with their body within half a metre. `posture_right` is the share
@@ -34,6 +35,7 @@ def score_poses(estimate: PoseEstimate, sequence: Sequence) -> dict[str, Any]:
     matches = [_matched(estimate.joints[k], true) for k, true in enumerate(truth)]
     present = sum(int(np.isfinite(true[:, 0]).all(axis=1).sum()) for true in truth)
     result: dict[str, Any] = {"frames": len(estimate.frames), "people": present}
+    result["matched"] = sum(len(row) for row in matches)
     for name, joints in (("fit", estimate.joints), ("standing", estimate.standing)):
         result[name] = _errors(joints, truth, matches)
     distance = [

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from rfgs_core.articulated import people
+from rfgs_core.cli.pose import _missed
 from rfgs_core.limbs.evidence.library import upright
 from rfgs_core.pose.body import (
     BONES,
@@ -215,6 +216,17 @@ def test_heights_are_those_of_the_people_who_were_matched() -> None:
     nothing_known = scored(found, np.full_like(truth, np.nan), heights_m=np.array([1.81, 1.52]))
     assert nothing_known["heights_m"] == [1.81, 1.52]
     assert nothing_known["true_heights_m"] is None
+
+
+def test_errors_say_of_how_many_people_they_are() -> None:
+    """Without the body that is further off the mean is smaller, but not of everybody."""
+    truth = np.stack([joints_of(parameters(x=x), 0.0) for x in (0.0, 2.0)])[None].repeat(2, axis=0)
+    both = truth + np.array([0.1, 0.3])[:, None, None]
+    whole, half = scored(both, truth), scored(both[:, :1], truth)
+    assert half["fit"]["mpjpe_m"] < whole["fit"]["mpjpe_m"]
+    assert (whole["matched"], half["matched"], half["people"]) == (4, 2, 4)
+    assert _missed(4, 4) == ""
+    assert _missed(2, 4).startswith("errors    of 2 of 4 people")
 
 
 def test_unknown_joints_have_no_error() -> None:

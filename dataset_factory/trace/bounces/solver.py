@@ -4,7 +4,8 @@
 All points hang on one tiny sensing target under the floor, a millimetre outside a body that
 is an ordinary absorber, so that the body shadows its own points. Sionna scatters with unit
 cross-section; the facet is applied afterwards in double precision, with each point's own area
-and at every frequency, which the solver could not do. Wall coefficients stay at the carrier.
+and at every frequency, which the solver could not do. Wall
+coefficients are the solver's, of the carrier, and are carried over the band by `walls`.
 """
 
 from __future__ import annotations

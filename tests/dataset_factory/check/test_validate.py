@@ -16,6 +16,7 @@ from dataset_factory.plan.job import Job
 from rfgs_core.dataset import open_dataset
 from rfgs_core.dataset.csi_store import write_csi
 from rfgs_core.dataset.pictures import write_png
+from rfgs_core.example import example_folder
 from rfgs_core.files import write_json
 
 Faults = Callable[[Path], list[str]]
@@ -32,6 +33,11 @@ def test_a_dataset_in_which_nobody_but_a_thing_moves_is_sound(
     assert generate(make_job(out, frames="2:2", images=False, blend=build_scene(kind="AUTO")))
     assert validate(out) == []
     assert open_dataset(out).sequence("box_room").joints(2).shape == (0, 17, 3)
+
+
+def test_the_example_that_comes_along_is_sound() -> None:
+    """A quarter of the subcarriers: late reflections stand where a profile's negative delays do."""
+    assert validate(example_folder() / "dataset") == []
 
 
 def test_missing_and_foreign_files_are_named(box_copy: Path) -> None:

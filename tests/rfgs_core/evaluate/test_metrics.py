@@ -124,6 +124,34 @@ def test_a_lost_comparison_says_whether_the_optimisation_is_at_fault() -> None:
     assert "not known" in judged(0.4, 0.5, None)[0]
 
 
+def test_a_baseline_ahead_in_either_score_is_named() -> None:
+    def group(f05: float | None, f10: float | None) -> dict[str, Any]:
+        return {"geometry": {"f05": f05, "f10": f10}, "rf": {}, "image": {}}
+
+    baselines = {name: group(None, None) for name in BASELINES} | {
+        "matched_filter": group(0.6, 0.4), "body_prior": group(0.58, 0.8),
+    }  # fmt: skip
+    limits = {"range_resolution_m": 0.9, "cross_range_m": 0.6}
+    said = verdicts({**group(0.57, 0.84), "baselines": baselines, "limits": limits})
+    assert "Lost: F5 0.570 against matched_filter (0.600), body_prior (0.580)." in said
+    assert not any(line.startswith("Lost: F10") for line in said)
+
+
+def test_frames_in_which_nothing_was_found_are_told() -> None:
+    """Their F-score is zero, but there is no distance to be counted."""
+    found = {"geometry": {"f10": 0.5, "centroid_m": 0.1}}
+    empty = {"geometry": {"f10": 0.0, "centroid_m": None}}
+    for frames, line in (
+        ([found, empty, found], "in 1 of 3 frames nothing was found"),
+        ([found], None),
+    ):
+        nobody = {name: {"geometry": {}, "rf": {}, "image": {}} for name in BASELINES}
+        metrics = {"geometry": {}, "rf": {}, "image": {}, "baselines": nobody, "frames": frames}
+        metrics["limits"] = {"range_resolution_m": 0.9, "cross_range_m": 0.6}
+        told = [one for one in verdicts(metrics) if "nothing was found" in one]
+        assert len(told) == (line is not None) and all(line in one for one in told)
+
+
 @pytest.mark.parametrize(
     ("own", "sentence"),
     [

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float, Float64, Int
 
+from rfgs_core.errors import RfgsError
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.layout import NEAREST_ANTENNAS_M, DevicePose, layout, nearest_m
 from rfgs_core.radio.materials import MATERIALS
@@ -175,6 +176,22 @@ def _coincident(radio: Radio, devices: list[DevicePose]) -> list[str]:
                 f"radio {radio.name!r} are in the same place; move one"
             )
     return list(found.values())
+
+
+def refuse_places(radio: Radio, devices: list[DevicePose]) -> None:
+    """Refuses devices between which there is no channel.
+
+    Raises:
+        RfgsError: One sends from where another hears, or there is no link at all.
+    """
+    problems = _coincident(radio, devices)
+    if problems:
+        raise RfgsError(problems[0])
+    if not devices or not layout(radio, devices).measured.any():
+        raise RfgsError(
+            f"radio {radio.name!r} has no link with {len(devices)} devices: they do not hear "
+            "themselves; place two or more"
+        )
 
 
 def winding_number(

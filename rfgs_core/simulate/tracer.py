@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 from rfgs_core.radio import Radio, layout
+from rfgs_core.radio.check import refuse_places
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.layout import DevicePose
 from rfgs_core.radio.reflection import material_permittivity
@@ -91,7 +92,11 @@ class FastTracer:
                 ends.
             shadow: "kirchhoff", or "hard" for all or nothing.
             seed: Root seed of the facets.
+
+        Raises:
+            RfgsError: One device sends from where another hears, or nobody hears anybody.
         """
+        refuse_places(radio, devices)
         self._room, self._radio, self._devices = room, radio, devices
         self._people, self._vehicles = people, vehicles
         self._shadow: Shadow = shadow

@@ -8,8 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rfgs_core.errors import RfgsError
 from rfgs_core.radio import PRESETS, DevicePose, preset
 from rfgs_core.radio.check import check, check_devices, winding_number
+from rfgs_core.simulate.geometry.room import SlabMaterial, box_room
+from rfgs_core.simulate.surface.movers import Movers
+from rfgs_core.simulate.tracer import FastTracer
 
 BOUNDS_M = np.array([[0.0, 0.0, 0.0], [6.0, 5.0, 2.7]])
 QUADS = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
@@ -89,3 +93,14 @@ def test_devices_in_the_same_place_are_refused_where_they_hear_each_other() -> N
     # Radars hear only themselves, and a transmitter below its receiver may have a twin.
     assert check_devices(preset("mmwave"), BOUNDS_M, devices, []) == []
     assert check_devices(preset("wifi"), BOUNDS_M, devices, []) == []
+
+
+def test_the_tracer_refuses_places_without_a_channel() -> None:
+    commodity, nobody = preset("wifi_commodity"), Movers.none()
+    room = box_room(np.zeros(3), np.array([5.0, 4.0, 2.6]), SlabMaterial("plasterboard", 0.0125))
+    first = at(1.0, 1.0, 1.0)
+    with pytest.raises(RfgsError, match="are in the same place; move one"):
+        FastTracer(room, nobody, nobody, commodity, [first, replace(first, name="twin")])
+    with pytest.raises(RfgsError, match="'wifi_commodity' has no link with 1 devices"):
+        FastTracer(room, nobody, nobody, commodity, [first])
+    assert FastTracer(room, nobody, nobody, preset("mmwave"), [first]).static().any()

@@ -18,12 +18,14 @@ from typing import Any
 import msgspec
 
 from rfgs_core.errors import RfgsError, RfgsFormatError
-from rfgs_core.links import refuse_link, stands_at
+from rfgs_core.links import kind_of, refuse_link, stands_at
 
 #: Objects of Python take some thirty times the bytes that the file has.
 LARGEST_JSON_BYTES = 2**25
 #: Opens to read and does not wait, where the system knows of that.
 _READ_AT_ONCE = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0)
+#: Where a dataset and a run keep what was drawn or predicted of them; nothing reads it as theirs.
+_BESIDE = {"a dataset": "log/preview", "a run": "predictions"}
 
 
 @contextmanager
@@ -88,6 +90,29 @@ def refuse_place(path: Path) -> None:
         raise RfgsError(
             f"{path}: nothing can be made there ({error.strerror}); choose another place"
         ) from error
+
+
+def refuse_inside(path: Path, *, itself: bool = True) -> None:
+    """Refuses a place whose files belong to a dataset, a run or a scene bundle.
+
+    What is written there would replace files of theirs, or be taken for one: their own commands
+    would then answer wrongly, and in silence. Free are the folders where our commands keep what
+    they draw and predict.
+
+    Args:
+        path: File or folder that shall be written.
+        itself: Whether it may not be such a folder either.
+
+    Raises:
+        RfgsError: It lies in such a folder, or is one.
+    """
+    real = Path(os.path.realpath(path))
+    for folder in (real, *real.parents) if itself else real.parents:
+        kind = kind_of(folder)
+        free = _BESIDE.get(kind)
+        if kind and not (free and real.is_relative_to(folder / free)):
+            what = f"is {kind}" if folder == real else f"lies in {kind}, {folder}"
+            raise RfgsError(f"{path} {what}, whose files are its own; choose another place")
 
 
 def sweep(folder: Path, *patterns: str) -> None:

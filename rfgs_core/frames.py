@@ -11,6 +11,8 @@ import numpy as np
 from rfgs_core.errors import RfgsError
 
 _FORM = re.compile(r"(-?\d+)(?::(-?\d+)(?::(\d+))?)?", re.ASCII)
+#: More frames than these are not named one by one.
+_MOST_LISTED = 16
 
 
 def parse_frames(text: str) -> range:
@@ -43,6 +45,20 @@ def spread_frames(frames: Sequence[int], most: int) -> list[int]:
     """
     rows = np.linspace(0, len(frames) - 1, min(most, len(frames))).round().astype(int)
     return [frames[row] for row in rows.tolist()]
+
+
+def listed(frames: Sequence[int]) -> str:
+    """Frames as a message names them: all of a few, the first and the last of many.
+
+    Example:
+        >>> listed([10, 15, 20])
+        '10, 15, 20'
+        >>> listed(range(1, 61))
+        '1, 2, 3, 4, 5, 6, 7, 8, 9, 10, …, 60 (60 frames)'
+    """
+    if len(frames) <= _MOST_LISTED:
+        return ", ".join(map(str, frames))
+    return f"{', '.join(map(str, frames[:10]))}, …, {frames[-1]} ({len(frames)} frames)"
 
 
 def chosen_frames(text: str | None, available: list[int]) -> list[int]:

@@ -18,11 +18,11 @@ import msgspec
 from rfgs_core.errors import RfgsFormatError
 
 #: What makes a folder a dataset, a run or a scene bundle, and how its schema then begins.
-_MARKS = (
-    ("dataset.json", "rfgs-dataset/"),
-    ("config.json", "rfgs-run/"),
-    ("bundle.json", "rfgs-bundle/"),
-)
+_MARKS = {
+    "a dataset": ("dataset.json", "rfgs-dataset/"),
+    "a run": ("config.json", "rfgs-run/"),
+    "a scene bundle": ("bundle.json", "rfgs-bundle/"),
+}
 #: Larger files are refused wherever they are read, so they mark nothing [bytes].
 _LARGEST_MARK = 2**25
 
@@ -76,7 +76,7 @@ def refuse_link(path: Path | str) -> None:
     while folder != os.path.dirname(folder):
         home = os.path.realpath(folder)
         if os.path.commonpath([home, real]) != home and (
-            folder in msgspec.json.decode(os.environ.get(_FILLED, "[]")) or _is_marked(folder)
+            folder in msgspec.json.decode(os.environ.get(_FILLED, "[]")) or kind_of(folder)
         ):
             raise RfgsFormatError(
                 f"{path}: a symbolic link leads out of {folder}, to {real}; expected files and "
@@ -149,9 +149,9 @@ def _kind(mode: int) -> str:
     return next((name for matches, name in kinds if matches(mode)), "a device")
 
 
-def _is_marked(folder: str) -> bool:
-    """Whether a folder is a dataset, a run or a scene bundle."""
-    for name, begin in _MARKS:
+def kind_of(folder: Path | str) -> str:
+    """What a folder is: a dataset, a run or a scene bundle; empty where it is something else."""
+    for kind, (name, begin) in _MARKS.items():
         # As it will be read: a schema may be spelt with escapes, too.
         with suppress(OSError, msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
             file = os.path.join(folder, name)
@@ -161,5 +161,5 @@ def _is_marked(folder: str) -> bool:
             with open(file, "rb") as stream:
                 mark = msgspec.json.decode(stream.read(), type=_Mark)
             if mark.schema.startswith(begin):
-                return True
-    return False
+                return kind
+    return ""

@@ -12,12 +12,12 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from rfgs_core.files import refuse_place
+from rfgs_core.files import refuse_inside, refuse_place
 from rfgs_core.links import filled
 from rfgs_core.outcome import run_cli
 
 #: Arguments of commands that name what they write.
-_OUTPUTS = ("out", "json")
+_OUTPUTS = ("out", "json", "video", "picture", "record", "markdown")
 
 
 def _say(text: str, code: int) -> int:
@@ -32,8 +32,8 @@ class Program:
     A command's module holds its arguments, a frozen dataclass that says in its docstring what
     the command does, and `run`, which takes them and returns the exit code. A command of several
     parts has a union of such dataclasses instead, and a line on all of them, SUMMARY. Paths of
-    arguments called `out` or `json` are known to be writable then, and no link leads out of a
-    folder there.
+    arguments that name outputs, as `out` and `json` do, are known to be writable then and to
+    belong to no dataset or run, and no link leads out of a folder there.
     """
 
     name: str
@@ -46,6 +46,9 @@ class Program:
     """Shown above the list of commands."""
     closing: str
     """Shown below it: how to begin."""
+    continuing: tuple[str, ...] = ()
+    """Commands whose output may be a dataset or a run that is there: they look at it themselves,
+    and go on with it or refuse it."""
 
     def main(self, arguments: Sequence[str] | None = None) -> int:
         """Runs one command; returns the exit code.
@@ -90,6 +93,7 @@ class Program:
             for output in _OUTPUTS:
                 place = getattr(parsed, output, None)
                 if isinstance(place, Path) and str(place) != "-":
+                    refuse_inside(place, itself=name not in self.continuing)
                     refuse_place(place)
                     if place.is_dir():
                         stack.enter_context(filled(place))

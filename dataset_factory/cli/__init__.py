@@ -35,5 +35,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         introduction="Makes datasets of radio channels with matching pictures from animated "
         "Blender files.",
         closing=_FIRST_STEPS,
+        continuing=("plan", "generate"),
     )
     return program.main(arguments)

@@ -9,8 +9,6 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from dataset_factory.make.encode import encode_empty, encode_frame, rendered_whole
 from dataset_factory.make.impair import impair_radio
 from dataset_factory.make.sequence import describe_sequence, write_geometry
@@ -20,6 +18,7 @@ from dataset_factory.plan.folder import claim_taken_back, locked, open_folder
 from dataset_factory.plan.job import Job
 from dataset_factory.plan.price import price_line
 from dataset_factory.plan.progress import progress_bar
+from dataset_factory.plan.scene_size import refuse_large_scene
 from dataset_factory.plan.stages import size_of, speeds_noted
 from dataset_factory.scene.bundle import Bundle, read_bundle
 from dataset_factory.scene.devices import check_scene, choose_devices
@@ -42,14 +41,10 @@ from rfgs_core.files import read_json, sweep, write_json
 from rfgs_core.frames import parse_frames
 from rfgs_core.past import Clock
 from rfgs_core.radio import DevicePose, frame_samples, layout, pose_span_s
-from rfgs_core.radio.check import too_far
 from rfgs_core.radio.impairments import impairments_from_json
 from rfgs_core.schedule.workers import count_workers
 
 logger = logging.getLogger(__name__)
-
-#: Radios that tell paths of this length apart need no look at the scene's size beforehand [m].
-_ANY_SCENE_M = 100.0
 
 
 def generate(job: Job) -> bool:
@@ -62,6 +57,8 @@ def generate(job: Job) -> bool:
         RfgsError: The folder holds something else, or the scene cannot be used.
     """
     if not open_folder(job):
+        # Killed while tidying up: nothing is missing.
+        shutil.rmtree(job.work, ignore_errors=True)
         return False
     if job.scheduler:
         # A cluster that is not there is known before the scene is exported for it.
@@ -148,7 +145,7 @@ def _export(job: Job) -> Bundle:
         shutil.rmtree(target, ignore_errors=True)
         write_json(plan_file, plan)
     if not (target / "bundle.json").is_file():
-        _refuse_large_scene(job)
+        refuse_large_scene(job)
         fresh = job.work / "bundle.new"
         shutil.rmtree(fresh, ignore_errors=True)
         logger.info("exporting the scene from Blender")
@@ -168,27 +165,6 @@ def _export(job: Job) -> Bundle:
         read_bundle(fresh)
         fresh.rename(target)
     return read_bundle(target)
-
-
-def _refuse_large_scene(job: Job) -> None:
-    """Refuses a scene too large for a radio before all of its frames are exported.
-
-    Raises:
-        RfgsError: A radio's subcarriers are too far apart for the scene.
-    """
-    radios = [job.plan.radio(name) for name in job.plan.radios]
-    if all(radio.unambiguous_path_m > _ANY_SCENE_M for radio in radios):
-        return
-    file = job.work / "check.json"
-    asked = ["--frames", job.plan.frames] if job.plan.frames else []
-    job.run_blender("check", "--out", str(file), *asked)
-    bounds_m = read_report(file)["scene"]["bounds_m"]
-    if bounds_m is None:
-        # Nothing moves, or the like: the export says so.
-        return
-    problems = [text for radio in radios for text in too_far(radio, np.array(bounds_m))]
-    if problems:
-        raise RfgsError(f"{job.blender.blend.stem}: " + "; also: ".join(problems))
 
 
 def _choose(job: Job, bundle: Bundle) -> tuple[dict[str, list[DevicePose]], list[dict[str, Any]]]:

@@ -32,8 +32,6 @@ def open_folder(job: Job) -> bool:
         made_with = {} if stored.manifest_sha256 else stored.versions
         refuse_other_plan(job.out, job.plan, stored.config, made_with)
         if stored.manifest_sha256:
-            # Killed while tidying up: nothing is missing.
-            shutil.rmtree(job.work, ignore_errors=True)
             return False
     elif job.out.is_dir() and any(
         entry.name not in (".work", "log") and not entry.name.startswith(".tmp-")

@@ -72,8 +72,12 @@ def detect(path: Path) -> Reader:
         return named[0]
     if not head and not path.is_dir():
         raise RfgsFormatError(f"{path}: expected a capture, found an empty file")
-    known = "; ".join(f"{candidate.NAME}: {candidate.TITLE}" for candidate in readers)
-    raise RfgsFormatError(f"{path}: no reader knows what it begins with; there are {known}")
+    raise RfgsFormatError(f"{path}: no reader knows what it begins with; there are {_known()}")
+
+
+def _known() -> str:
+    """Every reader by name and radio, for messages."""
+    return "; ".join(f"{one.NAME}: {one.TITLE}" for one in map(reader, READERS))
 
 
 def read_capture(path: Path | str, form: str | None = None) -> Reading:
@@ -94,4 +98,15 @@ def read_capture(path: Path | str, form: str | None = None) -> Reading:
         `read_capture("walk.dat").largest.values` is (time, device, rx, tx, subcarrier).
     """
     path = Path(path)
-    return (detect(path) if form is None else reader(form)).read(path)
+    if form is not None:
+        return reader(form).read(path)
+    found = detect(path)
+    try:
+        return found.read(path)
+    except RfgsFormatError as error:
+        if found.looks_like(read_head(path), path):
+            raise
+        # An ending such as .txt is anybody's.
+        raise RfgsFormatError(
+            f"{error}; only the ending of its name told {found.NAME}, there are {_known()}"
+        ) from error

@@ -32,5 +32,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         introduction="Radio-frequency Gaussian splatting: fits 3D Gaussians to channel state "
         "information alone.",
         closing="Start with `rfgs info`, then `rfgs demo`.",
+        continuing=("train",),
     )
     return program.main(arguments)

@@ -34,15 +34,20 @@ def run(args: CompareArgs) -> int:
     )
     from rfgs_core.report.metrics_file import read_metrics
     from rfgs_core.report.page import comparison_page
+    from rfgs_core.run.config import RunConfig
 
     if args.out is not None and args.out.suffix not in (".md", ".html"):
         raise RfgsError(f"{args.out}: expected a name that ends in .md or .html")
     first, second = read_metrics(args.first), read_metrics(args.second)
+    datasets = (
+        RunConfig.read(args.first).dataset_fingerprint,
+        RunConfig.read(args.second).dataset_fingerprint,
+    )
     names = (args.first.resolve().name, args.second.resolve().name)
     if names[0] == names[1]:
         names = (str(args.first), str(args.second))
     rows = comparison_rows(first, second, names)
-    notes = [f"Not the same conditions: {line}" for line in differences(first, second)]
+    notes = [f"Not the same conditions: {line}" for line in differences(first, second, datasets)]
     sys.stdout.write(text_comparison(rows, notes))
     if args.out is not None:
         page = comparison_page if args.out.suffix == ".html" else markdown_comparison

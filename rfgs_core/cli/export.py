@@ -45,6 +45,7 @@ def export_run(trained: TrainedRun, args: ExportArgs) -> None:
     Raises:
         RfgsError: The file name does not end in .ply, or the run has no such frame.
     """
+    from rfgs_core.frames import listed
     from rfgs_core.gaussians.ply import write_ply
     from rfgs_core.render.view import colored_cloud, fitted_shader
 
@@ -52,9 +53,7 @@ def export_run(trained: TrainedRun, args: ExportArgs) -> None:
         raise RfgsError(f"{args.out}: expected a file name ending in .ply")
     frame = trained.frames[0] if args.frame is None else args.frame
     if frame not in trained.frames:
-        raise RfgsError(
-            f"{args.run}: no frame {frame}; the run has {trained.frames[0]} to {trained.frames[-1]}"
-        )
+        raise RfgsError(f"{args.run}: no frame {frame}; the run has {listed(trained.frames)}")
     shader = fitted_shader(trained)
     if shader is None:
         _LOG.warning("%s: no shader has been fitted, so the Gaussians are grey", args.run)

@@ -28,9 +28,9 @@ class InspectArgs:
     file: tyro.conf.Positional[Path]
     """A capture: a file, or a folder in NeRF2's layout; or a dataset."""
     out: Path | None = None
-    """Folder for pictures; none are drawn when left out."""
+    """Folder for pictures of a capture; none are drawn when left out."""
     sanitize: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
-    """Also clean it, step by step, and draw before and after."""
+    """Also clean a capture, step by step, and draw before and after."""
     format: str | None = None
     """Name of the reader, where the file does not tell it."""
 
@@ -40,6 +40,7 @@ def run(args: InspectArgs) -> int:
     from rfgs_core.capture import read_capture
 
     if (args.file / "dataset.json").is_file():
+        _refuse_capture_options(args)
         sys.stdout.write("".join(f"{line}\n" for line in _can_tell(args.file)))
         return 0
     reading = read_capture(args.file, args.format)
@@ -54,6 +55,22 @@ def run(args: InspectArgs) -> int:
         if args.sanitize:
             _sanitise(capture, None if args.out is None else args.out / f"{name}_sanitised.png")
     return 0
+
+
+def _refuse_capture_options(args: InspectArgs) -> None:
+    """Refuses what has no meaning for a dataset.
+
+    Raises:
+        RfgsError: Such an option was given.
+    """
+    from rfgs_core.errors import RfgsError
+
+    given = [f"--{name}" for name in ("out", "sanitize", "format") if getattr(args, name)]
+    if given:
+        raise RfgsError(
+            f"{args.file} is a dataset: {', '.join(given)} goes with captures only; leave it out, "
+            f"or draw pictures with `rfgs-factory preview {args.file}`"
+        )
 
 
 def _can_tell(dataset: Path) -> list[str]:

@@ -78,6 +78,11 @@ def run(args: LimbsArgs) -> int:
         frames=args.frames, hours=args.hours, passes=args.passes, kept=args.kept,
         workers=args.workers, batch=args.batch, size=args.size, device=args.device, seed=args.seed,
     )  # fmt: skip
+    if args.frames < config.least_frames:
+        raise RfgsError(
+            f"--frames {args.frames}: expected at least {config.least_frames}, which the first "
+            "step waits for with this --batch, --kept and --passes"
+        )
     torch.set_num_threads(1)
     partial = args.out.with_suffix(".partial")
     with tqdm(total=args.frames, desc=f"limbs {args.radio}", unit="frame") as bar:

@@ -69,6 +69,11 @@ def remove_impaired(path: Path) -> None:
         shutil.rmtree(folder, ignore_errors=True)
 
 
+def is_of_impaired(name: str) -> bool:
+    """Whether a file of a dataset, as its manifest names it, is one that impairments add."""
+    return any(f"/csi.zarr/{folder}/" in name for folder in (IMPAIRED, *_ARRAYS))
+
+
 @contextmanager
 def writing_impaired(path: Path) -> Iterator[ImpairedWriter]:
     """Yields a writer; everything appears in the store when the block ends, the channels last.

@@ -3,11 +3,16 @@
 
 from __future__ import annotations
 
+import hashlib
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 
+from rfgs_core.dataset.impaired_store import IMPAIRED, is_of_impaired
+from rfgs_core.dataset.observed import Observed
 from rfgs_core.dataset.schema import DatasetInfo, read_dataset_info
 from rfgs_core.dataset.sequence import Sequence
+from rfgs_core.dataset.writer import MANIFEST, info_text
 from rfgs_core.errors import RfgsError
 from rfgs_core.files import inside, sha256
 
@@ -50,6 +55,10 @@ def open_dataset(path: Path | str) -> Dataset:
     return Dataset(path, info)
 
 
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode("utf-8")).hexdigest()
+
+
 class Dataset:
     """A finished dataset on disk."""
 
@@ -71,6 +80,31 @@ class Dataset:
     def fingerprint(self) -> str:
         """Digest that identifies the data: of `dataset.json`, which holds the manifest's."""
         return sha256(self.path / "dataset.json")
+
+    @cached_property
+    def clean_fingerprint(self) -> str:
+        """The `fingerprint` without impaired channels, as it was before they were added."""
+        manifest = self.path / MANIFEST
+        if IMPAIRED not in self.has or not manifest.is_file():
+            return self.fingerprint
+        if sha256(manifest) != self.info.manifest_sha256:
+            # Whatever it names is not what this dataset was sealed with.
+            return self.fingerprint
+        lines = manifest.read_text("utf-8").splitlines(keepends=True)
+        rest = "".join(line for line in lines if not is_of_impaired(line))
+        has = [name for name in self.has if name != IMPAIRED]
+        info = replace(self.info, has=has, manifest_sha256=_digest(rest))
+        return _digest(info_text(info))
+
+    def fingerprints(self, channel: Observed) -> tuple[str, ...]:
+        """Every digest by which a run on a channel may know this dataset, today's first.
+
+        Impairments are no part of what a run on clean channels was trained on; runs before this was
+        so know the digest of everything.
+        """
+        if channel == "clean":
+            return self.clean_fingerprint, self.fingerprint
+        return (self.fingerprint,)
 
     def sequence(self, name: str | None = None) -> Sequence:
         """Opens a sequence.

@@ -16,7 +16,7 @@ from jaxtyping import Float32, UInt8, UInt16
 from rfgs_core.dataset.names import SequenceFiles
 from rfgs_core.dataset.pictures import write_exr, write_png
 from rfgs_core.dataset.schema import DatasetInfo, SequenceInfo, info_json
-from rfgs_core.files import sha256, write_bytes, write_json, write_text
+from rfgs_core.files import json_text, sha256, write_bytes, write_json, write_text
 
 #: Folders of a dataset that hold wall times and half-made work, no data.
 UNLISTED = ("log", ".work")
@@ -86,9 +86,14 @@ def finish_dataset(path: Path, info: DatasetInfo) -> None:
 
 
 def write_dataset_info(path: Path, info: DatasetInfo) -> None:
-    """Writes `dataset.json` with the digest of its own content."""
+    """Writes `dataset.json`."""
+    write_text(path / "dataset.json", info_text(info))
+
+
+def info_text(info: DatasetInfo) -> str:
+    """What `dataset.json` holds, with the digest of its own content."""
     value = info_json(info)
-    write_json(path / "dataset.json", {**value, "sha256": own_digest(value)})
+    return json_text({**value, "sha256": own_digest(value)})
 
 
 def own_digest(value: dict[str, Any]) -> str:

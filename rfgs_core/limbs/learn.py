@@ -58,6 +58,12 @@ class LearnConfig:
     seed: int = 0
     """Seed of worlds and weights."""
 
+    @property
+    def least_frames(self) -> int:
+        """How many it takes for a first step; with fewer the network stays as it was drawn."""
+        first = min(_FIRST, self.kept)
+        return max(first, self.batch, math.ceil(self.batch / self.passes))
+
     def share(self, progress: Progress) -> float:
         """How much of the training is done."""
         spent = 0.0 if self.hours is None else progress.spent_s / (3600.0 * self.hours)
@@ -123,8 +129,9 @@ def learn(
         if progress.frames - looked >= _OFTEN * max(config.batch // 64, 1) or share >= 1.0:
             looked = progress.frames
             unseen = judge(network, judged)
-            told = float(torch.stack(errors).mean()) if errors else math.nan
-            words = f"off by {told:.3f} m, in unseen worlds {unseen:.4f} m"
+            # Whoever ends by the clock may do so before the first step.
+            told = f"off by {float(torch.stack(errors).mean()):.3f} m, " if errors else ""
+            words = f"{told}in unseen worlds {unseen:.4f} m"
             if checkpoint is not None and errors:
                 keep(checkpoint, network, optimiser, progress)
         on_chunk(progress.frames, words)

@@ -60,5 +60,5 @@ def bench_real(data: Path, say: Callable[[str], None]) -> dict[str, float | str]
             continue
         result |= {f"{part}_{name}": value for name, value in judge(file).items()}
     if not result:
-        raise RfgsError(f"{data}: expected some of {', '.join(PARTS.values())}")
+        raise RfgsError(f"{data}: expected some of {', '.join(dict.fromkeys(PARTS.values()))}")
     return result

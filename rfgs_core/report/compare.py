@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from rfgs_core.frames import listed
 from rfgs_core.report.tables import GROUPS, align, show
 
 #: Conditions that must agree for a comparison to mean anything.
@@ -20,13 +21,28 @@ CONDITIONS = (
 )
 
 
-def differences(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[str]:
-    """Sentences on conditions in which two runs differ."""
+def differences(
+    first: Mapping[str, Any], second: Mapping[str, Any], datasets: tuple[str, str]
+) -> list[str]:
+    """Sentences on conditions in which two runs differ.
+
+    Args:
+        first: Metrics of a run.
+        second: Metrics of another one.
+        datasets: Fingerprints of the datasets that they were trained on.
+    """
     pairs = [
         (name, first["conditions"].get(name), second["conditions"].get(name)) for name in CONDITIONS
     ]
     pairs.append(("trace_depth", first.get("trace_depth"), second.get("trace_depth")))
+    pairs.append(("frames", _frames(first), _frames(second)))
+    pairs.append(("dataset, by its fingerprint", datasets[0][:12], datasets[1][:12]))
     return [f"{name}: {a} against {b}" for name, a, b in pairs if a != b]
+
+
+def _frames(metrics: Mapping[str, Any]) -> str:
+    """Frames that were evaluated."""
+    return listed([row["frame"] for row in metrics["frames"]])
 
 
 def comparison_rows(

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from rfgs_core.dataset import Dataset, Sequence
+from rfgs_core.dataset.observed import Observed
 from rfgs_core.errors import RfgsError
 from rfgs_core.links import refuse_link
 from rfgs_core.run.config import CONFIG_FILE, RunConfig, relative_dataset
@@ -64,13 +65,23 @@ def asked_of(
     heads = counted(out, sequence, radio, frames, config, people)
     asked = RunConfig(
         dataset=relative_dataset(out, dataset.path),
-        dataset_fingerprint=dataset.fingerprint,
+        dataset_fingerprint=_fingerprint(out, dataset, config.channel),
         sequence=sequence.name,
         radio=radio,
         frames=frames,
         settings=config if heads is None else replace(config, bodies=max(heads.count, 1)),
     )
     return asked, heads
+
+
+def _fingerprint(out: Path, dataset: Dataset, channel: Observed) -> str:
+    """By which digest a run knows its dataset; one that is there keeps its own."""
+    known = dataset.fingerprints(channel)
+    if (out / CONFIG_FILE).exists():
+        stored = RunConfig.read(out).dataset_fingerprint
+        if stored in known:
+            return stored
+    return known[0]
 
 
 def refuse_other_files(out: Path) -> None:

@@ -7,11 +7,14 @@ from functools import lru_cache
 from pathlib import Path
 
 from rfgs_core.dataset import Sequence, open_dataset
+from rfgs_core.dataset.observed import Observed
 from rfgs_core.errors import RfgsError
 
 
 @lru_cache(maxsize=8)
-def trained_sequence(run: Path, place: Path, name: str, fingerprint: str) -> Sequence:
+def trained_sequence(
+    run: Path, place: Path, name: str, fingerprint: str, channel: Observed
+) -> Sequence:
     """The sequence of a run, out of the dataset at `place`.
 
     Raises:
@@ -23,7 +26,7 @@ def trained_sequence(run: Path, place: Path, name: str, fingerprint: str) -> Seq
             "the same `rfgs train` with its new place"
         )
     dataset = open_dataset(place)
-    if dataset.fingerprint != fingerprint:
+    if fingerprint not in dataset.fingerprints(channel):
         raise RfgsError(
             f"{run} was trained on another dataset than {place} holds now (expected fingerprint "
             f"{fingerprint[:12]}, found {dataset.fingerprint[:12]}); train again or restore that "

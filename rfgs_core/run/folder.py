@@ -82,7 +82,8 @@ class Run:
         """
         config = self.config
         place = (self.path / config.dataset).resolve()
-        return trained_sequence(self.path, place, config.sequence, config.dataset_fingerprint)
+        fingerprint = config.dataset_fingerprint
+        return trained_sequence(self.path, place, config.sequence, fingerprint, self.channel)
 
     def with_dataset(self, place: Path) -> Run:
         """The run, once it is written down that its dataset lies elsewhere now."""

@@ -153,6 +153,8 @@ def cases(
         ("condition", conditions, CONDITIONS),
         ("radio", radios, RADIOS),
     ):
+        if not asked:
+            raise RfgsError(f"--{kind}s without any: expected some of {', '.join(known)}")
         for name in asked:
             if name not in known:
                 now = f" (it is called {_RENAMED[name]} now)" if name in _RENAMED else ""

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rfgs_core.errors import RfgsError
+from rfgs_core.frames import listed
 from rfgs_core.render.cameras import Camera
 from rfgs_core.run import Run
 from rfgs_core.view.colors import PREFERRED, colors_of, legend_html, scales_of
@@ -69,7 +70,7 @@ class Viewer:
         numbers = self.frames.numbers
         begin = numbers[0] if frame is None else frame
         if begin not in numbers:
-            raise RfgsError(f"{run.path}: no frame {begin}; it has {', '.join(map(str, numbers))}")
+            raise RfgsError(f"{run.path}: no frame {begin}; it has {listed(numbers)}")
         samples = self.frames.samples()
         self.scales = scales_of(samples)
         mode = mode or next(known for known in PREFERRED if known in self.scales)

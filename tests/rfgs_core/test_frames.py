@@ -4,7 +4,7 @@ from __future__ import annotations
 import pytest
 
 from rfgs_core.errors import RfgsError
-from rfgs_core.frames import chosen_frames, parse_frames
+from rfgs_core.frames import chosen_frames, listed, parse_frames
 
 
 def test_parsed_frames_include_both_ends() -> None:
@@ -39,3 +39,8 @@ def test_chosen_frames(text: str | None, expected: list[int]) -> None:
 def test_frames_that_mean_nothing_are_refused(text: str) -> None:
     with pytest.raises(RfgsError, match=f"--frames {text!r}:"):
         chosen_frames(text, [10, 15, 20])
+
+
+def test_messages_name_the_frames_there_are() -> None:
+    assert listed([10, 18, 26, 34, 42]) == "10, 18, 26, 34, 42"
+    assert listed(range(3, 600, 3)) == "3, 6, 9, 12, 15, 18, 21, 24, 27, 30, …, 597 (199 frames)"

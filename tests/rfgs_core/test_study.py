@@ -75,6 +75,10 @@ def test_unknown_names_and_empty_choices_are_refused() -> None:
         cases(["living_room_walk"], ["bounces"], ["uwb"], 1)
     with pytest.raises(RfgsError, match="expected at least 1"):
         cases(["living_room_walk"], ["clean"], ["wifi"], 0)
+    with pytest.raises(RfgsError, match="--scenes without any: expected some of living_room_walk"):
+        cases([], ["clean"], ["wifi"], 1)
+    with pytest.raises(RfgsError, match="--conditions without any: expected some of clean"):
+        cases(["living_room_walk"], [], ["wifi"], 1)
 
 
 def test_targets_follow_from_means_over_seeds() -> None:

@@ -101,9 +101,14 @@ class People(Part):
         """Counts people of a dataset, or judges joints of a public set."""
         from rfgs_core.errors import RfgsError
 
-        if self.data is not None and self.dataset is None:
+        if self.data is not None and self.dataset is not None:
+            raise RfgsError(
+                "bench people: expected either --dataset FOLDER of ours or "
+                "--data FOLDER of a public set, not both"
+            )
+        if self.data is not None:
             return self._public_set(self.data)
-        if self.dataset is None or self.data is not None:
+        if self.dataset is None:
             raise RfgsError(
                 "bench people: expected --dataset FOLDER of ours, see `rfgs-factory generate`, or "
                 "--data FOLDER of a public set, see docs/captures.md"

@@ -81,6 +81,23 @@ def test_wrong_requests(
     assert all(word in line for word in words), line
 
 
+def test_a_plan_refuses_what_generate_refuses(
+    factory_here: Factory, box_room: Path, tiny_copy: Path, tmp_path: Path
+) -> None:
+    """Whoever plans a night of tracing shall not learn in the evening that it cannot be."""
+    (tmp_path / "file").write_text("a letter")
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    for radio, out, more, words in (
+        ("mmwave", "out", WIDE, "reach 56.3 m"),
+        ("wifi", "file", (), "a file of that name exists"),
+        ("wifi", tiny_copy.name, (), "was made with scene = 'tiny'"),
+    ):
+        asked = (str(box_room), "--radio", radio, "--out", str(tmp_path / out), *more)
+        refusals = [one_line(factory_here(command, *asked)) for command in ("plan", "generate")]
+        assert refusals[0] == refusals[1] and words in refusals[0]
+    assert before == {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+
+
 def test_packets_that_no_radio_sends_are_refused_by_check_too(factory_here: Factory) -> None:
     answer = factory_here("check", "living_room_walk", "--packets-per-frame", "0")
     assert "--packets-per-frame 0: expected 1 to 10000" in one_line(answer)

@@ -310,6 +310,10 @@ def test_unknown_formats_and_files_are_one_line(tmp_path: Path) -> None:
     (tmp_path / "a.xyz").write_bytes(b"hello")
     with pytest.raises(RfgsFormatError, match="no reader knows"):
         read_capture(tmp_path / "a.xyz")
+    (tmp_path / "a.txt").write_text("a letter,\nno capture\n")
+    told = "2 lines that .*; only the ending of its name told esp32, there are acconeer: .*nerf2: "
+    with pytest.raises(RfgsFormatError, match=told):
+        read_capture(tmp_path / "a.txt")
 
 
 @pytest.mark.parametrize(

@@ -39,7 +39,7 @@ class SurfaceRun:
     shift_m: np.ndarray = field(default_factory=lambda: np.zeros(3))
     frames: list[int] = field(default_factory=lambda: [1, 2])
     config: RunConfig = field(
-        default_factory=lambda: RunConfig("", "", "tiny", "wifi", [1, 2], TrainConfig(), 1.5)
+        default_factory=lambda: RunConfig("", "a" * 64, "tiny", "wifi", [1, 2], TrainConfig(), 1.5)
     )
     channel: Observed = "clean"
 
@@ -89,7 +89,7 @@ def surface_run(tiny_dataset: Path, tmp_path: Path) -> SurfaceRun:
 def evaluated_run(tiny_dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> SurfaceRun:
     """The same run, evaluated once; nothing in its folder is changed, a report is added."""
     run = SurfaceRun(tmp_path_factory.mktemp("run"), open_dataset(tiny_dataset).sequence())
-    run.path.joinpath("config.json").write_text("{}")
+    run.config.write(run.path)
     evaluate_run(run, oracle=False)
     return run
 

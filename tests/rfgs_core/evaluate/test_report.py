@@ -6,6 +6,7 @@ import io
 import json
 import re
 import shutil
+from dataclasses import replace
 from html import unescape
 from pathlib import Path
 
@@ -20,7 +21,9 @@ from rfgs_core.evaluate.baselines import BASELINES
 from rfgs_core.figures.shapes import colouring
 from rfgs_core.report import write_demo_report, write_run_report
 from rfgs_core.report.cards import WORDS, headline_cards, in_words
+from rfgs_core.report.metrics_file import read_metrics
 from rfgs_core.report.tables import metric_tables, show, text_table
+from rfgs_core.run.config import RunConfig
 from rfgs_core.seals import write_sealed_json
 from rfgs_core.view.browser import find_chromium, open_page
 
@@ -203,9 +206,28 @@ def test_compare_prints_and_writes_both_kinds(evaluated_run, tmp_path: Path, cap
     assert "Not the same conditions: radio: wifi against mmwave" in text
     row = next(line for line in text.splitlines() if line.startswith("geometry.f10 "))
     assert row.endswith(evaluated_run.path.name)
+    assert text.count("Not the same conditions") == 2
     (other / "metrics.json").write_text("[]")
     with pytest.raises(RfgsFormatError, match=r"metrics\.json: expected an object"):
         compare(CompareArgs(evaluated_run.path, other))
+
+
+def test_compare_names_other_frames_and_another_dataset(
+    evaluated_run, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As many frames of the same scene, but others, or traced anew, are another task."""
+    other = Path(shutil.copytree(evaluated_run.path, tmp_path / "other"))
+    metrics = read_metrics(other)
+    for row in metrics["frames"]:
+        row["frame"] += 7
+    write_sealed_json(other / "metrics.json", metrics)
+    replace(RunConfig.read(other), dataset_fingerprint="f" * 64).write(other)
+    assert compare(CompareArgs(evaluated_run.path, other)) == 0
+    notes = [line for line in capsys.readouterr().out.splitlines() if line.startswith("Not")]
+    assert notes == [
+        "Not the same conditions: frames: 1, 2 against 8, 9",
+        "Not the same conditions: dataset, by its fingerprint: aaaaaaaaaaaa against ffffffffffff",
+    ]
 
 
 @pytest.mark.parametrize("make", [False, True])

@@ -53,3 +53,13 @@ def test_inspect_says_it_of_a_dataset(
     out = capsys.readouterr().out
     assert "wifi: paths are resolved by 1.87 m (out and back: ranges by 0.937 m)" in out
     assert out.count(": across, at ") == 4
+
+
+@pytest.mark.parametrize("option", ["--out pictures", "--sanitize", "--format intel5300"])
+def test_what_only_captures_have_is_refused_of_a_dataset(
+    tiny_dataset: Path, option: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["inspect", str(tiny_dataset), *option.split()]) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and len(err.splitlines()) == 1
+    assert f"is a dataset: {option.split()[0]} goes with captures only; leave it out" in err

@@ -122,4 +122,6 @@ def test_the_command_prints_claims_as_claims(tmp_path: Path, capsys) -> None:
     assert main(["bench", "people", "--data", str(tmp_path)]) == 2
     assert "expected MM-Fi" in capsys.readouterr().err
     assert main(["bench", "people", "--data", "a", "--dataset", "b"]) == 2
-    assert "--data FOLDER of a public set" in capsys.readouterr().err
+    assert "--data FOLDER of a public set, not both" in capsys.readouterr().err
+    assert main(["bench", "people"]) == 2
+    assert "--data FOLDER of a public set, see docs" in capsys.readouterr().err

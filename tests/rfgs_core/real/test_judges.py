@@ -225,6 +225,8 @@ def test_bench_real_needs_a_folder_with_something_in_it(tmp_path: Path, capsys) 
     assert main(["bench", "real", "--data", str(tmp_path)]) == 2
     err = capsys.readouterr().err
     assert err.count("skipped") == len(PARTS) and "expected some of newrf" in err
+    asked = err.rpartition("expected some of ")[2].split(", ")
+    assert len(asked) == len(set(asked)) == len(set(PARTS.values()))
 
 
 @pytest.mark.slow

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the network makes of one person through a sequence: of all that it may be, what goes on.
 
-It looks at single frames. Entries that are hidden of them are told from the visible ones first, so
-that maps have narrower beams and lower side lobes. Now and then it takes a back for a front, and
-beside the place of somebody who lies it takes heads for feet, and is the less sure.
+It looks at single frames. Of somebody alone, entries that are hidden are told from the visible ones
+first, so that maps have narrower beams and lower side lobes; what is left of others beside somebody
+is no echo to be carried on. Now and then it takes a back for a front, and beside the place of
+somebody who lies it takes heads for feet, and is the less sure.
 """
 
 from __future__ import annotations
@@ -82,7 +83,7 @@ def propose_beside(
         Of all frames, shape (frame, 1, 17, ·).
     """
     told = [
-        propose(network, complete(observations), place[None])
+        propose(network, observations, place[None])
         for observations, place in zip(alone, axes_xy, strict=True)
     ]
     joints = Joints(*(np.array(values) for values in zip(*told, strict=True)))

@@ -14,8 +14,9 @@ from rfgs_core.articulated import people
 from rfgs_core.limbs.evidence import tell as telling
 from rfgs_core.limbs.evidence.follow import stood, walked
 from rfgs_core.limbs.evidence.library import PHASES, about_z, headings_of, strides, upright
-from rfgs_core.limbs.evidence.tell import best_walk, tell
+from rfgs_core.limbs.evidence.tell import Told, best_walk, tell
 from rfgs_core.limbs.evidence.track import course_of, looks_of, way_of
+from rfgs_core.limbs.propose import Joints
 from rfgs_core.skeleton import JOINTS
 
 SHIFTS = np.array([[0.0, 0.0, 0.0], [0.04, 0.0, 0.0], [-0.04, 0.0, 0.0]])
@@ -148,6 +149,29 @@ def test_a_walk_of_another_body_is_told(heard, stride, walker_joints, monkeypatc
     assert told.joints.sigma_m.shape == (4, 1, 17) and told.joints.sigma_m.min() > 0.0
     # Who stays on the spot does not walk.
     assert best_walk(seen, np.zeros((4, 2))) is None
+
+
+@pytest.mark.parametrize(
+    ("lead", "agree", "draws"),
+    [(700.0, 0.6, 2), (300.0, 0.6, 1), (700.0, 0.7, 1), (-5.0, 0.9, 1)],
+)
+def test_strides_are_drawn_again_where_a_walk_stands_out_and_frames_do_not_agree(
+    monkeypatch, lead: float, agree: float, draws: int
+) -> None:
+    """Ten frames: 40 nat each is what stands out. The second draw is another, and the last."""
+    asked: list[int] = []
+    joints = Joints(np.zeros((10, 1, 17, 3)), np.ones((10, 1, 17)))
+
+    def one(seen: Any, axes_xy: np.ndarray, seed: int = 0, *_: Any) -> Told:
+        asked.append(seed)
+        return Told(joints, lead, agree if len(asked) == 1 else 0.8)
+
+    monkeypatch.setattr(telling, "best_walk", one)
+    frames: Any = [SimpleNamespace()] * 10
+    found = tell(frames, np.zeros((10, 2)), seed=3)
+    assert len(asked) == len(set(asked)) == draws
+    told = lead > 0.0 and (draws == 2 or agree >= 0.65)
+    assert (found is not None) == told
 
 
 def test_who_halts_on_the_way_or_is_seen_too_shortly_is_not_told(monkeypatch) -> None:

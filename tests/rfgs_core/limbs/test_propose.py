@@ -8,9 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rfgs_core.encode.body_maps import CENTRE_HEIGHT_M, body_maps
 from rfgs_core.limbs.postures.through import propose_alone
 from rfgs_core.limbs.propose import Joints, propose
 from rfgs_core.limbs.weights import own_network
+from rfgs_core.measure.completion import complete
 from rfgs_core.measure.observations import Observations
 
 
@@ -46,6 +48,39 @@ def said_alone(seen: list[Observations], axes_xy: np.ndarray) -> Joints:
     trained = own_network(seen[0].freq_hz)
     assert trained is not None
     return propose_alone(trained.network, seen, axes_xy, np.arange(len(seen), dtype=np.float64))
+
+
+def test_hidden_entries_are_told_before_the_network_reads(
+    heard_by_radars: tuple[Observations, np.ndarray],
+) -> None:
+    """Maps of a held-out frame are those of the whole one, and so is what is said of them."""
+    whole, joints = heard_by_radars
+    columns = whole.layout.rx_column
+    links = whole.links & (columns < columns.max() + 1 - (columns.max() + 1) // 4)
+    subcarriers = whole.subcarriers.copy()
+    subcarriers[len(subcarriers) * 5 // 8 : len(subcarriers) * 3 // 4] = False
+    seen = links[..., None] & subcarriers
+    held_out = replace(
+        whole, links=links, subcarriers=subcarriers, delta=np.where(seen, whole.delta, 0)
+    )
+    centre = np.array([*joints[:, :2].mean(axis=0), CENTRE_HEIGHT_M])
+
+    def maps(one: Observations) -> np.ndarray:
+        return body_maps(
+            one.delta, one.layout, one.links, one.freq_hz, one.subcarriers, centre
+        )  # fmt: skip
+
+    def apart(one: Observations) -> float:
+        return float(np.linalg.norm(maps(one) - maps(whole)) / np.linalg.norm(maps(whole)))
+
+    assert apart(complete(held_out)) < 0.2 * apart(held_out)
+    place = joints[:, :2].mean(axis=0)
+    as_whole = said_alone([whole], place[None]).xyz[0, 0]
+    off_m = [
+        np.linalg.norm(xyz - as_whole, axis=1).mean()
+        for xyz in (said_alone([held_out], place[None]).xyz[0, 0], said(held_out, place).xyz[0])
+    ]
+    assert off_m[0] < 0.5 * off_m[1]
 
 
 def test_beside_who_lies_heads_are_no_longer_taken_for_feet(

@@ -26,12 +26,6 @@ from rfgs_core.measure.observations import Observations
 
 #: Frames this far apart smooth each other [s], and the degree of the curve through them.
 SMOOTH_S, DEGREE = 0.4, 2
-#: Two ways contradict each other in a frame if the mean square of how far they are apart, in units
-#: of what both are expected to be off, is more than this: on average it is 0.4 to 1.9 where a walk
-#: is right, 4 to 11 where none is or the person is a child (random worlds and recorded motions).
-_CONTRADICTION = 3.0
-#: Who walks is not contradicted in more than this share of the frames.
-_TURNED_AROUND = 0.25
 #: Places around a body from which the network is asked [m].
 _SIDES_M = 0.06 * np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
 #: How often it is asked so, as long as the joints move by more than this [m].
@@ -237,35 +231,6 @@ def smoothed(joints: Joints, time_s: Float64[np.ndarray, "frame"]) -> Joints:
         xyz[frame] = np.einsum("bjk,bjkx->bjx", inverse[..., 0, :], moment)
         sigma[frame] = joints.sigma_m[near].mean(axis=0)
     return Joints(xyz, sigma)
-
-
-def contradiction(one: Joints, other: Joints) -> Float64[np.ndarray, "frame"]:
-    """Mean square of how far two ways are apart, for how far off they say that they are."""
-    apart_m = np.linalg.norm(one.xyz - other.xyz, axis=-1)
-    expected_m = np.hypot(one.sigma_m, other.sigma_m)
-    return np.mean((apart_m / expected_m) ** 2, axis=(1, 2))
-
-
-def of_walk_and_network(walk: Joints, network: Joints) -> Joints:
-    """Joints told by evidence of a walk and by the network: of both, as long as they agree.
-
-    Evidence finds the likeliest walk of a mean body on the floor, whoever it is; the network
-    assumes neither. Where they contradict each other in more than a quarter of the frames, it alone
-    counts. If they do in single ones only, the walk does there: it is one walk for all frames,
-    while the network is asked for each by itself and takes a back for a front now and then.
-
-    Args:
-        walk: Of all frames, shape (frame, body, 17, ·).
-        network: The same.
-    """
-    contradicted = contradiction(walk, network) > _CONTRADICTION
-    if contradicted.mean() > _TURNED_AROUND:
-        return network
-    both, lonely = combined(walk, network), contradicted[:, None, None]
-    return Joints(
-        np.where(lonely[..., None], walk.xyz, both.xyz),
-        np.where(lonely, walk.sigma_m, both.sigma_m),
-    )
 
 
 def combined(one: Joints, other: Joints) -> Joints:

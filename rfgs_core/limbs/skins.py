@@ -33,6 +33,23 @@ def shapes_of(said: Joints) -> Float64[np.ndarray, "body K"]:
     return np.array([fit_shape(said.xyz[:, b], _SHAPE, said.sigma_m[:, b]) for b in bodies])
 
 
+def sized(joints: Joints, shapes: Float64[np.ndarray, "body K"], floor_m: float) -> Joints:
+    """Joints of bodies of the mean shape, as bodies of these shapes would have them.
+
+    Each is scaled by its height about the ground below its pelvis.
+
+    Args:
+        joints: Of all frames, shape (frame, body, 17, ·).
+        shapes: Coefficients of each, see `shapes_of`.
+        floor_m: Height of the floor [m].
+    """
+    tall = np.array([people().body(shape).height_m for shape in shapes])
+    ratio = tall / people().body(np.zeros(0)).height_m
+    ground = joints.xyz[:, :, :1].copy()
+    ground[..., 2] = floor_m
+    return Joints(ground + ratio[:, None, None] * (joints.xyz - ground), joints.sigma_m)
+
+
 @dataclass(frozen=True)
 class OnSkin:
     """Gaussians of one frame on the skins of its people."""

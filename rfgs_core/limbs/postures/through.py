@@ -22,6 +22,8 @@ from rfgs_core.skeleton import JOINTS
 
 #: Places from which it is asked again [m]: who lies is found so far off.
 _BESIDE_M = 0.3 * np.array([[np.cos(a), np.sin(a)] for a in np.arange(8) * np.pi / 4])
+#: Frames before and after have a person elsewhere if it is so far off [m].
+_ELSEWHERE_M = 0.15
 #: Within this ratio of σ it is as sure wherever it is asked.
 _AS_SURE = 1.05
 
@@ -34,9 +36,10 @@ def propose_alone(
 ) -> Joints:
     """Joints of somebody with nobody else near, whom the network might find instead.
 
-    Where it is less sure than `SURE_M` it begins again from eight places around. Of each frame
-    that counts which is surest and goes on from the frames before and after. Frames whose packets
-    were filtered are asked once.
+    Where it is less sure than `SURE_M` it begins again from eight places around, and from where
+    the frames before and after have the person, for the place found may be that of an echo. Of
+    each frame that counts which is surest and goes on from the frames before and after. Frames
+    whose packets were filtered are asked once.
 
     Args:
         network: The network of this kind of radio.
@@ -47,12 +50,15 @@ def propose_alone(
     Returns:
         Of all frames, shape (frame, 1, 17, ·).
     """
-    told = []
-    for frame, place in zip(seen, np.asarray(axes_xy, np.float64), strict=True):
-        observations = complete(frame)
+    told, places = [], np.asarray(axes_xy, np.float64)
+    for number, frame in enumerate(seen):
+        observations, place = complete(frame), places[number]
         one = propose(network, observations, place[None])
         if one.sigma_m.mean() > SURE_M and observations.packets is None:
             one = _together(one, propose(network, observations, place + _BESIDE_M))
+            elsewhere = _elsewhere(places, number)
+            if len(elsewhere):
+                one = _both(one, propose(network, observations, elsewhere))
         told.append(one)
     # Of joints with the same σ, what is more certain is likelier.
     score = [-len(JOINTS) / TEMPER * np.log(one.sigma_m.mean(axis=1)) for one in told]
@@ -90,8 +96,21 @@ def propose_beside(
     return facing(fronts(joints, time_s), time_s)
 
 
+def _elsewhere(
+    places: Float64[np.ndarray, "frame 2"], number: int
+) -> Float64[np.ndarray, "place 2"]:
+    """Where the frames before and after have the person, if it is not where this one does [m]."""
+    near = np.concatenate([places[max(number - 1, 0) : number], places[number + 1 : number + 2]])
+    return near[np.linalg.norm(near - places[number], axis=1) > _ELSEWHERE_M]
+
+
 def _together(found: Joints, others: Joints) -> Joints:
     """Both, one after the other, or the first alone if it makes no difference where it is asked."""
-    both = Joints(*(np.concatenate(values) for values in zip(found, others, strict=True)))
+    both = _both(found, others)
     sigma_m = both.sigma_m.mean(axis=1)
     return both if sigma_m.max() > _AS_SURE * sigma_m.min() else found
+
+
+def _both(one: Joints, other: Joints) -> Joints:
+    """One after the other."""
+    return Joints(*(np.concatenate(values) for values in zip(one, other, strict=True)))

@@ -101,6 +101,17 @@ def test_beside_who_lies_heads_are_no_longer_taken_for_feet(
     assert 0.5 < better_m.mean() / through.sigma_m.mean() < 2.0
 
 
+def test_where_a_frame_has_an_echo_it_is_asked_at_the_place_of_the_frames_beside(
+    who_lies_heard_by_radars: tuple[Observations, np.ndarray],
+) -> None:
+    """A place over a metre off, too far for those that are asked around it."""
+    observations, joints = who_lies_heard_by_radars
+    places = joints[0, :2] + np.array([[0.0, 0.0], [1.2, 0.7], [0.0, 0.0]])
+    lost, through = (said_alone([observations] * len(at), at) for at in (places[[1]], places))
+    assert np.linalg.norm(lost.xyz[0, 0] - joints, axis=1).mean() > 0.8, "the case is too easy"
+    assert np.linalg.norm(through.xyz[1, 0] - joints, axis=1).mean() < 0.35
+
+
 def test_whom_the_network_is_sure_of_it_is_asked_once(
     heard_by_radars: tuple[Observations, np.ndarray],
 ) -> None:

@@ -11,8 +11,6 @@ from rfgs_core.limbs.propose import (
     SMOOTH_S,
     Joints,
     combined,
-    contradiction,
-    of_walk_and_network,
     smoothed,
 )
 from rfgs_core.limbs.skins import PosedPeople, shapes_of
@@ -68,35 +66,6 @@ def test_two_ways_together_are_nearer_than_either_and_say_how_near() -> None:
     # Who knows nothing has no say.
     blind = Joints(ways[1].xyz + 5.0, np.full_like(sigmas[1], 1e4))
     np.testing.assert_allclose(combined(ways[0], blind).xyz, ways[0].xyz, atol=1e-3)
-
-
-def test_a_walk_that_the_network_contradicts_has_no_say() -> None:
-    """They agree as long as they are apart by less than √3 of what both are expected to be off."""
-    walk = Joints(np.zeros((4, 1, 17, 3)), np.full((4, 1, 17), 0.06))
-    for share, apart in ((0.98, False), (1.02, True)):
-        # Half of the joints are right, the other half are off by enough for all of them.
-        off = np.zeros((4, 1, 17, 3))
-        off[:, :, ::2, 1] = share * np.sqrt(3.0 * 17 / 9) * np.hypot(0.06, 0.15)
-        network = Joints(off, np.full((4, 1, 17), 0.15))
-        assert ((contradiction(walk, network) > 3.0) == apart).all()
-        told = of_walk_and_network(walk, network)
-        wanted = network if apart else combined(walk, network)
-        np.testing.assert_array_equal(told.xyz, wanted.xyz)
-        np.testing.assert_array_equal(told.sigma_m, wanted.sigma_m)
-
-
-def test_a_frame_that_the_network_turns_around_is_left_to_the_walk() -> None:
-    rng = np.random.default_rng(5)
-    walk = Joints(rng.normal(size=(6, 1, 17, 3)) * 0.1, np.full((6, 1, 17), 0.07))
-    said = walk.xyz + 0.02
-    said[2, ..., :2] *= -1.0
-    network = Joints(said, np.full((6, 1, 17), 0.07))
-    told, both = of_walk_and_network(walk, network), combined(walk, network)
-    np.testing.assert_array_equal(told.xyz[2], walk.xyz[2])
-    np.testing.assert_array_equal(told.sigma_m[2], walk.sigma_m[2])
-    others = [0, 1, 3, 4, 5]
-    np.testing.assert_array_equal(told.xyz[others], both.xyz[others])
-    np.testing.assert_array_equal(told.sigma_m[others], both.sigma_m[others])
 
 
 def test_frames_far_apart_are_left_alone() -> None:

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Joints by evidence of a walk and by the network, together, as far as they agree."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Bool, Float64
+from scipy.optimize import brentq
+
+from rfgs_core.limbs.propose import Joints, combined
+
+#: Two ways contradict each other in a frame if the mean square of how far they are apart, in units
+#: of what both are expected to be off, is more than this: on average it is 0.4 to 1.9 where a walk
+#: is right, 4 to 11 where none is or the person is a child (random worlds and recorded motions).
+_CONTRADICTION = 3.0
+#: Who walks is not contradicted in more than this share of the frames.
+_TURNED_AROUND = 0.25
+#: The same mean square where a walk is as sure as it says; 1.2 if their errors had nothing in
+#: common, but they have (correlation 0.1 to 0.7). What is more than that is put down to the walk:
+#: in every scene and random world the network is off by what it says, or less.
+_AT_ODDS = 0.5
+#: How many times less sure than it says a walk may turn out to be.
+_MOST_DOUBT = 20.0
+
+
+def contradiction(one: Joints, other: Joints) -> Float64[np.ndarray, "frame"]:
+    """Mean square of how far two ways are apart, for how far off they say that they are."""
+    apart_m = np.linalg.norm(one.xyz - other.xyz, axis=-1)
+    expected_m = np.hypot(one.sigma_m, other.sigma_m)
+    return np.mean((apart_m / expected_m) ** 2, axis=(1, 2))
+
+
+def of_walk_and_network(walk: Joints, network: Joints) -> Joints:
+    """Joints told by evidence of a walk and by the network: of both, as long as they agree.
+
+    Evidence finds the likeliest walk on the floor, whoever it is; the network does not assume one.
+    Where they contradict each other in more than a quarter of the frames, it alone counts. If they
+    do in single ones only, the walk does there: it is one walk for all frames, while the network is
+    asked for each by itself and takes a back for a front now and then. In the others the walk
+    counts the less, the further they are apart.
+
+    Args:
+        walk: Of all frames, shape (frame, body, 17, ·), of bodies of the size that the network
+            tells, see `skins.sized`.
+        network: The same.
+    """
+    contradicted = contradiction(walk, network) > _CONTRADICTION
+    if contradicted.mean() > _TURNED_AROUND:
+        return network
+    walk = _doubted(walk, network, ~contradicted)
+    both, lonely = combined(walk, network), contradicted[:, None, None]
+    return Joints(
+        np.where(lonely[..., None], walk.xyz, both.xyz),
+        np.where(lonely, walk.sigma_m, both.sigma_m),
+    )
+
+
+def _doubted(walk: Joints, network: Joints, agree: Bool[np.ndarray, "frame"]) -> Joints:
+    """The walk, as sure as its distance from the network allows in frames where they agree.
+
+    Its σ knows doubts of the phase alone. Errors of gaits and bodies that the strides do not know
+    show here, and all are scaled until they explain the distance (R. T. Birge, Physical Review 40,
+    1932).
+    """
+
+    def excess(doubt: float) -> float:
+        wider = Joints(walk.xyz, doubt * walk.sigma_m)
+        return float(contradiction(wider, network)[agree].mean()) - _AT_ODDS
+
+    if excess(1.0) <= 0.0:
+        return walk
+    doubt = brentq(excess, 1.0, _MOST_DOUBT) if excess(_MOST_DOUBT) < 0.0 else _MOST_DOUBT
+    return Joints(walk.xyz, doubt * walk.sigma_m)

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Evidence of a walk and the network, together as far as they agree."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rfgs_core.articulated import people
+from rfgs_core.limbs.propose import Joints, combined
+from rfgs_core.limbs.skins import sized
+from rfgs_core.limbs.together import contradiction, of_walk_and_network
+from rfgs_core.worlds.motion import random_motion
+
+
+def test_a_walk_that_the_network_contradicts_has_no_say() -> None:
+    """They agree as long as they are apart by less than √3 of what both are expected to be off."""
+    walk = Joints(np.zeros((4, 1, 17, 3)), np.full((4, 1, 17), 0.06))
+    for share, apart in ((0.98, False), (1.02, True)):
+        # Half of the joints are right, the other half are off by enough for all of them.
+        off = np.zeros((4, 1, 17, 3))
+        off[:, :, ::2, 1] = share * np.sqrt(3.0 * 17 / 9) * np.hypot(0.06, 0.15)
+        network = Joints(off, np.full((4, 1, 17), 0.15))
+        assert ((contradiction(walk, network) > 3.0) == apart).all()
+        told = of_walk_and_network(walk, network)
+        assert np.array_equal(told.xyz, network.xyz) == apart
+        assert np.array_equal(told.sigma_m, network.sigma_m) == apart
+
+
+def test_a_walk_far_from_the_network_counts_as_if_it_had_said_so() -> None:
+    """Joints √½ of what both are expected to be off apart leave the walk as sure as it says.
+
+    Further apart, it has the σ that brings them there.
+    """
+    network = Joints(np.zeros((3, 1, 17, 3)), np.full((3, 1, 17), 0.04))
+    for sigma_m in (0.05, 0.08, 0.2):
+        off = np.zeros((3, 1, 17, 3))
+        off[..., 0] = np.sqrt(0.5) * np.hypot(sigma_m, 0.04)
+        right = Joints(off, np.full((3, 1, 17), sigma_m))
+        proud = Joints(off, np.full((3, 1, 17), 0.05))
+        if (contradiction(proud, network) > 3.0).any():
+            # Too far to be of the same person: the network alone counts.
+            np.testing.assert_array_equal(of_walk_and_network(proud, network).xyz, network.xyz)
+            continue
+        wanted, told = combined(right, network), of_walk_and_network(proud, network)
+        np.testing.assert_allclose(told.xyz, wanted.xyz, atol=1e-6)
+        np.testing.assert_allclose(told.sigma_m, wanted.sigma_m, rtol=1e-5)
+
+
+def test_a_frame_that_the_network_turns_around_is_left_to_the_walk() -> None:
+    rng = np.random.default_rng(5)
+    walk = Joints(rng.normal(size=(6, 1, 17, 3)) * 0.1, np.full((6, 1, 17), 0.07))
+    said = walk.xyz + 0.02
+    said[2, ..., :2] *= -1.0
+    network = Joints(said, np.full((6, 1, 17), 0.07))
+    told, both = of_walk_and_network(walk, network), combined(walk, network)
+    np.testing.assert_array_equal(told.xyz[2], walk.xyz[2])
+    np.testing.assert_array_equal(told.sigma_m[2], walk.sigma_m[2])
+    others = [0, 1, 3, 4, 5]
+    np.testing.assert_array_equal(told.xyz[others], both.xyz[others])
+    np.testing.assert_array_equal(told.sigma_m[others], both.sigma_m[others])
+
+
+@pytest.mark.parametrize("floor_m", [0.0, -1.2])
+def test_a_walk_of_the_mean_body_fits_a_small_one_once_it_is_sized(floor_m: float) -> None:
+    """Joints of the same poses; what is left are proportions and the length of steps."""
+    small = np.array([-2.0, 0.0, 0.0])
+    mean, own = people().body(np.zeros(0)), people().body(small)
+    assert own.height_m < 0.95 * mean.height_m
+    motion = random_motion(np.random.default_rng(4), mean, "walk")
+    poses = [motion.at(t) for t in np.linspace(0.2, 1.0, 5)]
+    place = np.array([0.7, -0.4, floor_m])
+    walk = np.array([[mean.joints17(pose) + place] for pose in poses])
+    told = sized(Joints(walk, np.full(walk.shape[:3], 0.06)), small[None], floor_m)
+    ground = walk[:, :, :1, :2]
+    np.testing.assert_allclose(told.xyz[:, :, 0, :2], ground[:, :, 0], atol=1e-12)
+    ratio = own.height_m / mean.height_m
+    np.testing.assert_allclose(told.xyz[..., 2] - floor_m, ratio * (walk[..., 2] - floor_m))
+    limbs = [np.linalg.norm(told.xyz[..., a, :] - told.xyz[..., b, :]) for a, b in ((1, 2), (2, 3))]
+    long = [np.linalg.norm(walk[..., a, :] - walk[..., b, :]) for a, b in ((1, 2), (2, 3))]
+    np.testing.assert_allclose(np.array(limbs) / long, ratio)
+    mean_shape = sized(told, np.zeros((1, 3)), floor_m)
+    np.testing.assert_allclose(mean_shape.xyz, told.xyz)

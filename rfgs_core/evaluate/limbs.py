@@ -30,8 +30,8 @@ from rfgs_core.limbs.postures.tell import can_tell, looks
 from rfgs_core.limbs.postures.tell import tell as tell_posture
 from rfgs_core.limbs.postures.through import propose_alone
 from rfgs_core.limbs.propose import Joints, smoothed
-from rfgs_core.limbs.skins import PosedPeople, shapes_of, sized
-from rfgs_core.limbs.together import of_walk_and_network
+from rfgs_core.limbs.skins import PosedPeople, shapes_of
+from rfgs_core.limbs.together import walk_with_network
 from rfgs_core.measure.observations import Observations, observe, packets_to_read
 from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import TrainConfig
@@ -141,9 +141,8 @@ def limb_table(
     if _EVIDENCE not in told and can_tell(person.seen[0]):
         told |= _by_postures(person, other, _SEED)
     if _SMOOTH in told and _EVIDENCE in told:
-        shapes, floor_m = shapes_of(told[_SMOOTH]), float(person.seen[0].bounds_m[0, 2])
-        walk = sized(told[_EVIDENCE], shapes, floor_m)
-        both = of_walk_and_network(walk, told[_SMOOTH])
+        shapes = shapes_of(told[_SMOOTH])
+        both = walk_with_network(told[_EVIDENCE], told[_SMOOTH], shapes, person.seen)
         told = {"evidence and network together": _on_bodies(both, shapes)} | told
     if _SMOOTH in told:
         told[_SMOOTH] = _on_bodies(told[_SMOOTH], shapes_of(told[_SMOOTH]))

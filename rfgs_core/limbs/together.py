@@ -5,9 +5,11 @@ from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Bool, Float64
-from scipy.optimize import brentq
+from scipy.optimize import root_scalar
 
 from rfgs_core.limbs.propose import Joints, combined
+from rfgs_core.limbs.skins import sized
+from rfgs_core.measure.observations import Observations
 
 #: Two ways contradict each other in a frame if the mean square of how far they are apart, in units
 #: of what both are expected to be off, is more than this: on average it is 0.4 to 1.9 where a walk
@@ -30,24 +32,49 @@ def contradiction(one: Joints, other: Joints) -> Float64[np.ndarray, "frame"]:
     return np.mean((apart_m / expected_m) ** 2, axis=(1, 2))
 
 
-def of_walk_and_network(walk: Joints, network: Joints) -> Joints:
+def walk_with_network(
+    walk: Joints,
+    network: Joints,
+    shapes: Float64[np.ndarray, "body K"],
+    seen: list[Observations],
+) -> Joints:
+    """Joints told by evidence of a walk of mean bodies and by the network: of both.
+
+    The walk becomes that of bodies of the size that the network tells. Where packets were filtered
+    it stays as it is: the network, which reads noise that is put back, tells people too tall and is
+    further off than it says.
+
+    Args:
+        walk: Of all frames, shape (frame, body, 17, ·).
+        network: The same.
+        shapes: Shapes of these bodies by the network, see `skins.shapes_of`.
+        seen: The frames.
+    """
+    if any(one.packets is not None for one in seen):
+        return of_walk_and_network(walk, network, honest=False)
+    own = sized(walk, shapes, float(seen[0].bounds_m[0, 2]))
+    return of_walk_and_network(own, network)
+
+
+def of_walk_and_network(walk: Joints, network: Joints, *, honest: bool = True) -> Joints:
     """Joints told by evidence of a walk and by the network: of both, as long as they agree.
 
     Evidence finds the likeliest walk on the floor, whoever it is; the network does not assume one.
     Where they contradict each other in more than a quarter of the frames, it alone counts. If they
     do in single ones only, the walk does there: it is one walk for all frames, while the network is
-    asked for each by itself and takes a back for a front now and then. In the others the walk
-    counts the less, the further they are apart.
+    asked for each by itself and takes a back for a front now and then.
 
     Args:
-        walk: Of all frames, shape (frame, body, 17, ·), of bodies of the size that the network
-            tells, see `skins.sized`.
+        walk: Of all frames, shape (frame, body, 17, ·).
         network: The same.
+        honest: Whether the network is off by no more than it says, so that a walk too far from it
+            is further off than that says.
     """
     contradicted = contradiction(walk, network) > _CONTRADICTION
     if contradicted.mean() > _TURNED_AROUND:
         return network
-    walk = _doubted(walk, network, ~contradicted)
+    if honest:
+        walk = _doubted(walk, network, ~contradicted)
     both, lonely = combined(walk, network), contradicted[:, None, None]
     return Joints(
         np.where(lonely[..., None], walk.xyz, both.xyz),
@@ -69,5 +96,7 @@ def _doubted(walk: Joints, network: Joints, agree: Bool[np.ndarray, "frame"]) ->
 
     if excess(1.0) <= 0.0:
         return walk
-    doubt = brentq(excess, 1.0, _MOST_DOUBT) if excess(_MOST_DOUBT) < 0.0 else _MOST_DOUBT
+    doubt = _MOST_DOUBT
+    if excess(doubt) < 0.0:
+        doubt = float(root_scalar(excess, bracket=(1.0, doubt)).root)
     return Joints(walk.xyz, doubt * walk.sigma_m)

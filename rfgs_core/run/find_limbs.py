@@ -27,8 +27,8 @@ from rfgs_core.limbs.propose import (
     Joints,
     smoothed,
 )
-from rfgs_core.limbs.skins import PosedPeople, shapes_of, sized
-from rfgs_core.limbs.together import of_walk_and_network
+from rfgs_core.limbs.skins import PosedPeople, shapes_of
+from rfgs_core.limbs.together import walk_with_network
 from rfgs_core.limbs.weights import Trained, own_network
 from rfgs_core.measure.observations import Observations
 from rfgs_core.run.folder import LIMBS_FILE, Run
@@ -109,9 +109,8 @@ def find_limbs(
         if only_people and len(said) > 1:
             said = _asked_anew(trained, seen, said, tracks, config, on_frame)
         shapes = shapes_of(_side_by_side(said))
-        floor_m = float(seen[0].bounds_m[0, 2])
         told = [
-            other if one is None else of_walk_and_network(sized(one, shape[None], floor_m), other)
+            other if one is None else walk_with_network(one, other, shape[None], seen)
             for one, other, shape in zip(told, said, shapes, strict=True)
         ]
     if walks and not any(told):

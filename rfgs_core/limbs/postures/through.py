@@ -22,8 +22,8 @@ from rfgs_core.skeleton import JOINTS
 
 #: Places from which it is asked again [m]: who lies is found so far off.
 _BESIDE_M = 0.3 * np.array([[np.cos(a), np.sin(a)] for a in np.arange(8) * np.pi / 4])
-#: Frames before and after have a person elsewhere if it is so far off [m].
-_ELSEWHERE_M = 0.15
+#: Frames before and after have a person elsewhere if it is further off than these [m].
+_ELSEWHERE_M = 0.3
 #: Within this ratio of σ it is as sure wherever it is asked.
 _AS_SURE = 1.05
 

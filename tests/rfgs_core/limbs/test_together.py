@@ -3,13 +3,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rfgs_core.articulated import people
 from rfgs_core.limbs.propose import Joints, combined
 from rfgs_core.limbs.skins import sized
-from rfgs_core.limbs.together import contradiction, of_walk_and_network
+from rfgs_core.limbs.together import contradiction, of_walk_and_network, walk_with_network
+from rfgs_core.measure.observations import Observations
 from rfgs_core.worlds.motion import random_motion
 
 
@@ -45,6 +48,32 @@ def test_a_walk_far_from_the_network_counts_as_if_it_had_said_so() -> None:
         wanted, told = combined(right, network), of_walk_and_network(proud, network)
         np.testing.assert_allclose(told.xyz, wanted.xyz, atol=1e-6)
         np.testing.assert_allclose(told.sigma_m, wanted.sigma_m, rtol=1e-5)
+
+
+def test_a_walk_far_from_a_network_that_may_be_wrong_is_as_sure_as_it_says() -> None:
+    walk = Joints(np.zeros((3, 1, 17, 3)), np.full((3, 1, 17), 0.05))
+    network = Joints(np.full((3, 1, 17, 3), 0.06), np.full((3, 1, 17), 0.08))
+    assert (contradiction(walk, network) > 0.6).all()
+    told, wanted = of_walk_and_network(walk, network, honest=False), combined(walk, network)
+    np.testing.assert_array_equal(told.xyz, wanted.xyz)
+    np.testing.assert_array_equal(told.sigma_m, wanted.sigma_m)
+
+
+def test_only_where_no_packets_are_filtered_a_walk_takes_the_size_of_the_network(
+    heard_by_radars: tuple[Observations, np.ndarray],
+) -> None:
+    observations, joints = heard_by_radars
+    walk = Joints(joints[None, None], np.full((1, 1, 17), 0.06))
+    network = Joints(walk.xyz + 0.04, np.full((1, 1, 17), 0.05))
+    small = np.zeros((1, len(people().components)))
+    small[0, 0] = -2.0
+    floor_m = float(observations.bounds_m[0, 2])
+    told = walk_with_network(walk, network, small, [observations])
+    own = of_walk_and_network(sized(walk, small, floor_m), network)
+    np.testing.assert_array_equal(told.xyz, own.xyz)
+    filtered = replace(observations, packets=np.stack([observations.delta] * 2))
+    told = walk_with_network(walk, network, small, [observations, filtered])
+    np.testing.assert_array_equal(told.xyz, combined(walk, network).xyz)
 
 
 def test_a_frame_that_the_network_turns_around_is_left_to_the_walk() -> None:

@@ -37,20 +37,23 @@ def walk_with_network(
     network: Joints,
     shapes: Float64[np.ndarray, "body K"],
     seen: list[Observations],
+    *,
+    others: bool = False,
 ) -> Joints:
     """Joints told by evidence of a walk of mean bodies and by the network: of both.
 
-    The walk becomes that of bodies of the size that the network tells. Where packets were filtered
-    it stays as it is: the network, which reads noise that is put back, tells people too tall and is
-    further off than it says.
+    The walk becomes that of bodies of the size that the network tells. Beside others, or where
+    packets were filtered, it stays as it is: what is left of the others, and noise that is put
+    back, make bodies too small or too tall, and the network is further off than it says.
 
     Args:
         walk: Of all frames, shape (frame, body, 17, ·).
         network: The same.
         shapes: Shapes of these bodies by the network, see `skins.shapes_of`.
         seen: The frames.
+        others: Whether others are there.
     """
-    if any(one.packets is not None for one in seen):
+    if others or any(one.packets is not None for one in seen):
         return of_walk_and_network(walk, network, honest=False)
     own = sized(walk, shapes, float(seen[0].bounds_m[0, 2]))
     return of_walk_and_network(own, network)

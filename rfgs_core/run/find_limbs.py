@@ -109,9 +109,10 @@ def find_limbs(
         if only_people and len(said) > 1:
             said = _asked_anew(trained, seen, said, tracks, config, on_frame)
         shapes = shapes_of(_side_by_side(said))
+        others = len(said) > 1
         told = [
-            other if one is None else walk_with_network(one, other, shape[None], seen)
-            for one, other, shape in zip(told, said, shapes, strict=True)
+            other if one is None else walk_with_network(one, other, shape, seen, others=others)
+            for one, other, shape in zip(told, said, shapes[:, None], strict=True)
         ]
     if walks and not any(told):
         told = _upright(alone, tracks)

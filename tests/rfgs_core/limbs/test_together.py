@@ -59,7 +59,7 @@ def test_a_walk_far_from_a_network_that_may_be_wrong_is_as_sure_as_it_says() -> 
     np.testing.assert_array_equal(told.sigma_m, wanted.sigma_m)
 
 
-def test_only_where_no_packets_are_filtered_a_walk_takes_the_size_of_the_network(
+def test_beside_others_or_of_filtered_packets_a_walk_does_not_take_the_size_of_the_network(
     heard_by_radars: tuple[Observations, np.ndarray],
 ) -> None:
     observations, joints = heard_by_radars
@@ -71,6 +71,8 @@ def test_only_where_no_packets_are_filtered_a_walk_takes_the_size_of_the_network
     told = walk_with_network(walk, network, small, [observations])
     own = of_walk_and_network(sized(walk, small, floor_m), network)
     np.testing.assert_array_equal(told.xyz, own.xyz)
+    beside = walk_with_network(walk, network, small, [observations], others=True)
+    np.testing.assert_array_equal(beside.xyz, combined(walk, network).xyz)
     filtered = replace(observations, packets=np.stack([observations.delta] * 2))
     told = walk_with_network(walk, network, small, [observations, filtered])
     np.testing.assert_array_equal(told.xyz, combined(walk, network).xyz)

@@ -22,11 +22,7 @@ from rfgs_core.limbs.postures.tell import can_tell
 from rfgs_core.limbs.postures.tell import looks as posture_looks
 from rfgs_core.limbs.postures.tell import tell as tell_posture
 from rfgs_core.limbs.postures.through import propose_alone, propose_beside
-from rfgs_core.limbs.propose import (
-    SMOOTH_S,
-    Joints,
-    smoothed,
-)
+from rfgs_core.limbs.propose import SMOOTH_S, Joints, smoothed
 from rfgs_core.limbs.skins import PosedPeople, shapes_of
 from rfgs_core.limbs.together import walk_with_network
 from rfgs_core.limbs.weights import Trained, own_network

@@ -22,8 +22,9 @@ from rfgs_core.skeleton import JOINTS
 
 #: Places from which it is asked again [m]: who lies is found so far off.
 _BESIDE_M = 0.3 * np.array([[np.cos(a), np.sin(a)] for a in np.arange(8) * np.pi / 4])
-#: Frames before and after have a person elsewhere if it is further off than these [m].
-_ELSEWHERE_M = 0.3
+#: A place this far from the middle between those of the frames before and after may be that of an
+#: echo [m].
+_ASTRAY_M = 0.3
 #: Within this ratio of σ it is as sure wherever it is asked.
 _AS_SURE = 1.05
 
@@ -36,8 +37,8 @@ def propose_alone(
 ) -> Joints:
     """Joints of somebody with nobody else near, whom the network might find instead.
 
-    Where it is less sure than `SURE_M` it begins again from eight places around, and from where
-    the frames before and after have the person, for the place found may be that of an echo. Of
+    Where it is less sure than `SURE_M` it begins again from eight places around, and, of who is
+    astray, from where the frames before and after have them: the place found may be an echo's. Of
     each frame that counts which is surest and goes on from the frames before and after. Frames
     whose packets were filtered are asked once.
 
@@ -99,9 +100,10 @@ def propose_beside(
 def _elsewhere(
     places: Float64[np.ndarray, "frame 2"], number: int
 ) -> Float64[np.ndarray, "place 2"]:
-    """Where the frames before and after have the person, if it is not where this one does [m]."""
-    near = np.concatenate([places[max(number - 1, 0) : number], places[number + 1 : number + 2]])
-    return near[np.linalg.norm(near - places[number], axis=1) > _ELSEWHERE_M]
+    """Where the frames before and after have the person, if this one is astray from these [m]."""
+    near = places[[number - 1, number + 1]] if 0 < number < len(places) - 1 else places[:0]
+    astray = len(near) > 0 and np.linalg.norm(places[number] - near.mean(axis=0)) > _ASTRAY_M
+    return near if astray else places[:0]
 
 
 def _together(found: Joints, others: Joints) -> Joints:

@@ -19,7 +19,7 @@ _CONTRADICTION = 3.0
 _TURNED_AROUND = 0.25
 #: The same mean square where a walk is as sure as it says; 1.2 if their errors had nothing in
 #: common, but they have (correlation 0.1 to 0.7). What is more than that is put down to the walk:
-#: in every scene and random world the network is off by what it says, or less.
+#: of single people who walk, in every scene and random world, the network is off by what it says.
 _AT_ODDS = 0.5
 #: How many times less sure than it says a walk may turn out to be.
 _MOST_DOUBT = 20.0

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -18,6 +19,9 @@ from rfgs_core.outcome import run_cli
 
 #: Arguments of commands that name what they write.
 _OUTPUTS = ("out", "json", "video", "picture", "record", "markdown")
+
+#: Seconds between two states of a progress bar in a log, which nobody watches.
+_LOGGED_S = "10"
 
 
 def _say(text: str, code: int) -> int:
@@ -57,6 +61,9 @@ class Program:
             arguments: Without the program's name; None takes those of the process.
         """
         given = list(sys.argv[1:] if arguments is None else arguments)
+        if not sys.stderr.isatty():
+            # tqdm reads it as it is imported, with the module of a command.
+            os.environ.setdefault("TQDM_MININTERVAL", _LOGGED_S)
         if not given or given[0] in ("-h", "--help"):
             return run_cli(lambda: _say(self.overview(), 0 if given else 2))
         if given == ["--version"]:

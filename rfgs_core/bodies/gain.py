@@ -13,11 +13,11 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Bool, Float64
 
 from rfgs_core.bodies.body_prior import Bodies
-from rfgs_core.bodies.expected_echoes import ExpectedEchoes, middle_of
-from rfgs_core.bodies.localise import SEPARATION_M
+from rfgs_core.bodies.expected_echoes import ExpectedEchoes, doubt_of_path, middle_of
+from rfgs_core.bodies.localise import BODY_RADIUS_M, SEPARATION_M
 from rfgs_core.bodies.start import LYING_REACH_M
 from rfgs_core.limbs.evidence.entries import Pair, pairs_of
 from rfgs_core.limbs.evidence.levels import Levels, mean_power
@@ -84,18 +84,22 @@ def gain_near(
         observations: The frame.
         known: The others.
         near: The one body, about where it is; who lies keeps height and way.
-        shifts_m: Places that are tried around there [m].
+        shifts_m: Places that are tried around there [m]; of those beyond the walls, whose mirrors
+            show bodies too, none but the place itself.
     """
+    inside = in_room(near.axes_xy + shifts_m[:, :2], observations.bounds_m)
+    shifts_m = shifts_m[inside | ~shifts_m.any(axis=1)]
     floor_m = float(observations.bounds_m[0, 2])
     pairs = pairs_of(observations, middle_of(near, floor_m))
     others = [ExpectedEchoes.at(known.only(body), floor_m, pairs) for body in range(len(known))]
     new = ExpectedEchoes.at(near, floor_m, pairs)
     fits, tried, brightness = [], [], []
     for pair in pairs:
-        straight = [body.echoes(pair) for body in others]
+        doubt = doubt_of_path(pair)
+        straight = [body.echoes(pair) * doubt for body in others]
         bounces = [body.by_bounces(pair, observations.bounds_m) for body in others]
         fits.append(Levels.fitted(pair.change, [*straight, *bounces]))
-        tried.append([new.echoes(pair, shift) for shift in shifts_m])
+        tried.append([new.echoes(pair, shift) * doubt for shift in shifts_m])
         brightness += [
             level * pair.scale**2 / mean_power(part)
             for level, part in zip(fits[-1].level[1:], straight, strict=False)
@@ -190,6 +194,14 @@ def stands_clear(known: Bodies, place: Float64[np.ndarray, "2"]) -> bool:
     """
     apart_m = np.where(known.lies, LYING_REACH_M, SEPARATION_M)
     return bool((np.linalg.norm(known.axes_xy - place, axis=1) >= apart_m).all())
+
+
+def in_room(
+    places_xy: Float64[np.ndarray, "place 2"], bounds_m: Float64[np.ndarray, "2 3"]
+) -> Bool[np.ndarray, "place"]:
+    """Which places have space for a body within the walls."""
+    low, high = bounds_m[:, :2] + np.array([[BODY_RADIUS_M], [-BODY_RADIUS_M]])
+    return ((places_xy >= low) & (places_xy <= high)).all(axis=1)
 
 
 def _hidden(pair: Pair, known: Bodies, place_xy: Float64[np.ndarray, "2"]) -> bool:

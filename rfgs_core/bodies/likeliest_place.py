@@ -18,8 +18,8 @@ from jaxtyping import Complex64, Float, Float64
 from rfgs_core.bodies.body_prior import Bodies
 from rfgs_core.bodies.expected_echoes import ExpectedEchoes, middle_of
 from rfgs_core.bodies.gain import FEWEST_PAIRS as FEWEST_TO_CHOOSE
-from rfgs_core.bodies.gain import stands_clear
-from rfgs_core.bodies.localise import BODY_RADIUS_M, NEAR_M, SEPARATION_M, PairMaps, highest_peaks
+from rfgs_core.bodies.gain import in_room, stands_clear
+from rfgs_core.bodies.localise import NEAR_M, SEPARATION_M, PairMaps, highest_peaks
 from rfgs_core.limbs.evidence.entries import pairs_of
 from rfgs_core.limbs.evidence.levels import Levels
 from rfgs_core.measure.observations import Observations
@@ -113,12 +113,11 @@ def _climbed(
     others: Bodies,
 ) -> tuple[Float64[np.ndarray, "2"], float]:
     """The likeliest place uphill from one, in the room and apart from others."""
-    low, high = observations.bounds_m[:, :2] + np.array([[BODY_RADIUS_M], [-BODY_RADIUS_M]])
     step_m, likely = _FIRST_STEP_M, evidence.at(here)
     while step_m >= _LAST_STEP_M:
         around = here + step_m * _WAYS
-        inside = ((around >= low) & (around <= high)).all(axis=1)
-        tried = [place for place in around[inside] if stands_clear(others, place)]
+        inside = around[in_room(around, observations.bounds_m)]
+        tried = [place for place in inside if stands_clear(others, place)]
         values = [evidence.at(place) for place in tried]
         best = int(np.argmax(values)) if values else -1
         if values and values[best] > likely:

@@ -183,8 +183,8 @@ class CostBar:
     def step(self, said: str) -> None:
         """A step of the refinement is done."""
         self._steps += 1
+        self._bar.set_postfix_str(said, refresh=False)
         self._advance(self._costs.step_s)
-        self._bar.set_postfix_str(said)
 
     def finish_frame(self) -> None:
         """A frame is fitted: what it took is what the others are taken to cost."""

@@ -205,7 +205,7 @@ def random_world(
         place: Extent and devices; None draws them.
 
     Raises:
-        RfgsError: The radio's antennas move, or nobody finds room.
+        RfgsError: The radio's antennas move, or people or devices find no room.
     """
     settings.check()
     refuse_radio(radio)
@@ -219,12 +219,10 @@ def random_world(
             actors = cast_of(
                 rng, setting, count, settings.lasts_s, settings.families, settings.recordings
             )
+            kind, devices = _devices(rng, radio, setting, actors, settings, place)
         except RfgsError:
+            # Too small for these people, or for the radio's arrays along its walls.
             continue
-        if place is None:
-            kind, devices = _devices(rng, radio, setting, actors, settings)
-        else:
-            kind, devices = replace(radio, num_devices=len(place.devices)), list(place.devices)
         stands = [np.array(device.position_m) for device in devices]
         clear = [setting.clear_of_furniture(point, _FROM_DEVICE_M) for point in stands]
         if not devices or not all(clear):
@@ -236,8 +234,8 @@ def random_world(
         setting.materials.append(SlabMaterial(SKIN, MATERIALS[SKIN].thickness_m))
         return World(index, setting, kind, devices, actors)
     raise RfgsError(
-        f"world {index}: none of {_ROOMS} rooms has space for its people and is small enough for "
-        f"radio {radio.name!r}; ask for fewer people or frames, or more subcarriers"
+        f"world {index}: none of {_ROOMS} rooms has space for its people and devices and is small "
+        f"enough for radio {radio.name!r}; ask for fewer people or frames, or more subcarriers"
     )
 
 
@@ -247,8 +245,15 @@ def _devices(
     setting: Setting,
     actors: list[Actor],
     settings: WorldSettings,
+    place: Place | None,
 ) -> tuple[Radio, list[DevicePose]]:
-    """Three to six devices, by the radio's own rule or anywhere; none where they find no place."""
+    """Those of a place, or three to six by the radio's rule or anywhere; none without room.
+
+    Raises:
+        RfgsError: The room is too small for the radio's rule.
+    """
+    if place is not None:
+        return replace(radio, num_devices=len(place.devices)), list(place.devices)
     count = int(rng.integers(_DEVICES[0], _DEVICES[1] + 1))
     heights = tuple(float(z) for z in rng.uniform(*_HEIGHTS_M, count))
     kind = replace(

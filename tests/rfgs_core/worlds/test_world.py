@@ -33,6 +33,16 @@ def test_number_and_seed_are_a_world() -> None:
         assert not np.array_equal(one.setting.bounds_m, other.setting.bounds_m)
 
 
+def test_rooms_too_small_for_arrays_along_their_walls_are_drawn_anew() -> None:
+    settings = WorldSettings(frames=1, people=(1, 1))
+    radio = preset("uwb")
+    inset_m, array_m = 0.1, 3.0
+    for index in range(12):
+        world = random_world(radio, settings, 3133, index)
+        sides_m = np.diff(world.setting.bounds_m[:, :2], axis=0)[0] - 2 * inset_m
+        assert 2 * (sides_m // array_m).sum() >= len(world.devices) == radio.num_devices
+
+
 def test_people_stay_within_their_room_and_out_of_all_that_stands_there(worlds) -> None:
     beds = 0
     for world in worlds:

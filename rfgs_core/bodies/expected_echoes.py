@@ -23,9 +23,6 @@ from rfgs_core.worlds.figure import Figure
 _HEADINGS_RAD = (0.0, 0.5 * math.pi)
 #: Nor is at which end of who lies the head is.
 _ENDS_RAD = (0.0, math.pi)
-#: Nor are pose and shape: echoes come from so much nearer or farther than from the mean body that
-#: stands, out and back (deviation) [m].
-PATH_DEVIATION_M = 0.2
 #: From looking along x to lying on the back, the head towards x.
 _ON_BACK = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 
@@ -67,21 +64,6 @@ class ExpectedEchoes(NamedTuple):
         images = evidence.images_of(pair, bounds_m, self.middle)
         parts = [evidence.by_bounces(one.facets, pair, images) for one in self.ways]
         return np.sum(parts, axis=0)
-
-
-def doubt_of_path(pair: Pair) -> Float64[np.ndarray, "entry entry"]:
-    """What a covariance is multiplied by whose echoes may all come a little sooner or later.
-
-    A path that is off by a normal δ turns bands m and n against each other by (k_m − k_n) δ, on
-    average exp(−½ σ² (k_m − k_n)²) with σ of `PATH_DEVIATION_M`: little between bands of Wi-Fi, all
-    between such as resolve less than that.
-    """
-    bands = pair.bands
-    k = bands.first_k + bands.step_k * np.arange(len(bands.block))
-    visible = bands.block >= 0
-    middle_k = np.bincount(bands.block[visible], k[visible]) / np.bincount(bands.block[visible])
-    entry_k = np.tile(middle_k, len(pair.change) // len(middle_k))
-    return np.exp(-0.5 * (PATH_DEVIATION_M * (entry_k[:, None] - entry_k)) ** 2)
 
 
 def middle_of(one: Bodies, floor_m: float) -> Float64[np.ndarray, "3"]:

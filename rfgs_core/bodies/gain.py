@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Bool, Float64
 
 from rfgs_core.bodies.body_prior import Bodies
-from rfgs_core.bodies.expected_echoes import ExpectedEchoes, doubt_of_path, middle_of
+from rfgs_core.bodies.expected_echoes import ExpectedEchoes, middle_of
 from rfgs_core.bodies.localise import BODY_RADIUS_M, SEPARATION_M
 from rfgs_core.bodies.start import LYING_REACH_M
 from rfgs_core.limbs.evidence.entries import Pair, pairs_of
@@ -95,11 +95,10 @@ def gain_near(
     new = ExpectedEchoes.at(near, floor_m, pairs)
     fits, tried, brightness = [], [], []
     for pair in pairs:
-        doubt = doubt_of_path(pair)
-        straight = [body.echoes(pair) * doubt for body in others]
+        straight = [body.echoes(pair) for body in others]
         bounces = [body.by_bounces(pair, observations.bounds_m) for body in others]
         fits.append(Levels.fitted(pair.change, [*straight, *bounces]))
-        tried.append([new.echoes(pair, shift) * doubt for shift in shifts_m])
+        tried.append([new.echoes(pair, shift) for shift in shifts_m])
         brightness += [
             level * pair.scale**2 / mean_power(part)
             for level, part in zip(fits[-1].level[1:], straight, strict=False)

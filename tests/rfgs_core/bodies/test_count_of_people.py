@@ -11,8 +11,7 @@ import pytest
 from lit_bodies import echoing, lit
 
 from rfgs_core.bodies.body_prior import Bodies
-from rfgs_core.bodies.count import ALONE_SHARE, OF_OTHERS, TO_COUNT, count_bodies, one_more_counts
-from rfgs_core.bodies.expected_echoes import PATH_DEVIATION_M, doubt_of_path
+from rfgs_core.bodies.count import OF_OTHERS, TO_COUNT, count_bodies, one_more_counts
 from rfgs_core.bodies.gain import (
     FEWEST_PAIRS,
     NOBODY,
@@ -23,7 +22,6 @@ from rfgs_core.bodies.gain import (
     stands_clear,
 )
 from rfgs_core.bodies.localise import BODY_RADIUS_M
-from rfgs_core.limbs.evidence.entries import pairs_of
 from rfgs_core.measure.observations import Observations
 from rfgs_core.radio import preset
 from rfgs_core.settings import TrainConfig
@@ -196,29 +194,6 @@ def test_next_to_strong_evidence_a_faint_one_is_nobody() -> None:
     strong = 4.0 * TO_COUNT / OF_OTHERS
     assert one_more_counts([of(2.0 * TO_COUNT)])
     assert not one_more_counts([of(strong), of(strong), of(2.0 * TO_COUNT)])
-
-
-def test_a_path_that_may_be_off_is_the_mean_over_where_it_may_be(empty: Observations) -> None:
-    pair = pairs_of(empty, np.array([2.0, 2.0, 1.0]))[0]
-    bands = pair.bands
-    k = bands.first_k + bands.step_k * np.arange(len(bands.block))
-    middle_k = [k[bands.block == band].mean() for band in range(len(bands.share))]
-    off_m = PATH_DEVIATION_M * np.random.default_rng(3).standard_normal(40_000)
-    heard = np.exp(1j * np.outer(np.resize(middle_k, len(pair.change)), off_m))
-    over_all = heard @ heard.conj().T / len(off_m)
-    assert np.abs(over_all - doubt_of_path(pair)).max() < 0.02
-    # Bands are fastest: entries of one band of different antennas stay together.
-    assert doubt_of_path(pair)[0, len(middle_k)] == 1.0
-
-
-@pytest.mark.parametrize("seed", [1, 2])
-def test_a_wide_band_hears_who_is_of_another_shape(
-    make_observations: Callable[..., Observations], seed: int
-) -> None:
-    radio = replace(preset("uwb"), rx_cols=4, num_subcarriers=96)
-    wide = make_observations(radio=radio, bounds_m=ROOM_M)
-    seen = noisy(lit(wide, BODIES[:1], seed, radius_m=0.25), 0.1)
-    assert gain_near(seen, NOBODY, upright(BODIES[0])).heard >= ALONE_SHARE
 
 
 def test_evidence_does_not_lead_through_a_wall_to_its_mirror_of_a_body(empty: Observations) -> None:

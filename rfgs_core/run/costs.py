@@ -52,7 +52,7 @@ USUAL_GAUSSIANS = 6000
 USUAL_POINT_S, USUAL_PAPER_STEP_S, USUAL_PAPER_GAUSSIAN_S = 3e-4, 0.01, 2e-6
 #: Looks at a frame there while people are posed [s].
 USUAL_LOOK_S = 0.5
-#: Counting people in a frame there [s].
+#: Counting people in a frame there, times the square of their number [s].
 USUAL_COUNT_S = 6.0
 #: PLY, features and checkpoint of a Gaussian of a frame [B].
 BYTES_PER_GAUSSIAN = 420.0
@@ -90,10 +90,19 @@ def pose_stage(run: Run, looks: int) -> Stage:
     return Stage("pose", "train-pose", what, looks, Speed(0.0, USUAL_LOOK_S))
 
 
-def count_stage(sequence: Sequence, radio: str, votes: int) -> Stage:
-    """Counting people before anything is fitted, in so many frames."""
-    what = [radio, sequence.layout(radio).measured.shape]
-    return Stage("count", "train-count", what, votes, Speed(0.0, USUAL_COUNT_S))
+def count_stage(sequence: Sequence, radio: str, votes: int, instances: int) -> Stage:
+    """Counting people before anything is fitted, in so many frames.
+
+    Args:
+        sequence: The data.
+        radio: Which radio.
+        votes: In how many frames.
+        instances: People that the dataset has, which says nothing but how long it may take: each is
+            settled beside all others.
+    """
+    what = [radio, sequence.layout(radio).measured.shape, instances]
+    usual_s = USUAL_COUNT_S * max(instances, 1) ** 2
+    return Stage("count", "train-count", what, votes, Speed(0.0, usual_s))
 
 
 def count_price(stage: Stage) -> str:

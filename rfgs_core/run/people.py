@@ -154,7 +154,7 @@ def counted(
         kept = HeadCount(told(sequence), "told")
     if kept is not None and people in ("auto", kept.source):
         return kept
-    stage = count_stage(sequence, radio, votes_of(frames))
+    stage = count_stage(sequence, radio, votes_of(frames), told(sequence))
     with (
         tqdm(total=stage.steps, desc="counting people", delay=1.0) as bar,
         speed_noted(stage) as clock,

@@ -13,7 +13,7 @@ import pytest
 
 from rfgs_core.past import forecast
 from rfgs_core.run import costs
-from rfgs_core.run.costs import USUAL, CostBar, Costs, expected, price_line, stages
+from rfgs_core.run.costs import USUAL, CostBar, Costs, count_stage, expected, price_line, stages
 from rfgs_core.settings import TrainConfig, TrainOptions
 
 STEPS = 10
@@ -104,6 +104,14 @@ def test_posing_people_is_part_of_the_price(clock: Clock, run: Any) -> None:
 
     more = seconds(price_line(run, looks=40)) - seconds(price_line(run))
     assert more == pytest.approx(40 * costs.USUAL_LOOK_S, abs=1.0)
+
+
+def test_counting_several_people_is_said_to_take_longer(run: Any) -> None:
+    def seconds(instances: int) -> float:
+        return forecast([count_stage(run.sequence, "wifi", 3, instances)]).total_s
+
+    assert seconds(0) == pytest.approx(seconds(1))
+    assert seconds(4) == pytest.approx(16 * seconds(1))
 
 
 def test_a_damaged_note_stops_no_training(clock: Clock, run: Any, tmp_path: Path) -> None:

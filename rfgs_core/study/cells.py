@@ -31,7 +31,15 @@ from rfgs_core.seals import read_sealed_json, write_sealed_json
 from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import TrainConfig
 from rfgs_core.study.cases import EVERY_SCENE
-from rfgs_core.study.paper_tables import ABLATED, CHANNEL_FIELDS, FIELDS, TRAINED, Cell, Size
+from rfgs_core.study.paper_tables import (
+    ABLATED,
+    CHANNEL_FIELDS,
+    FIELD_POINTS,
+    FIELDS,
+    TRAINED,
+    Cell,
+    Size,
+)
 from rfgs_core.threads import one_torch_thread
 
 
@@ -105,7 +113,8 @@ def train_config(cell: Cell, size: Size) -> TrainConfig:
     steps = size.paper_steps if options.recipe == "paper" else None
     config = TrainConfig.chosen(replace(options, seed=cell.seed), iterations=steps)
     if options.recipe == "paper":
-        config = replace(config, grid_side=size.grid_side, refine_levels=size.refine_levels)
+        points = FIELD_POINTS if cell.method in FIELDS else (size.grid_side, size.refine_levels)
+        config = replace(config, grid_side=points[0], refine_levels=points[1])
     return config
 
 

@@ -28,6 +28,7 @@ from rfgs_core.study.paper_tables import (
     TRAINED,
     Cell,
     Size,
+    SizeName,
     cells,
     narrowed,
 )
@@ -112,6 +113,17 @@ def test_the_papers_recipe_has_both_starts_in_both_tables() -> None:
         assert starts["paper_prior"] == ("prior", 6000, "paper")
         assert starts["rfgs"] == ("prior", 6000, "csi")
     assert {start for start, *_ in starts.values()} == {"prior", "random"}
+
+
+@pytest.mark.parametrize("size", ["smoke", "paper-cpu", "full"])
+def test_fields_have_the_points_that_their_settings_were_searched_with(size: SizeName) -> None:
+    def points(method: str) -> tuple[int, int]:
+        cell = Cell("living_room_walk", "wifi", method, 0)
+        train = settings_of(cell, SIZES[size])["train"]
+        return train["grid_side"], train["refine_levels"]
+
+    assert {points(method) for method in FIELDS} == {(32, 2)}
+    assert points("paper") == (SIZES[size].grid_side, SIZES[size].refine_levels)
 
 
 def test_every_radio_is_traced_as_deep_as_it_can_be() -> None:

@@ -231,6 +231,7 @@ class Fields(Part):
         from rfgs_core.frames import chosen_frames
         from rfgs_core.neural.settings import FieldSettings
         from rfgs_core.settings import TrainConfig
+        from rfgs_core.study.paper_tables import FIELD_POINTS
 
         need_at_least_one(steps=self.steps)
         dataset = open_dataset(self.dataset)
@@ -238,7 +239,8 @@ class Fields(Part):
         frame = chosen_frames(None if self.frame is None else str(self.frame), frames)[0]
         tried = candidates(self.steps or FieldSettings().steps)
         with tqdm(total=len(tried), desc="fields") as bar:
-            rows = search(dataset, self.radio, frame, TrainConfig(grid_side=32), tried, bar.update)
+            points = TrainConfig(grid_side=FIELD_POINTS[0], refine_levels=FIELD_POINTS[1])
+            rows = search(dataset, self.radio, frame, points, tried, bar.update)
         note(search_table(rows))
         names = ("kind", "objective", "learning_rate", "octaves", "finest_m", "contrast")
         table = {

@@ -196,9 +196,10 @@ def test_next_to_strong_evidence_a_faint_one_is_nobody() -> None:
     assert not one_more_counts([of(strong), of(strong), of(2.0 * TO_COUNT)])
 
 
-def test_evidence_does_not_lead_through_a_wall_to_its_mirror_of_a_body(empty: Observations) -> None:
+@pytest.mark.parametrize("behind_m", [0.5, 1.2])
+def test_evidence_does_not_lead_through_a_wall(empty: Observations, behind_m: float) -> None:
     high_x = float(ROOM_M[1, 0])
-    behind = [(high_x + 0.5, 1.6)]
+    behind = [(high_x + behind_m, 1.6)]
     seen = noisy(lit(empty, behind, seed=2), 0.1)
     best = gain_near(seen, NOBODY, upright((high_x - 0.3, 1.6)))
     assert climbed(seen, NOBODY, best).place_xy[0] <= high_x - BODY_RADIUS_M

@@ -17,7 +17,7 @@ from jaxtyping import Bool, Float64
 
 from rfgs_core.bodies.body_prior import Bodies
 from rfgs_core.bodies.expected_echoes import ExpectedEchoes, middle_of
-from rfgs_core.bodies.localise import BODY_RADIUS_M, SEPARATION_M
+from rfgs_core.bodies.localise import SEPARATION_M, standing_room
 from rfgs_core.bodies.start import LYING_REACH_M
 from rfgs_core.limbs.evidence.entries import Pair, pairs_of
 from rfgs_core.limbs.evidence.levels import Levels, mean_power
@@ -199,7 +199,7 @@ def in_room(
     places_xy: Float64[np.ndarray, "place 2"], bounds_m: Float64[np.ndarray, "2 3"]
 ) -> Bool[np.ndarray, "place"]:
     """Which places have space for a body within the walls."""
-    low, high = bounds_m[:, :2] + np.array([[BODY_RADIUS_M], [-BODY_RADIUS_M]])
+    low, high = standing_room(bounds_m)
     return ((places_xy >= low) & (places_xy <= high)).all(axis=1)
 
 

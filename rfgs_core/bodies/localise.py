@@ -214,7 +214,7 @@ def highest_peaks(
         near: Where bodies are expected; None for anywhere.
         reach_m: How far around each of `near` to look [m].
     """
-    low, high = bounds_m[:, :2] + np.array([[BODY_RADIUS_M], [-BODY_RADIUS_M]])
+    low, high = standing_room(bounds_m)
     axes = [np.arange(low[k], high[k] + 1e-9, GROUND_STEP_M) for k in range(2)]
     ground = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
     if near is not None:
@@ -224,6 +224,11 @@ def highest_peaks(
         ground = ground[(distance_m <= within).any(axis=1)]
     score = _visible_side_score(maps, ground, float(bounds_m[0, 2]))
     return _means_around(ground, score, _separate_peaks(ground, score, count))
+
+
+def standing_room(bounds_m: Float64[np.ndarray, "2 3"]) -> Float64[np.ndarray, "2 2"]:
+    """Lowest and highest x and y that leave a body space within the walls [m]."""
+    return bounds_m[:, :2] + np.array([[BODY_RADIUS_M], [-BODY_RADIUS_M]])
 
 
 def in_order_of(

@@ -1,21 +1,41 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One torch thread where tensors are small: faster, and sums do not depend on the cores."""
+"""How many threads work: many where kernels and matrices are large, one where tensors are small."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from typing import TypeVar
 
-import torch
+import numba
+
+Item = TypeVar("Item")
+Found = TypeVar("Found")
+
+
+def in_threads(work: Callable[[Item], Found], items: Iterable[Item]) -> list[Found]:
+    """What some work makes of each item, as many at a time as numba has threads.
+
+    Args:
+        work: Its kernels and routines let other threads go on.
+        items: What it is given.
+    """
+    if numba.get_num_threads() == 1:
+        return [work(item) for item in items]
+    with ThreadPoolExecutor(numba.get_num_threads()) as pool:
+        return list(pool.map(work, items))
 
 
 @contextmanager
 def one_torch_thread() -> Iterator[None]:
-    """Runs torch on one thread within the block; compiled kernels keep all theirs.
+    """Runs torch on one thread within the block: faster where tensors are small.
 
-    Two thread pools on few cores wait for each other, and the order of torch's sums follows
-    the number of threads.
+    Compiled kernels keep all their threads. Two thread pools on few cores wait for each other, and
+    the order of torch's sums follows the number of threads.
     """
+    import torch
+
     before = torch.get_num_threads()
     torch.set_num_threads(1)
     try:

@@ -8,8 +8,10 @@ trunk, two thighs and two shins, and knees that point somewhere.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 from jaxtyping import Bool, Float, Float64, Int64
 
@@ -90,22 +92,12 @@ class _Limb:
     end: Float64[np.ndarray, "3"]
     radius_m: float
 
-    def offsets(self, points: Float[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 3"]:
-        """From the nearest point of the line to each point [m]."""
-        along = self.end - self.start
-        share = np.clip((points - self.start) @ along / (along @ along), 0.0, 1.0)
-        return points - self.start - share[:, None] * along
-
-    def log_density(self, offsets: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N"]:
-        """Unnormalised; an upright limb ends more sharply than it is wide."""
+    def row(self, body: int) -> list[float]:
+        """Numbers for `_likeliest_limb`: start, end, deviation across and upwards, and whose."""
+        # An upright limb ends more sharply than it is wide.
         upright = self.start[0] == self.end[0] and self.start[1] == self.end[1]
-        deviation = [self.radius_m, self.radius_m, END_FALL_M if upright else self.radius_m]
-        return -0.5 * np.sum((offsets / deviation) ** 2, axis=1)
-
-    def away(self, offsets: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 3"]:
-        """Across the line, also beyond its ends [m]."""
-        along = (self.end - self.start) / np.linalg.norm(self.end - self.start)
-        return offsets - np.outer(offsets @ along, along)
+        up_m = END_FALL_M if upright else self.radius_m
+        return [*self.start.tolist(), *self.end.tolist(), self.radius_m, up_m, float(body)]
 
 
 def _limbs(bodies: Bodies, body: int) -> list[_Limb]:
@@ -138,7 +130,7 @@ def nearest_axis(
     points: Float[np.ndarray, "N 3"], axes_xy: Float[np.ndarray, "body 2"]
 ) -> Int64[np.ndarray, "N"]:
     """Which body axis is nearest to each point, seen from above."""
-    return np.linalg.norm(points[:, None, :2] - axes_xy[None], axis=2).argmin(axis=1)
+    return _nearest_to_each(np.asarray(points, np.float64), np.asarray(axes_xy, np.float64))
 
 
 def surface_prior(
@@ -155,20 +147,67 @@ def surface_prior(
     Returns:
         Log density, and unit normals away from the limb; a normal on the line itself is zero.
     """
-    whose = nearest_axis(points, bodies.axes_xy)
-    density, normals = np.full(len(points), -np.inf), np.zeros((len(points), 3))
-    for body in range(len(bodies)):
-        own = np.flatnonzero(whose == body)
-        for limb in _limbs(bodies, body):
-            offsets = limb.offsets(points[own])
-            log = limb.log_density(offsets)
-            better = log > density[own]
-            density[own[better]] = log[better]
-            normals[own[better]] = limb.away(offsets)[better]
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    return density, normals / np.maximum(length, 1e-9)
+    rows = [limb.row(body) for body in range(len(bodies)) for limb in _limbs(bodies, body)]
+    return _likeliest_limb(
+        np.asarray(points, np.float64), bodies.axes_xy,
+        np.array(rows, dtype=np.float64).reshape(-1, 9),
+    )  # fmt: skip
 
 
 def outward_normals(points: Float[np.ndarray, "N 3"], bodies: Bodies) -> Float64[np.ndarray, "N 3"]:
     """Unit directions away from the likeliest limb of the nearest body; see `surface_prior`."""
     return surface_prior(points, bodies)[1]
+
+
+@numba.njit(cache=True, nogil=True)
+def _nearest(point: np.ndarray, axes_xy: np.ndarray) -> int:
+    """Which axis is nearest to a point, seen from above; −1 where there is none."""
+    whose, least = -1, np.inf
+    for body in range(len(axes_xy)):
+        x, y = point[0] - axes_xy[body, 0], point[1] - axes_xy[body, 1]
+        if x * x + y * y < least:
+            whose, least = body, x * x + y * y
+    return whose
+
+
+@numba.njit(cache=True, nogil=True)
+def _nearest_to_each(points: np.ndarray, axes_xy: np.ndarray) -> np.ndarray:
+    """`_nearest` of every point."""
+    whose = np.zeros(len(points), np.int64)
+    for i in range(len(points)):
+        whose[i] = _nearest(points[i], axes_xy)
+    return whose
+
+
+@numba.njit(cache=True, nogil=True)
+def _likeliest_limb(
+    points: np.ndarray, axes_xy: np.ndarray, limbs: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """`surface_prior` of limbs that are rows of numbers, see `_Limb.row`."""
+    density, normals = np.full(len(points), -np.inf), np.zeros((len(points), 3))
+    off, along, across = np.zeros(3), np.zeros(3), np.zeros(3)
+    for i in range(len(points)):
+        whose = _nearest(points[i], axes_xy)
+        for limb in limbs:
+            if int(limb[8]) != whose:
+                continue
+            squared_m, share = 0.0, 0.0
+            for k in range(3):
+                along[k] = limb[3 + k] - limb[k]
+                squared_m += along[k] * along[k]
+                share += along[k] * (points[i, k] - limb[k])
+            share = min(max(share / squared_m, 0.0), 1.0)
+            log, ahead = 0.0, 0.0
+            for k in range(3):
+                off[k] = points[i, k] - limb[k] - share * along[k]
+                log -= 0.5 * (off[k] / limb[7 if k == 2 else 6]) ** 2
+                ahead += off[k] * along[k] / squared_m
+            if log > density[i]:
+                density[i] = log
+                # Across the limb, also beyond its ends.
+                for k in range(3):
+                    across[k] = off[k] - ahead * along[k]
+                length = math.sqrt(across[0] ** 2 + across[1] ** 2 + across[2] ** 2)
+                for k in range(3):
+                    normals[i, k] = across[k] / max(length, 1e-9)
+    return density, normals

@@ -13,7 +13,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float64
+from jaxtyping import Bool, Complex64, Float64
 
 from rfgs_core.bodies.body_prior import Bodies
 from rfgs_core.bodies.expected_echoes import ExpectedEchoes, middle_of
@@ -22,6 +22,7 @@ from rfgs_core.bodies.start import LYING_REACH_M
 from rfgs_core.limbs.evidence.entries import Pair, pairs_of
 from rfgs_core.limbs.evidence.levels import Levels, mean_power
 from rfgs_core.measure.observations import Observations
+from rfgs_core.threads import in_threads
 
 #: A pair would hear a body that raises its log-likelihood by at least this on average [nat].
 AUDIBLE = 5.0
@@ -72,6 +73,20 @@ class Gain(NamedTuple):
         return float(np.mean(self.by_pair[audible] > 0.0)) if audible.any() else 0.0
 
 
+class _Tried(NamedTuple):
+    """What one device pair says of a body at some places."""
+
+    pair: Pair
+    fit: Levels
+    """The levels of the others without it."""
+    parts: list[Complex64[np.ndarray, "entry entry"]]
+    """Covariance of the body's straight echoes at each place."""
+    rises: Float64[np.ndarray, "place"]
+    """How much the log-likelihood rises with it, at least [nat]."""
+    brightness: list[float]
+    """Level of each of the others, over what is expected of it."""
+
+
 def gain_near(
     observations: Observations,
     known: Bodies,
@@ -93,33 +108,38 @@ def gain_near(
     pairs = pairs_of(observations, middle_of(near, floor_m))
     others = [ExpectedEchoes.at(known.only(body), floor_m, pairs) for body in range(len(known))]
     new = ExpectedEchoes.at(near, floor_m, pairs)
-    fits, tried, brightness = [], [], []
-    for pair in pairs:
+
+    def tried_by(pair: Pair) -> _Tried:
         straight = [body.echoes(pair) for body in others]
         bounces = [body.by_bounces(pair, observations.bounds_m) for body in others]
-        fits.append(Levels.fitted(pair.change, [*straight, *bounces]))
-        tried.append([new.echoes(pair, shift) for shift in shifts_m])
-        brightness += [
+        fit = Levels.fitted(pair.change, [*straight, *bounces])
+        parts = [new.echoes(pair, shift) for shift in shifts_m]
+        brightness = [
             level * pair.scale**2 / mean_power(part)
-            for level, part in zip(fits[-1].level[1:], straight, strict=False)
+            for level, part in zip(fit.level[1:], straight, strict=False)
             if part.any() and pair.change.any()
         ]
-    rises = [fit.rises(parts) for fit, parts in zip(fits, tried, strict=True)]
-    best = int(np.sum(rises, axis=0).argmax())
-    by_pair, expected = np.zeros(len(pairs)), np.full(len(pairs), 0.0 if others else np.inf)
+        return _Tried(pair, fit, parts, fit.rises(parts), brightness)
+
+    tried = in_threads(tried_by, pairs)
+    best = int(np.sum([one.rises for one in tried], axis=0).argmax())
+    bright = [value for one in tried for value in one.brightness] or [0.0]
     seen = [not _hidden(pair, known, near.axes_xy[0]) for pair in pairs]
     if sum(seen) < FEWEST_PAIRS:
         # Two pairs agree by chance on an echo off a wall: then all have a say.
         seen = [True] * len(pairs)
-    for row, (pair, fit) in enumerate(zip(pairs, fits, strict=True)):
-        part = tried[row][best]
+
+    def gained(row: int) -> tuple[float, float]:
+        pair, fit, part = tried[row].pair, tried[row].fit, tried[row].parts[best]
         with_it = fit.with_part(part)
-        if pair.change.any():
-            by_pair[row] = with_it.log_likelihood - fit.log_likelihood
-        by_pair[row] -= 0.5 * math.log(len(pair.change))
-        if others and seen[row]:
-            level = float(np.median(brightness or [0.0])) * mean_power(part) / pair.scale**2
-            expected[row] = with_it.expected_rise(level)
+        rise = with_it.log_likelihood - fit.log_likelihood if pair.change.any() else 0.0
+        rise -= 0.5 * math.log(len(pair.change))
+        if not others:
+            return rise, np.inf
+        level = float(np.median(bright)) * mean_power(part) / pair.scale**2
+        return rise, with_it.expected_rise(level) if seen[row] else 0.0
+
+    by_pair, expected = np.array(in_threads(gained, range(len(pairs)))).reshape(-1, 2).T
     there = replace(near, axes_xy=near.axes_xy + shifts_m[best, :2])
     outermost = np.abs(shifts_m[best]).max() == np.abs(shifts_m).max() > 0.0
     return Gain(there, by_pair, expected, bool(outermost))

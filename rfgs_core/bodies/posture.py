@@ -11,34 +11,27 @@ knows which echoes fit together.
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Complex64, Float, Float64
-from scipy.linalg import eigh
+from jaxtyping import Float, Float64
 
 from rfgs_core.bodies.body_prior import Bodies, outward_normals
 from rfgs_core.bodies.localise import PairMaps, pair_maps
+from rfgs_core.bodies.pair_sample import PairSample, pair_samples
 from rfgs_core.bodies.separation import each_alone
 from rfgs_core.bodies.start import StartCells, StartDensity
 from rfgs_core.measure.observations import Observations
-from rfgs_core.model.head import SHARPNESS, dimming
-from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import TrainConfig
+from rfgs_core.threads import in_threads
 
 #: Gaussians that stand for a body.
 GAUSSIANS = 1500
 #: Entries (links times subcarriers) that are read of all device pairs together, and at most of one
-# at a
-#: time. Of few pairs others are read, with other Gaussians, in several rounds: what one round says
-#: of a single pair may be 100 nat off.
+#: at a time. Of few pairs others are read, with other Gaussians, in several rounds: what one round
+#: says of a single pair may be 100 nat off.
 ENTRIES, MOST_ENTRIES, MOST_ROUNDS = 4096, 256, 4
-#: Links that are read of a pair; the other entries are subcarriers.
-LINKS = 32
-#: Shares of noise that are tried, against the mean power of the echoes.
-NOISE_SHARES = 10.0 ** np.arange(-3.0, 1.01, 0.25)
 #: Directions of knees that are tried.
 DIRECTIONS = 8
 #: Somebody who stands may be this far from the place that was found [m]: legs that point to where
@@ -49,88 +42,6 @@ SHIFTS_M = (0.1, 0.2)
 MOST_PER_PAIR, FEWEST_PAIRS = 10.0, 8
 #: Evidence that it takes to call somebody seated [nat].
 TO_SIT = 15.0
-
-
-@dataclass(frozen=True)
-class PairSample:
-    """Some visible links and subcarriers of one device pair."""
-
-    tx_xyz: Float64[np.ndarray, "link 3"]
-    """Transmitting elements [m]."""
-    rx_xyz: Float64[np.ndarray, "link 3"]
-    """Receiving elements [m]."""
-    freq_hz: Float64[np.ndarray, "subcarrier"]
-    """Subcarriers [Hz]."""
-    change: Complex64[np.ndarray, "entry"]
-    """Channel change of these links and subcarriers, subcarriers fastest."""
-
-    def log_likelihood(
-        self, points: Float64[np.ndarray, "M 3"], normals: Float64[np.ndarray, "M 3"]
-    ) -> float:
-        """Log evidence of Gaussians of equal power, at their best level and share of noise.
-
-        Zero where nothing is heard, which speaks for no posture.
-        """
-        response = self._responses(points, normals)
-        covariance = response @ response.conj().T
-        level = float(np.trace(covariance).real) / len(covariance)
-        if not (level > 0.0 and self.change.any()):
-            return 0.0
-        eigenvalues, vectors = eigh(covariance / level, lower=True, driver="evd")
-        power = np.abs(vectors.conj().T @ self.change) ** 2
-        variance = np.maximum(eigenvalues, 0.0) + NOISE_SHARES[:, None]
-        # The best s has a closed form: the mean of power over variance.
-        scale = (power / variance).mean(axis=1)
-        log = np.log(scale) + np.log(variance).mean(axis=1) + 1.0
-        return -len(power) * float(log.min())
-
-    def _responses(
-        self, points: Float64[np.ndarray, "M 3"], normals: Float64[np.ndarray, "M 3"]
-    ) -> Complex64[np.ndarray, "entry M"]:
-        """The propagation model's answer of each link and subcarrier to each Gaussian of γ = 1.
-
-        Without its factor λ/(4π)^{3/2}, which hardly differs within a band: levels are fitted.
-        """
-        out_m, lit = _leg(self.tx_xyz, points, normals)
-        back_m, heard = _leg(self.rx_xyz, points, normals)
-        turns = (self.freq_hz[:, None] / SPEED_OF_LIGHT) * (out_m + back_m)[:, None]
-        # Whole turns go in double precision: paths have thousands of wavelengths.
-        phase = (-2 * np.pi * (turns - np.round(turns))).astype(np.float32)
-        response = (lit * heard)[:, None].astype(np.float32) * np.exp(1j * phase)
-        return response.reshape(-1, len(points))
-
-
-def _leg(
-    antennas: Float64[np.ndarray, "link 3"],
-    points: Float64[np.ndarray, "M 3"],
-    normals: Float64[np.ndarray, "M 3"],
-) -> tuple[Float64[np.ndarray, "link M"], Float64[np.ndarray, "link M"]]:
-    """Distance [m], and visibility over distance, between antennas and Gaussians."""
-    towards = antennas[:, None] - points
-    distance = np.linalg.norm(towards, axis=2)
-    facing = np.einsum("lmk,mk->lm", towards, normals) / distance
-    return distance, 1.0 / (distance * dimming(SHARPNESS * facing))
-
-
-def pair_samples(observations: Observations, seed: int) -> list[PairSample]:
-    """Entries of each device pair, drawn by chance, in units of their root mean square."""
-    rng = np.random.default_rng(seed)
-    pair, names = observations.pairs
-    visible = np.flatnonzero(observations.subcarriers)
-    entries = min(ENTRIES // max(len(names), 1), MOST_ENTRIES)
-    result = []
-    for index in range(len(names)):
-        tx, rx = np.nonzero(pair == index)
-        count = min(len(tx), LINKS)
-        link = np.sort(rng.choice(len(tx), count, replace=False))
-        subcarrier = rng.choice(visible, min(len(visible), max(entries // count, 4)), replace=False)
-        tx, rx, subcarrier = tx[link], rx[link], np.sort(subcarrier)
-        change = observations.delta[tx[:, None], rx[:, None], subcarrier].ravel()
-        scale = np.sqrt(np.mean(np.abs(change) ** 2)) or 1.0
-        ends = observations.layout.tx_xyz[tx], observations.layout.rx_xyz[rx]
-        freq_hz = observations.freq_hz[subcarrier]
-        result.append(PairSample(*ends, freq_hz, (change / scale).astype(np.complex64)))
-    return result
 
 
 @dataclass(frozen=True)
@@ -147,7 +58,9 @@ class PostureEvidence:
         """Draws entries: of few device pairs in several rounds."""
         pairs = max(len(observations.pairs[1]), 1)
         rounds = int(np.clip(ENTRIES // (pairs * MOST_ENTRIES), 1, MOST_ROUNDS))
-        drawn = [pair_samples(observations, sub_seed(seed, number)) for number in range(rounds)]
+        entries = min(ENTRIES // pairs, MOST_ENTRIES)
+        seeds = [sub_seed(seed, number) for number in range(rounds)]
+        drawn = [pair_samples(observations, entries, each) for each in seeds]
         return PostureEvidence(drawn, seed)
 
     def of_density(self, density: StartDensity, bodies: Bodies) -> Float64[np.ndarray, "pair"]:
@@ -167,9 +80,8 @@ class PostureEvidence:
     def all(
         self, likely: Callable[[Bodies], Float64[np.ndarray, "pair"]], bodies: list[Bodies]
     ) -> list[Float64[np.ndarray, "pair"]]:
-        """Evidence of each; numpy lets other threads go on while it multiplies."""
-        with ThreadPoolExecutor(2) as pool:
-            return list(pool.map(likely, bodies))
+        """Evidence of each."""
+        return in_threads(likely, bodies)
 
 
 def tell_postures(

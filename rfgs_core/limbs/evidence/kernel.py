@@ -17,14 +17,14 @@ share of noise n is the best of a few (the evidence of a linear model; MacKay, N
 
 from __future__ import annotations
 
-import functools
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numba
 import numpy as np
-from jaxtyping import Bool, Complex64, Complex128, Float64, Int64
+from jaxtyping import Bool, Complex, Complex64, Float64, Int64
 
+from rfgs_core.lapack import product_with_itself, tridiagonal
 from rfgs_core.limbs.evidence.entries import Pair
 from rfgs_core.vector_math import FAST_MATH, sine_cosine_of_turns
 from rfgs_core.worlds.echoes import shadowing
@@ -97,14 +97,14 @@ def covariance(
         tx.share, rx.share, bands.first_k, bands.step_k, bands.middle_k, bands.block, bands.share,
         lobe_rad,
     )  # fmt: skip
-    if not rows.size:
-        return np.zeros((len(pair.change),) * 2, dtype=np.complex64)
-    # As Fortran sees them the conjugate responses are (facet, entry): Σ is their Aᴴ A.
-    return _routines()[0](1.0, rows.T, trans=2)
+    return product_with_itself(rows)
 
 
 def log_evidence(
-    change: Complex128[np.ndarray, "entry"], covariance: np.ndarray, least_noise: float = 0.0
+    change: Complex[np.ndarray, "entry"],
+    covariance: Complex[np.ndarray, "entry entry"],
+    least_noise: float = 0.0,
+    shares: Float64[np.ndarray, "share"] = NOISE_SHARES,
 ) -> float:
     """Log evidence of entries at the best level and share of noise [nat].
 
@@ -112,54 +112,40 @@ def log_evidence(
 
     Args:
         change: Entries.
-        covariance: Their covariance without level and noise, at least its upper triangle.
+        covariance: Their covariance without level and noise, at least its upper triangle; what is
+            in single precision is reduced in single precision.
         least_noise: Smaller shares of noise are not tried.
+        shares: Shares of noise that are tried, against the mean power of the echoes.
     """
-    level = float(np.diagonal(covariance).real.mean())
+    level = np.diagonal(covariance).real.mean()
     if not (level > 0.0 and change.any()):
         return 0.0
-    matrix = (covariance / level).astype(np.complex128)
-    known: dict[int, float] = {}
-
-    def at(step: int) -> float:
-        if step not in known:
-            known[step] = _with_noise(change, matrix, float(NOISE_SHARES[step]))
-        return known[step]
-
-    # Evidence over the share of noise has one hill, which is climbed from the middle, or from the
-    # least share that is allowed: what is asked for again and again is near its best there.
-    first = int(np.searchsorted(NOISE_SHARES, 0.999 * least_noise))
-    place, steps = first or len(NOISE_SHARES) // 2, range(first, len(NOISE_SHARES))
-    while True:
-        best = max((s for s in (place, place - 1, place + 1) if s in steps), key=at)
-        if best == place:
-            return known[place]
-        place = best
+    tried = shares[shares >= 0.999 * least_noise]
+    # With two diagonals a share of noise costs little, and eigenvectors none at all.
+    return _best_log(*tridiagonal(covariance / level, change), tried)
 
 
-@functools.cache
-def _routines() -> tuple[Any, Any, Any]:
-    """A Aᴴ or Aᴴ A in single precision; Cholesky's factor and solving with it in double."""
-    from scipy.linalg import get_blas_funcs, get_lapack_funcs
+@numba.njit(cache=True, nogil=True)
+def _best_log(
+    diagonal: np.ndarray, beside: np.ndarray, change: np.ndarray, shares: np.ndarray
+) -> float:
+    """Log evidence at the best of some shares of noise n, by L D Lᴴ of T + n I for each.
 
-    product: Any = get_blas_funcs("herk", dtype=np.complex64)
-    cholesky, solve = get_lapack_funcs(("potrf", "trtrs"), dtype=np.complex128)
-    return product, cholesky, solve
-
-
-def _with_noise(change: np.ndarray, matrix: np.ndarray, noise: float) -> float:
-    """Log evidence at one share of noise and the best level, by Cholesky's factor."""
-    _, cholesky, solve = _routines()
-    size = len(change)
-    noisy = matrix.copy()
-    noisy.ravel()[:: size + 1] += noise
-    root, failed = cholesky(noisy, lower=0, clean=0)
-    if failed:
-        return -np.inf
-    white = solve(root, change, lower=0, trans=2)[0]
-    scale = float(np.vdot(white, white).real) / size
-    spread = 2.0 * float(np.log(np.diagonal(root).real).sum())
-    return -size * (math.log(scale) + 1.0) - spread
+    The best level s has a closed form: the mean of what is heard, whitened by the covariance.
+    """
+    best, size = -np.inf, len(diagonal)
+    for share in shares:
+        pivot, rest = 1.0, 0.0j
+        power, spread = 0.0, 0.0
+        for i in range(size):
+            times = beside[i - 1] / pivot if i else 0.0
+            rest = change[i] - times * rest
+            # No pivot is below the least eigenvalue, that of noise: what is, has been rounded.
+            pivot = max(diagonal[i] + share - times * (beside[i - 1] if i else 0.0), share)
+            power += (rest.real * rest.real + rest.imag * rest.imag) / pivot
+            spread += math.log(pivot)
+        best = max(best, -size * (math.log(power / size) + 1.0) - spread)
+    return best
 
 
 @numba.njit(cache=True, nogil=True, inline="always")

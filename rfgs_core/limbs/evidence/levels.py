@@ -13,13 +13,13 @@ the likelihood (Zhou, Hu, Zhou and Lange, J. Comput. Graph. Stat. 28(2), 2019):
 
 from __future__ import annotations
 
-import functools
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Complex, Complex128, Float64
 
+from rfgs_core.lapack import inverse
 from rfgs_core.limbs.evidence.kernel import log_evidence
 
 #: Steps of the fit, and the least level of the first covariance, which is noise: a share of the
@@ -61,11 +61,12 @@ class Levels(NamedTuple):
         level[~whole.any(axis=(1, 2))] = 0.0
         level[0] = max(level[0], _least_noise(level, len(change)))
         for _ in range(STEPS):
-            inverse = _inverse(np.tensordot(level, whole, 1))
-            white = inverse @ change
+            # The least noise makes every covariance positive definite.
+            weights = inverse(np.tensordot(level, whole, 1))
+            white = weights @ change
             # What a part has of the change rounds to less than nothing where it has no share.
             power = np.maximum(np.einsum("n,kn->k", white.conj(), whole @ white).real, 0.0)
-            trace = np.einsum("knm,mn->k", whole, inverse).real
+            trace = np.einsum("knm,mn->k", whole, weights).real
             level = level * np.sqrt(power / np.maximum(trace, 1e-300))
             level[0] = max(level[0], _least_noise(level, len(change)))
         return Levels(change, whole, level)
@@ -97,8 +98,8 @@ class Levels(NamedTuple):
         distributions (Kullback and Leibler, Ann. Math. Stat. 22(1), 1951).
         """
         others = np.tensordot(self.level[:-1], self.parts[:-1], 1)
-        inverse = np.linalg.inv(np.linalg.cholesky(others + level * self.parts[0]))
-        there = inverse @ (others + level * self.parts[-1]) @ inverse.conj().T
+        whitener = np.linalg.inv(np.linalg.cholesky(others + level * self.parts[0]))
+        there = whitener @ (others + level * self.parts[-1]) @ whitener.conj().T
         eigenvalues = np.maximum(np.linalg.eigvalsh(there), 1e-12)
         return float((eigenvalues - 1.0 - np.log(eigenvalues)).sum())
 
@@ -110,10 +111,10 @@ class Levels(NamedTuple):
         """
         if not self.change.any():
             return np.zeros(len(parts))
-        inverse = np.linalg.inv(np.linalg.cholesky(self.covariance))
-        white = inverse @ self.change
+        whitener = np.linalg.inv(np.linalg.cholesky(self.covariance))
+        white = whitener @ self.change
         before = -len(white) * (math.log(np.vdot(white, white).real / len(white)) + 1.0)
-        whitened = inverse @ _whole(np.array(parts)) @ inverse.conj().T
+        whitened = whitener @ _whole(np.array(parts)) @ whitener.conj().T
         return np.maximum([log_evidence(white, part) - before for part in whitened], 0.0)
 
 
@@ -139,23 +140,3 @@ def _whole(
     level = np.diagonal(upper, axis1=-2, axis2=-1).real.mean(axis=-1)[..., None, None]
     matrix = np.triu(upper) + np.triu(upper, 1).conj().swapaxes(-2, -1)
     return (matrix / np.where(level > 0.0, level, 1.0)).astype(np.complex128)
-
-
-def _inverse(
-    matrix: Complex128[np.ndarray, "entry entry"],
-) -> Complex128[np.ndarray, "entry entry"]:
-    """Of a covariance with noise, by Cholesky's factor: in half the time of `numpy.linalg.inv`."""
-    cholesky, invert = _routines()
-    root, failed = cholesky(matrix, lower=0, clean=1)
-    assert not failed, "the least noise makes every covariance positive definite"
-    upper = invert(root, lower=0)[0]
-    upper.ravel(order="F")[:: len(upper) + 1] *= 0.5
-    return upper + upper.conj().T
-
-
-@functools.cache
-def _routines() -> tuple[Any, ...]:
-    """Cholesky's factor, and the inverse out of it, of which it fills the upper triangle."""
-    from scipy.linalg import get_lapack_funcs
-
-    return tuple(get_lapack_funcs(("potrf", "potri"), dtype=np.complex128))

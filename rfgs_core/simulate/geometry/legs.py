@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numba
@@ -13,6 +12,7 @@ from jaxtyping import Float64
 from rfgs_core.simulate.geometry.bvh import triangle_at
 from rfgs_core.simulate.geometry.faces import Faces, mirrored
 from rfgs_core.simulate.geometry.surroundings import Surroundings
+from rfgs_core.threads import in_threads
 
 
 class Legs(NamedTuple):
@@ -44,8 +44,7 @@ def mirror_legs(around: Surroundings, points: Float64[np.ndarray, "point 3"]) ->
         point, triangle, place = _of_end(around.faces, ends[site], lit, points)
         return Legs(point, np.full(len(point), site), triangle, place)
 
-    with ThreadPoolExecutor(numba.get_num_threads()) as pool:
-        parts = list(pool.map(of_site, range(len(ends))))
+    parts = in_threads(of_site, range(len(ends)))
     every = Legs(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
     order = np.lexsort((every.site, every.point))
     return Legs(*(column[order] for column in every))

@@ -10,7 +10,6 @@ gives the same paths reversed. What decides is then a test of every segment in d
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numba
@@ -23,6 +22,7 @@ from rfgs_core.simulate.geometry.bvh import SAME_M, triangle_at
 from rfgs_core.simulate.geometry.faces import Faces, height, holds, mirrored
 from rfgs_core.simulate.geometry.rays import crossings
 from rfgs_core.simulate.geometry.surroundings import Surroundings
+from rfgs_core.threads import in_threads
 
 #: Interactions of a path at most.
 MAX_DEPTH = 3
@@ -87,10 +87,10 @@ def specular_paths(
         return found
 
     receivers = [int(rx) for rx in np.flatnonzero(wanted.any(axis=0))]
-    with ThreadPoolExecutor(numba.get_num_threads()) as pool:
-        # Beams of many transmitters would fill the memory; each of those has few receivers.
-        tx_beams = list(pool.map(lit, tx_xyz, around.tx_hidden)) if len(tx_xyz) <= _KEPT else []
-        rows = list(pool.map(of_receiver, receivers))
+    # Beams of many transmitters would fill the memory; each of those has few receivers.
+    kept = zip(tx_xyz, around.tx_hidden, strict=True) if len(tx_xyz) <= _KEPT else ()
+    tx_beams = in_threads(lambda one: lit(*one), kept)
+    rows = in_threads(of_receiver, receivers)
     return _assembled(wanted, receivers, rows, rx_xyz, depth)
 
 

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numba
@@ -13,6 +12,7 @@ from jaxtyping import Bool, Float64
 from rfgs_core.simulate.geometry.bvh import SAME_M, Bvh, build_bvh
 from rfgs_core.simulate.geometry.faces import Faces, height
 from rfgs_core.simulate.geometry.rays import crossings
+from rfgs_core.threads import in_threads
 
 #: Surfaces in front of a face are counted up to this many.
 MOST_HIDDEN = 2
@@ -80,8 +80,7 @@ class Sight:
             place, behind = self._places[site], self._behind[site]
             return _hidden(faces, place, self._bvh, others, kept, behind)
 
-        with ThreadPoolExecutor(numba.get_num_threads()) as pool:
-            rows = list(pool.map(seen_by, range(len(self._places))))
+        rows = in_threads(seen_by, range(len(self._places)))
         hidden = np.array(rows, dtype=np.int64).reshape(len(rows), len(faces.normal))
         split = len(self._tx)
         return Surroundings(faces, self._tx, self._rx, hidden[:split], hidden[split:])

@@ -177,8 +177,9 @@ def test_a_frame_is_settled_unless_asked_not_to(empty: Observations) -> None:
         return start_frame(seen, config, 0, None, settle=settle).tracks.bodies.axes_xy
 
     np.testing.assert_array_equal(placed(False), by_map)
-    np.testing.assert_array_equal(placed(True), moved(seen, by_map))
-    assert off_m(placed(True), ALONE[:1])[0] < off_m(by_map, ALONE[:1])[0]
+    settled = placed(True)
+    np.testing.assert_array_equal(settled, moved(seen, by_map))
+    assert off_m(settled, ALONE[:1])[0] < off_m(by_map, ALONE[:1])[0]
 
 
 def test_nobody_is_left_nobody(empty: Observations) -> None:

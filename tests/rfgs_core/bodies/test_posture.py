@@ -14,7 +14,8 @@ from lit_bodies import echoing
 from rfgs_core.bodies import posture
 from rfgs_core.bodies.body_prior import Bodies
 from rfgs_core.bodies.localise import pair_maps
-from rfgs_core.bodies.posture import NOISE_SHARES, PairSample, pair_samples, tell_postures
+from rfgs_core.bodies.pair_sample import NOISE_SHARES, PairSample, pair_samples
+from rfgs_core.bodies.posture import tell_postures
 from rfgs_core.measure.observations import Observations
 from rfgs_core.propagation import Links, Subcarriers, scatter
 from rfgs_core.settings import TrainConfig
@@ -99,7 +100,7 @@ def test_only_what_is_visible_is_sampled(make_observations: Callable[..., Observ
     delta = rng.standard_normal(seen.delta.shape) + 1j
     delta = np.where(seen.links[..., None] & seen.subcarriers, delta, np.nan)
     seen = replace(seen, delta=delta.astype(np.complex64))
-    samples = pair_samples(seen, 0)
+    samples = pair_samples(seen, 64, 0)
     assert len(samples) == len(seen.pairs[1])
     for entry in samples:
         assert np.isfinite(entry.change).all()
@@ -123,7 +124,7 @@ def test_pairs_that_hear_nothing_keep_their_place_and_say_nothing(
     delta[pair == 0] = 0.0
     delta[tx[1:], rx[1:]] = 0.0
     quiet = seen.with_delta(delta)
-    samples = pair_samples(quiet, 0)
+    samples = pair_samples(quiet, 64, 0)
     assert len(samples) == len(names) == 4
     assert samples[0].log_likelihood(*cloud) == 0.0 != samples[2].log_likelihood(*cloud)
     told = tell_postures(quiet, pair_maps(quiet), UPRIGHT, TrainConfig(), 0)

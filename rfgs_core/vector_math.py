@@ -71,7 +71,7 @@ def six_rows(table: np.ndarray, first: int, n: int) -> tuple[np.ndarray, ...]:
     )
 
 
-def exponential(x: float) -> float:
+def exponential(x: float | np.float32) -> float:
     """exp(x) in the precision of x; in float32 within |x| 1e-7, and exp(-87) below -87."""
     return math.exp(x)
 

@@ -23,6 +23,7 @@ from rfgs_core.bodies.localise import NEAR_M, SEPARATION_M, PairMaps, highest_pe
 from rfgs_core.limbs.evidence.entries import pairs_of
 from rfgs_core.limbs.evidence.levels import Levels
 from rfgs_core.measure.observations import Observations
+from rfgs_core.threads import in_threads
 
 #: Of fewer device pairs that hear anything, whether somebody sits moves the place: all are taken
 #: to stand.
@@ -118,7 +119,7 @@ def _climbed(
         around = here + step_m * _WAYS
         inside = around[in_room(around, observations.bounds_m)]
         tried = [place for place in inside if stands_clear(others, place)]
-        values = [evidence.at(place) for place in tried]
+        values = in_threads(evidence.at, tried)
         best = int(np.argmax(values)) if values else -1
         if values and values[best] > likely:
             here, likely = tried[best], values[best]

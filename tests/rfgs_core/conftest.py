@@ -14,7 +14,7 @@ import pytest
 import torch
 
 from rfgs_core import interrupts
-from rfgs_core.bodies import posture
+from rfgs_core.bodies import pair_sample, posture
 from rfgs_core.bodies.tracks import Tracks
 from rfgs_core.dataset import open_dataset
 from rfgs_core.fit.frame import FrameState
@@ -47,7 +47,7 @@ def hears_ctrl_c(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 def coarse_postures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Who sits is told of little, in a tenth of the time: for tests that ask for something else."""
     monkeypatch.setattr(posture, "ENTRIES", 512)
-    monkeypatch.setattr(posture, "LINKS", 8)
+    monkeypatch.setattr(pair_sample, "LINKS", 8)
     monkeypatch.setattr(posture, "GAUSSIANS", 200)
 
 

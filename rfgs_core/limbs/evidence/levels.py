@@ -16,11 +16,13 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numba
 import numpy as np
 from jaxtyping import Complex, Complex128, Float64
 
-from rfgs_core.lapack import inverse
+from rfgs_core.lapack import invert
 from rfgs_core.limbs.evidence.kernel import log_evidence
+from rfgs_core.vector_math import FAST_REDUCTION
 
 #: Steps of the fit, and the least level of the first covariance, which is noise: a share of the
 #: entries' mean power.
@@ -60,14 +62,12 @@ class Levels(NamedTuple):
         level = np.full(len(whole), 1.0 / len(whole)) if start is None else start.copy()
         level[~whole.any(axis=(1, 2))] = 0.0
         level[0] = max(level[0], _least_noise(level, len(change)))
+        work = np.zeros(whole.shape[1:], dtype=np.complex128)
         for _ in range(STEPS):
+            _add_up(whole, level, work)
             # The least noise makes every covariance positive definite.
-            weights = inverse(np.tensordot(level, whole, 1))
-            white = weights @ change
-            # What a part has of the change rounds to less than nothing where it has no share.
-            power = np.maximum(np.einsum("n,kn->k", white.conj(), whole @ white).real, 0.0)
-            trace = np.einsum("knm,mn->k", whole, weights).real
-            level = level * np.sqrt(power / np.maximum(trace, 1e-300))
+            invert(work)
+            _improve(change, whole, work, level)
             level[0] = max(level[0], _least_noise(level, len(change)))
         return Levels(change, whole, level)
 
@@ -121,6 +121,41 @@ class Levels(NamedTuple):
 def mean_power(upper: Complex[np.ndarray, "entry entry"]) -> float:
     """Mean power of entries of a covariance."""
     return float(np.diagonal(upper).real.mean())
+
+
+@numba.njit(cache=True, nogil=True)
+def _add_up(whole: np.ndarray, level: np.ndarray, out: np.ndarray) -> None:
+    """Lower triangle of the covariance of all parts together."""
+    out[:] = 0.0
+    for k in range(len(level)):
+        for n in range(len(out)):
+            for m in range(n + 1):
+                out[n, m] += level[k] * whole[k, n, m]
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST_REDUCTION)
+def _improve(change: np.ndarray, whole: np.ndarray, weights: np.ndarray, level: np.ndarray) -> None:
+    """A step of the fit, in place, by the inverse covariance's lower triangle."""
+    size = len(change)
+    white = np.zeros(size, np.complex128)
+    for n in range(size):
+        for m in range(n):
+            white[n] += weights[n, m] * change[m]
+            white[m] += np.conj(weights[n, m]) * change[n]
+        white[n] += weights[n, n].real * change[n]
+    for k in range(len(level)):
+        power, trace = 0.0, 0.0
+        for n in range(size):
+            echo = 0.0j
+            for m in range(n):
+                entry, weight = whole[k, n, m], weights[n, m]
+                echo += entry * white[m]
+                trace += 2.0 * (entry.real * weight.real + entry.imag * weight.imag)
+            echo = 2.0 * echo + whole[k, n, n] * white[n]
+            power += white[n].real * echo.real + white[n].imag * echo.imag
+            trace += whole[k, n, n].real * weights[n, n].real
+        # What a part has of the change rounds to less than nothing where it has no share.
+        level[k] *= math.sqrt(max(power, 0.0) / max(trace, 1e-300))
 
 
 def _least_noise(level: Float64[np.ndarray, "part"], entries: int) -> float:

@@ -1,110 +1,125 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Routines of SciPy's BLAS and LAPACK for Hermitian matrices, which let other threads go on.
+"""Routines of SciPy's BLAS and LAPACK for Hermitian matrices, within compiled kernels.
 
 `scipy.linalg.blas` and `scipy.linalg.lapack` hold Python's lock while they work, so that many small
 matrices in two threads take as long as in one. The same routines are called here by the addresses
-that SciPy tells other compiled code, `scipy.linalg.cython_blas` and `cython_lapack`.
-
-Of a Hermitian matrix one triangle is read and written.
+that SciPy tells other compiled code, `scipy.linalg.cython_blas` and `cython_lapack`, and other
+threads go on. Of an array in C's order Fortran sees the transposed one.
 """
 
 from __future__ import annotations
 
-import ctypes
-import functools
-from ctypes import byref, c_float, c_int, c_void_p
 from typing import Any
 
+import llvmlite.binding as llvm
+import numba
 import numpy as np
-from jaxtyping import Complex, Complex64, Complex128, Float
+from numba import types
+from numba.extending import get_cython_function_address
 
+_OPTIONS: Any = {"cache": True, "nogil": True}
 #: Columns that are reduced together.
 _BLOCK = 32
+_UPPER, _LEFT, _CONJUGATE = ord("U"), ord("L"), ord("C")
 
 
-def product_with_itself(
-    rows: Complex64[np.ndarray, "entry term"],
-) -> Complex64[np.ndarray, "entry entry"]:
-    """Upper triangle of Σ_i a_i a_iᴴ of conjugate columns a_i*, in half the work of a product.
+def _routine(library: str, name: str, arguments: int) -> Any:
+    """A routine for kernels, under a name that their cached files find again."""
+    symbol = f"rfgs_{name}"
+    llvm.add_symbol(symbol, get_cython_function_address(f"scipy.linalg.cython_{library}", name))
+    return types.ExternalFunction(symbol, types.void(*[types.uintp] * arguments))
+
+
+_cherk = _routine("blas", "cherk", 10)
+_zpotrf, _zpotri = _routine("lapack", "zpotrf", 5), _routine("lapack", "zpotri", 5)
+_chetrd, _zhetrd = _routine("lapack", "chetrd", 10), _routine("lapack", "zhetrd", 10)
+_cunmtr, _zunmtr = _routine("lapack", "cunmtr", 13), _routine("lapack", "zunmtr", 13)
+
+
+@numba.njit(**_OPTIONS)
+def _succeeded(sizes: np.ndarray, _used: tuple[np.ndarray, ...]) -> bool:
+    """Whether a routine's last size, its report, is zero.
+
+    The compiler gives an array back after its last use, which an address is none of: so this is
+    asked with all whose addresses the routine was given.
+    """
+    return sizes[-1] == 0
+
+
+@numba.njit(**_OPTIONS)
+def product_with_itself(rows: np.ndarray) -> np.ndarray:
+    """Upper triangle of Σ_i a_i a_iᴴ, in half the work of a product.
 
     Args:
-        rows: The conjugates, in C's order.
+        rows: Complex64 [entry, term], columns a_i*.
+
+    Returns:
+        Complex64 [entry, entry], zero below the diagonal.
     """
-    size, terms = c_int(rows.shape[0]), c_int(rows.shape[1])
-    rows = np.ascontiguousarray(rows, np.complex64)
-    out = np.zeros((rows.shape[0],) * 2, np.complex64, order="F")
+    rows = np.ascontiguousarray(rows)
+    out = np.zeros((rows.shape[0], rows.shape[0]), np.complex64)
     if rows.size:
-        # As Fortran sees them they are (term, entry): the sum is their Aᴴ A.
-        _routine("blas", "cherk")(
-            b"U", b"C", byref(size), byref(terms), byref(c_float(1.0)), _at(rows), byref(terms),
-            byref(c_float(0.0)), _at(out), byref(size),
+        letters = np.array([_UPPER, _CONJUGATE], np.uint8)
+        sizes = np.array([rows.shape[0], rows.shape[1], 0], np.int32)
+        factors = np.array([1.0, 0.0], np.float32)
+        letter, size, factor = letters.ctypes.data, sizes.ctypes.data, factors.ctypes.data
+        _cherk(
+            letter, letter + 1, size, size + 4, factor, rows.ctypes.data, size + 4,
+            factor + 4, out.ctypes.data, size,
         )  # fmt: skip
-    return out
+        _succeeded(sizes, (letters, factors, rows, out))
+    return out.T
 
 
-def invert(matrix: Complex128[np.ndarray, "n n"]) -> None:
-    """Puts the inverse in the place of a positive definite matrix: only the lower triangles count.
+@numba.njit(**_OPTIONS)
+def inverted(matrix: np.ndarray) -> bool:
+    """Puts the inverse in the place of a positive definite matrix; only lower triangles count.
 
     Args:
-        matrix: In C's order.
+        matrix: Complex128 [n, n] in C's order.
 
-    Raises:
-        numpy.linalg.LinAlgError: It is not positive definite.
+    Returns:
+        Whether it is positive definite; what is left of one that is not is of no use.
     """
-    size, info = c_int(len(matrix)), c_int(0)
-    # As Fortran sees it the lower triangle is the upper one of the conjugate: Cholesky's factor,
-    # and the inverse out of it.
-    for name in ("zpotrf", "zpotri"):
-        _routine("lapack", name)(b"U", byref(size), _at(matrix), byref(size), byref(info))
-        if info.value:
-            raise np.linalg.LinAlgError("a matrix to be inverted is not positive definite")
+    letters, sizes = np.array([_UPPER], np.uint8), np.array([len(matrix), 0], np.int32)
+    letter, size, place = letters.ctypes.data, sizes.ctypes.data, matrix.ctypes.data
+    # Cholesky's factor, and the inverse out of it.
+    _zpotrf(letter, size, place, size, size + 4)
+    if sizes[1] == 0:
+        _zpotri(letter, size, place, size, size + 4)
+    return _succeeded(sizes, (letters, matrix))
 
 
+@numba.njit(**_OPTIONS)
 def tridiagonal(
-    matrix: Complex[np.ndarray, "n n"], values: Complex[np.ndarray, "n"]
-) -> tuple[Float[np.ndarray, "n"], Float[np.ndarray, "n-1"], Complex[np.ndarray, "n"]]:
+    matrix: np.ndarray, values: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Qᴴ A Q with two diagonals, and Qᴴ y, of some unitary Q, in the precision of A.
 
     Args:
-        matrix: A, at least its upper triangle.
-        values: y.
+        matrix: A, complex64 or complex128 [n, n], at least its upper triangle.
+        values: y, of the same kind [n].
 
     Returns:
-        The diagonal, the one beside it, and Qᴴ y.
+        The diagonal [n], the one beside it [n], the last of which is of no use, and Qᴴ y [n].
     """
-    single = matrix.dtype == np.complex64
-    kind, real, letter = (
-        (np.complex64, np.float32, "c") if single else (np.complex128, np.float64, "z")
-    )
     count = len(matrix)
-    work, turned = np.array(matrix, kind, order="F"), np.array(values, kind)
-    diagonal, beside = np.zeros(count, real), np.zeros(max(count - 1, 0), real)
-    tau, scratch = np.zeros(count, kind), np.zeros(_BLOCK * count, kind)
-    size, space = c_int(count), c_int(len(scratch))
-    one, info = c_int(1), c_int(0)
-    _routine("lapack", f"{letter}hetrd")(
-        b"U", byref(size), _at(work), byref(size), _at(diagonal), _at(beside), _at(tau),
-        _at(scratch), byref(space), byref(info),
-    )  # fmt: skip
-    if count > 1:
-        _routine("lapack", f"{letter}unmtr")(
-            b"L", b"U", b"C", byref(size), byref(one), _at(work), byref(size), _at(tau),
-            _at(turned), byref(size), _at(scratch), byref(space), byref(info),
-        )  # fmt: skip
+    work, turned = matrix.T.copy(), values.copy()
+    diagonal, beside = np.zeros_like(values.real), np.zeros_like(values.real)
+    tau, scratch = np.zeros(count, matrix.dtype), np.zeros(_BLOCK * count, matrix.dtype)
+    letters = np.array([_UPPER, _LEFT, _CONJUGATE], np.uint8)
+    sizes = np.array([count, _BLOCK * count, 1, 0], np.int32)
+    upper, size = letters.ctypes.data, sizes.ctypes.data
+    left, conjugate = upper + 1, upper + 2
+    space, one, failed = size + 4, size + 8, size + 12
+    a, d, e, t = work.ctypes.data, diagonal.ctypes.data, beside.ctypes.data, tau.ctypes.data
+    y, w = turned.ctypes.data, scratch.ctypes.data
+    # Told at compile time.
+    if matrix.itemsize == 8:
+        _chetrd(upper, size, a, size, d, e, t, w, space, failed)
+        _cunmtr(left, upper, conjugate, size, one, a, size, t, y, size, w, space, failed)
+    else:
+        _zhetrd(upper, size, a, size, d, e, t, w, space, failed)
+        _zunmtr(left, upper, conjugate, size, one, a, size, t, y, size, w, space, failed)
+    _succeeded(sizes, (letters, work, tau, scratch, diagonal, beside, turned))
     return diagonal, beside, turned
-
-
-def _at(array: np.ndarray) -> c_void_p:
-    return c_void_p(array.ctypes.data)
-
-
-@functools.cache
-def _routine(library: str, name: str) -> Any:
-    """A routine by its name; whoever calls it lets go of Python's lock."""
-    import importlib
-
-    capsule = importlib.import_module(f"scipy.linalg.cython_{library}").__pyx_capi__[name]
-    signature, address = ctypes.pythonapi.PyCapsule_GetName, ctypes.pythonapi.PyCapsule_GetPointer
-    signature.restype, signature.argtypes = ctypes.c_char_p, [ctypes.py_object]
-    address.restype, address.argtypes = c_void_p, [ctypes.py_object, ctypes.c_char_p]
-    return ctypes.CFUNCTYPE(None)(address(capsule, signature(capsule)))

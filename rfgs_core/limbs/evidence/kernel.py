@@ -117,33 +117,36 @@ def log_evidence(
         least_noise: Smaller shares of noise are not tried.
         shares: Shares of noise that are tried, against the mean power of the echoes.
     """
-    level = np.diagonal(covariance).real.mean()
-    if not (level > 0.0 and change.any()):
+    if not change.any():
         return 0.0
     tried = shares[shares >= 0.999 * least_noise]
-    # With two diagonals a share of noise costs little, and eigenvectors none at all.
-    return _best_log(*tridiagonal(covariance / level, change), tried)
+    return _best_log(change.astype(covariance.dtype), covariance, tried)
 
 
 @numba.njit(cache=True, nogil=True)
-def _best_log(
-    diagonal: np.ndarray, beside: np.ndarray, change: np.ndarray, shares: np.ndarray
-) -> float:
-    """Log evidence at the best of some shares of noise n, by L D Lᴴ of T + n I for each.
+def _best_log(change: np.ndarray, covariance: np.ndarray, shares: np.ndarray) -> float:
+    """Log evidence at the best of some shares of noise n; zero where nothing is seen.
 
+    With two diagonals L D Lᴴ of T + n I costs little for each share, and eigenvectors none at all.
     The best level s has a closed form: the mean of what is heard, whitened by the covariance.
     """
-    best, size = -np.inf, len(diagonal)
+    best, size, mean = -np.inf, len(change), 0.0
+    for i in range(size):
+        mean += covariance[i, i].real / size
+    if mean <= 0.0:
+        return 0.0
+    diagonal, beside, turned = tridiagonal(covariance, change)
     for share in shares:
-        pivot, rest = 1.0, 0.0j
+        pivot, rest, times = 1.0, 0.0j, 0.0
         power, spread = 0.0, 0.0
         for i in range(size):
-            times = beside[i - 1] / pivot if i else 0.0
-            rest = change[i] - times * rest
+            rest = turned[i] - times * rest
+            under = times * beside[i - 1] / mean if i else 0.0
             # No pivot is below the least eigenvalue, that of noise: what is, has been rounded.
-            pivot = max(diagonal[i] + share - times * (beside[i - 1] if i else 0.0), share)
+            pivot = max(diagonal[i] / mean + share - under, share)
             power += (rest.real * rest.real + rest.imag * rest.imag) / pivot
             spread += math.log(pivot)
+            times = beside[i] / mean / pivot
         best = max(best, -size * (math.log(power / size) + 1.0) - spread)
     return best
 

@@ -20,7 +20,7 @@ import numba
 import numpy as np
 from jaxtyping import Complex, Complex128, Float64
 
-from rfgs_core.lapack import invert
+from rfgs_core.lapack import inverted
 from rfgs_core.limbs.evidence.kernel import log_evidence
 from rfgs_core.vector_math import FAST_REDUCTION
 
@@ -61,14 +61,8 @@ class Levels(NamedTuple):
             return Levels(change, whole, np.array([max(power, LEAST_NOISE)]))
         level = np.full(len(whole), 1.0 / len(whole)) if start is None else start.copy()
         level[~whole.any(axis=(1, 2))] = 0.0
-        level[0] = max(level[0], _least_noise(level, len(change)))
-        work = np.zeros(whole.shape[1:], dtype=np.complex128)
-        for _ in range(STEPS):
-            _add_up(whole, level, work)
-            # The least noise makes every covariance positive definite.
-            invert(work)
-            _improve(change, whole, work, level)
-            level[0] = max(level[0], _least_noise(level, len(change)))
+        if not _climbed(change.astype(np.complex128), whole, level):
+            raise np.linalg.LinAlgError("a covariance with noise is not positive definite")
         return Levels(change, whole, level)
 
     @property
@@ -124,16 +118,25 @@ def mean_power(upper: Complex[np.ndarray, "entry entry"]) -> float:
 
 
 @numba.njit(cache=True, nogil=True)
-def _add_up(whole: np.ndarray, level: np.ndarray, out: np.ndarray) -> None:
-    """Lower triangle of the covariance of all parts together."""
-    out[:] = 0.0
-    for k in range(len(level)):
-        for n in range(len(out)):
-            for m in range(n + 1):
-                out[n, m] += level[k] * whole[k, n, m]
+def _climbed(change: np.ndarray, whole: np.ndarray, level: np.ndarray) -> bool:
+    """`STEPS` steps of the fit, in place; false where a covariance is not positive definite."""
+    size = len(change)
+    covariance = np.zeros((size, size), np.complex128)
+    level[0] = max(level[0], _least_noise(level, size))
+    for _ in range(STEPS):
+        covariance[:] = 0.0
+        for k in range(len(level)):
+            for n in range(size):
+                for m in range(n + 1):
+                    covariance[n, m] += level[k] * whole[k, n, m]
+        if not inverted(covariance):
+            return False
+        _improve(change, whole, covariance, level)
+        level[0] = max(level[0], _least_noise(level, size))
+    return True
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST_REDUCTION)
+@numba.njit(forceinline=True, cache=True, nogil=True, fastmath=FAST_REDUCTION)
 def _improve(change: np.ndarray, whole: np.ndarray, weights: np.ndarray, level: np.ndarray) -> None:
     """A step of the fit, in place, by the inverse covariance's lower triangle."""
     size = len(change)
@@ -158,14 +161,15 @@ def _improve(change: np.ndarray, whole: np.ndarray, weights: np.ndarray, level: 
         level[k] *= math.sqrt(max(power, 0.0) / max(trace, 1e-300))
 
 
-def _least_noise(level: Float64[np.ndarray, "part"], entries: int) -> float:
+@numba.njit(cache=True, nogil=True)
+def _least_noise(level: np.ndarray, entries: int) -> float:
     """Least level of the noise beside other levels.
 
     Rounding takes no more than ε √(Σ |C|²) ≤ ε tr C from the smallest eigenvalue of a covariance,
     and its trace is the number of entries. A body that one direction of antennas explains may have
     a level of some hundred: then that is more than `LEAST_NOISE`, and makes R indefinite.
     """
-    return max(LEAST_NOISE, _ROUNDING * entries * float(level[1:].sum()))
+    return max(LEAST_NOISE, _ROUNDING * entries * level[1:].sum())
 
 
 def _whole(

@@ -38,10 +38,10 @@ _cunmtr, _zunmtr = _routine("lapack", "cunmtr", 13), _routine("lapack", "zunmtr"
 
 @numba.njit(**_OPTIONS)
 def _succeeded(sizes: np.ndarray, _used: tuple[np.ndarray, ...]) -> bool:
-    """Whether a routine's last size, its report, is zero.
+    """Whether a routine's report, the last of its sizes, is zero.
 
-    The compiler gives an array back after its last use, which an address is none of: so this is
-    asked with all whose addresses the routine was given.
+    The compiler gives an array back after its last use, and its address is none: so this is asked
+    with all whose addresses the routine had.
     """
     return sizes[-1] == 0
 
@@ -67,7 +67,8 @@ def product_with_itself(rows: np.ndarray) -> np.ndarray:
             letter, letter + 1, size, size + 4, factor, rows.ctypes.data, size + 4,
             factor + 4, out.ctypes.data, size,
         )  # fmt: skip
-        _succeeded(sizes, (letters, factors, rows, out))
+        if not _succeeded(sizes, (letters, factors, rows, out)):
+            raise ValueError("cherk has no report")
     return out.T
 
 
@@ -121,5 +122,6 @@ def tridiagonal(
     else:
         _zhetrd(upper, size, a, size, d, e, t, w, space, failed)
         _zunmtr(left, upper, conjugate, size, one, a, size, t, y, size, w, space, failed)
-    _succeeded(sizes, (letters, work, tau, scratch, diagonal, beside, turned))
+    if not _succeeded(sizes, (letters, work, tau, scratch, diagonal, beside, turned)):
+        raise ValueError("a matrix that cannot be reduced to two diagonals")
     return diagonal, beside, turned

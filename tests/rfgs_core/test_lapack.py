@@ -32,7 +32,7 @@ def test_the_upper_triangle_of_a_product(size: int, terms: int) -> None:
     rows = complex_normal((size, terms), 1).astype(np.complex64)
     got, expected = product_with_itself(rows), rows.conj() @ rows.T
     np.testing.assert_allclose(np.triu(got), np.triu(expected), rtol=1e-5, atol=1e-5 * terms)
-    # What is no more than one after the other in memory is read just so.
+    # Another order in memory makes no difference.
     turned = np.asfortranarray(rows)
     np.testing.assert_array_equal(product_with_itself(turned), got)
 

@@ -20,6 +20,7 @@ from rfgs_core.bodies.start import StartCells
 from rfgs_core.measure.observations import Observations
 from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import TrainConfig
+from rfgs_core.threads import in_threads
 
 #: Heights of the middle of who lies on the floor and on a bed [m].
 HEIGHTS_M = (0.13, 0.6)
@@ -207,7 +208,7 @@ def _lies(
     ) -> tuple[Bodies, Float64[np.ndarray, "pair"]]:
         """The likeliest of a body as it is and in other places."""
         inside = [one for one in tries if _inside(one, bounds_m)]
-        for one in zip(inside, evidence.all(likely, inside), strict=True):
+        for one in zip(inside, in_threads(likely, inside), strict=True):
             if evidence.lead(one[1], start[1]) > 0.0:
                 start = one
         return start
@@ -226,7 +227,7 @@ def _lies(
         best = climbed(best, _nudged(best[0], nudge))
     angles = np.arange(DIRECTIONS) * (2 * np.pi / DIRECTIONS)
     seated = [Bodies(upright.axes_xy, np.array([angle])) for angle in angles]
-    rivals = [standing, *evidence.all(likely, seated)]
+    rivals = [standing, *in_threads(likely, seated)]
     return best[0] if min(evidence.lead(best[1], rival) for rival in rivals) > TO_LIE else None
 
 

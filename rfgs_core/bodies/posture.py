@@ -10,7 +10,6 @@ knows which echoes fit together.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -77,12 +76,6 @@ class PostureEvidence:
         most = MOST_PER_PAIR if len(self.rounds[0]) >= FEWEST_PAIRS else np.inf
         return float(np.clip(log - other, -most, most).sum())
 
-    def all(
-        self, likely: Callable[[Bodies], Float64[np.ndarray, "pair"]], bodies: list[Bodies]
-    ) -> list[Float64[np.ndarray, "pair"]]:
-        """Evidence of each."""
-        return in_threads(likely, bodies)
-
 
 def tell_postures(
     observations: Observations,
@@ -126,18 +119,18 @@ def _knees(
 
     step = 2 * np.pi / DIRECTIONS
     angles = step * np.arange(DIRECTIONS)
-    upright, *sitting = evidence.all(likely, [Bodies.standing(axis_xy), *map(seated, angles)])
+    upright, *sitting = in_threads(likely, [Bodies.standing(axis_xy), *map(seated, angles)])
     best = int(np.argmax([evidence.lead(log, upright) for log in sitting]))
     if evidence.lead(sitting[best], upright) <= TO_SIT:
         return np.nan
     around = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     shifted = [Bodies.standing(axis_xy + far * away) for far in SHIFTS_M for away in around]
-    rivals = [upright, *evidence.all(likely, shifted)]
+    rivals = [upright, *in_threads(likely, shifted)]
     rival = max(rivals, key=lambda log: evidence.lead(log, upright))
     if evidence.lead(sitting[best], rival) <= TO_SIT:
         return np.nan
     between = [step * (best - 0.5), step * (best + 0.5)]
     found = [(sitting[best], angles[best])]
-    found += zip(evidence.all(likely, [*map(seated, between)]), between, strict=True)
+    found += zip(in_threads(likely, [*map(seated, between)]), between, strict=True)
     likeliest = max(found, key=lambda row: evidence.lead(row[0], upright))
     return float(likeliest[1] % (2 * np.pi))

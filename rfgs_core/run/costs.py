@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 
@@ -50,8 +50,11 @@ USUAL_GAUSSIANS = 6000
 #: With the objective of the paper alone, on two cores of an Intel Xeon, 2026-11-26: a sample
 #: point; a step, and as much more for each Gaussian of the start, of which four come [s].
 USUAL_POINT_S, USUAL_PAPER_STEP_S, USUAL_PAPER_GAUSSIAN_S = 3e-4, 0.01, 2e-6
-#: Looks at a frame there while people are posed [s].
-USUAL_LOOK_S = 0.5
+#: Bars of what comes before frames are fitted.
+FIND, POSE = "finding people", "posing people"
+#: Finding who is in a frame there, times the square of their number, and a look at a frame while
+#: one of them is posed [s].
+USUAL_FIND_S, USUAL_LOOK_S = 1.0, 0.5
 #: Counting people in a frame there, times the square of their number [s].
 USUAL_COUNT_S = 6.0
 #: PLY, features and checkpoint of a Gaussian of a frame [B].
@@ -84,10 +87,21 @@ def expected(run: Run) -> Costs:
     return Costs(each["find"], each["solve"], each["step"])
 
 
-def pose_stage(run: Run, looks: int) -> Stage:
-    """Posing people before frames are fitted, in so many looks at frames."""
-    what = [run.config.radio, run.sequence.layout(run.config.radio).measured.shape]
-    return Stage("pose", "train-pose", what, looks, Speed(0.0, USUAL_LOOK_S))
+def pose_stages(run: Run, frames: int, looks: int, people: int) -> list[Stage]:
+    """Finding people and posing them before frames are fitted.
+
+    Args:
+        run: The run.
+        frames: How many frames are read.
+        looks: How often frames are looked at to pose people.
+        people: How many people there are.
+    """
+    what = [run.config.radio, run.sequence.layout(run.config.radio).measured.shape, people]
+    find_s = USUAL_FIND_S * max(people, 1) ** 2
+    return [
+        Stage(FIND, "train-find-people", what, frames, Speed(0.0, find_s)),
+        Stage(POSE, "train-pose", what, looks, Speed(0.0, USUAL_LOOK_S)),
+    ]
 
 
 def count_stage(sequence: Sequence, radio: str, votes: int, instances: int) -> Stage:
@@ -124,18 +138,18 @@ def speed_noted(stage: Stage) -> Iterator[Clock]:
         note_speed(stage, speed)
 
 
-def price_line(run: Run, looks: int = 0) -> str:
+def price_line(run: Run, posing: Iterable[Stage] = ()) -> str:
     """One line before a training begins: how much, how long, and what would be less.
 
     Args:
         run: The run; its settings say how many steps and Gaussians.
-        looks: How often frames are looked at to pose people.
+        posing: What comes before frames are fitted; see `pose_stages`.
     """
     settings = run.config.settings
     frames = sum(not run.ply_path(frame).is_file() for frame in run.frames)
     size = size_in_words(frames * settings.num_gaussians * BYTES_PER_GAUSSIAN)
-    posing = [pose_stage(run, looks)] if looks and frames else []
-    found = forecast([*posing, *stages(run.config, run.sequence, frames, settings.iterations)])
+    before = posing if frames else []
+    found = forecast([*before, *stages(run.config, run.sequence, frames, settings.iterations)])
     return (
         f"{count_in_words(frames, 'frame')} to fit, {settings.iterations} steps each, "
         f"about {size}; about {in_words(found.total_s)}, {found.source}; fewer --frames or "

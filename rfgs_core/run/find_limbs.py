@@ -27,9 +27,11 @@ from rfgs_core.limbs.skins import PosedPeople, shapes_of
 from rfgs_core.limbs.together import walk_with_network
 from rfgs_core.limbs.weights import Trained, own_network
 from rfgs_core.measure.observations import Observations
+from rfgs_core.run.costs import FIND, POSE
 from rfgs_core.run.folder import LIMBS_FILE, Run
 from rfgs_core.run.limbs import REMEDY, Limbs, read_limbs, store_limbs
 from rfgs_core.run.people import known_people
+from rfgs_core.run.pose_bars import Begin, no_bar
 from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import TrainConfig
 
@@ -62,8 +64,7 @@ def find_limbs(
     run: Run,
     config: TrainConfig,
     trained: Trained | None,
-    on_frame: Callable[[], Any] = lambda: None,
-    seeking: Callable[[int], Callable[[], Any]] = lambda _: lambda: None,
+    begin: Begin = no_bar,
 ) -> Limbs | None:
     """Follows people through a run's frames and poses them; what is kept is read.
 
@@ -76,9 +77,8 @@ def find_limbs(
         run: The run.
         config: Its settings.
         trained: The network for its radio; None where there is none.
-        on_frame: Called as frames are read and looked at; see `looks_at`.
-        seeking: Told how many looks it takes to seek other postures than walks, if it is done;
-            what it gives is called at each.
+        begin: Told of each stage: people are found (`FIND`) and posed (`POSE`, `looks_at`), and
+            other postures than walks are sought if there are some to find.
 
     Returns:
         None where nothing can be told, or nothing that would be of use.
@@ -91,14 +91,15 @@ def find_limbs(
             )
         return kept
     frames = frames_read(run)
-    seen, tracks, alone = _read(run, frames, config, on_frame)
+    seen, tracks, alone = _read(run, frames, config, begin(FIND, len(frames)))
     # A vehicle is a body too, and does not walk.
     only_people = len(alone[0]) == known_people(run)
     walks = only_people and evidence_tells(run, frames)
     told: list[Joints | None] = [None] * len(alone[0])
+    on_frame = begin(POSE, looks_at(run, trained) if only_people else 0)
     if walks:
         told = _by_evidence(alone, tracks, config.seed, on_frame)
-        told = _by_postures(told, alone, tracks, config.seed, seeking)
+        told = _by_postures(told, alone, tracks, config.seed, begin)
     shapes = None
     if trained is not None:
         said = _by_network(trained, alone, tracks)
@@ -154,11 +155,11 @@ def evidence_tells(run: Run, frames: list[int]) -> bool:
 
 
 def looks_at(run: Run, trained: Trained | None) -> int:
-    """How often `find_limbs` calls `on_frame`, if somebody walks wherever evidence may tell."""
+    """How often frames are looked at to pose people, if they walk wherever evidence may tell."""
     frames, people = frames_read(run), known_people(run)
     by_evidence = people * looks(len(frames)) if evidence_tells(run, frames) else 0
     rounds = _ROUNDS if trained is not None and people > 1 else 0
-    return (1 + rounds) * len(frames) + by_evidence
+    return rounds * len(frames) + by_evidence
 
 
 def _alone(
@@ -190,7 +191,7 @@ def _by_postures(
     alone: list[list[Observations]],
     tracks: list[Tracks],
     seed: int,
-    seeking: Callable[[int], Callable[[], Any]],
+    begin: Begin,
 ) -> list[Joints | None]:
     """Joints in all frames, as `told` where a walk is; None of whom nothing is.
 
@@ -199,7 +200,7 @@ def _by_postures(
     """
     if len(told) > 1 or told[0] is not None or not can_tell(alone[0][0]):
         return told
-    on_frame = seeking(posture_looks(len(alone)))
+    on_frame = begin("seeking postures", posture_looks(len(alone)))
     axes_xy = np.array([track.axes_xy[0] for track in tracks])
     one = tell_posture([frame[0] for frame in alone], axes_xy, seed, on_frame)
     return [None if one is None else one.joints]

@@ -5,13 +5,8 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
-from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
-
-from tqdm import tqdm
 
 from rfgs_core.arrays import save_arrays
 from rfgs_core.background.learned import (
@@ -32,7 +27,7 @@ from rfgs_core.limbs.weights import Trained
 from rfgs_core.locks import alone_in
 from rfgs_core.measure.offsets import Offsets
 from rfgs_core.measure.resolving import resolving
-from rfgs_core.past import Speed, note_speed
+from rfgs_core.past import Speed, Stage, note_speed
 from rfgs_core.run.begun import POINT_CLOUD_FILE, asked_of, open_or_create, refuse_other_files
 from rfgs_core.run.calibration import (
     calibration_path,
@@ -41,7 +36,7 @@ from rfgs_core.run.calibration import (
     write_calibration,
 )
 from rfgs_core.run.checkpoint import checkpoint_path, finished_frame, partial_path, store_frame
-from rfgs_core.run.costs import CostBar, cost_bar, pose_stage, price_line
+from rfgs_core.run.costs import CostBar, cost_bar, pose_stages, price_line
 from rfgs_core.run.encoders import (
     ENCODER_FILE,
     keep_encoder,
@@ -64,7 +59,8 @@ from rfgs_core.run.folder import (
 )
 from rfgs_core.run.limbs import Limbs
 from rfgs_core.run.log import Scalars, TrainingLog
-from rfgs_core.run.people import People, need_no_people
+from rfgs_core.run.people import People, known_people, need_no_people
+from rfgs_core.run.pose_bars import PoseBars
 from rfgs_core.run.static import (
     has_static_set,
     need_phases,
@@ -178,10 +174,10 @@ def _fit_frames(run: Run, config: TrainConfig, log: bool) -> float:
     trained = limbs_network(run) if limbs_wanted(run, config) else None
     # What is told of limbs is not kept where it is of no use, and a finished run needs none of it.
     left = [frame for frame in run.frames if not checkpoint_path(run.path, frame).exists()]
-    looks = looks_at(run, trained) if left and (trained or _evidence(run, config)) else 0
+    posing = _posing(run, trained) if left and (trained or _evidence(run, config)) else []
     can = resolving(run.sequence, run.config.radio, config.num_gaussians, config.observe)
-    sys.stderr.write("".join(f"{line}\n" for line in [*can.lines(), price_line(run, looks)]))
-    limbs = _limbs(run, config, trained, looks) if looks else None
+    sys.stderr.write("".join(f"{line}\n" for line in [*can.lines(), price_line(run, posing)]))
+    limbs = _limbs(run, config, trained, posing) if posing else None
     spent += time.perf_counter() - begin
     with (
         cost_bar(run, config.iterations) as bar,
@@ -209,23 +205,20 @@ def _evidence(run: Run, config: TrainConfig) -> bool:
     return limbs_wanted(run, config) and evidence_tells(run, frames_read(run))
 
 
-def _limbs(run: Run, config: TrainConfig, trained: Trained | None, looks: int) -> Limbs | None:
+def _posing(run: Run, trained: Trained | None) -> list[Stage]:
+    """Finding and posing the people of all frames."""
+    return pose_stages(run, len(frames_read(run)), looks_at(run, trained), known_people(run))
+
+
+def _limbs(
+    run: Run, config: TrainConfig, trained: Trained | None, posing: list[Stage]
+) -> Limbs | None:
     """Follows and poses the people of all frames, where a network or evidence tells limbs."""
-    begin = time.perf_counter()
-    with ExitStack() as bars, one_torch_thread():
-        bar = bars.enter_context(tqdm(total=looks, desc="posing people"))
-        spent_s: list[float] = []
-
-        def seeking(count: int) -> Callable[[], Any]:
-            spent_s.append(time.perf_counter() - begin)
-            return bars.enter_context(tqdm(total=count, desc="seeking postures")).update
-
-        limbs = find_limbs(run, config, trained, bar.update, seeking)
-        spent_s.append(time.perf_counter() - begin)
-        if bar.n >= looks:
-            # Of whom no walk is told other postures are sought, which takes longer.
-            each_s = spent_s[0] / looks
-            note_speed(pose_stage(run, looks), Speed(0.0, each_s))
+    with PoseBars() as bars, one_torch_thread():
+        limbs = find_limbs(run, config, trained, bars.begin)
+    for stage in posing:
+        if stage.name in bars.step_s:
+            note_speed(stage, Speed(0.0, bars.step_s[stage.name]))
     return limbs
 
 

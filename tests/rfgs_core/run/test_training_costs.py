@@ -13,7 +13,16 @@ import pytest
 
 from rfgs_core.past import forecast
 from rfgs_core.run import costs
-from rfgs_core.run.costs import USUAL, CostBar, Costs, count_stage, expected, price_line, stages
+from rfgs_core.run.costs import (
+    USUAL,
+    CostBar,
+    Costs,
+    count_stage,
+    expected,
+    pose_stages,
+    price_line,
+    stages,
+)
 from rfgs_core.settings import TrainConfig, TrainOptions
 
 STEPS = 10
@@ -102,8 +111,9 @@ def test_posing_people_is_part_of_the_price(clock: Clock, run: Any) -> None:
         (word,) = re.findall(r"; about (\d+) s", line)
         return float(word)
 
-    more = seconds(price_line(run, looks=40)) - seconds(price_line(run))
-    assert more == pytest.approx(40 * costs.USUAL_LOOK_S, abs=1.0)
+    more = seconds(price_line(run, pose_stages(run, 8, 40, 2))) - seconds(price_line(run))
+    found_s = 8 * 4 * costs.USUAL_FIND_S
+    assert more == pytest.approx(found_s + 40 * costs.USUAL_LOOK_S, abs=1.0)
 
 
 def test_counting_several_people_is_said_to_take_longer(run: Any) -> None:

@@ -30,28 +30,10 @@ def covariances(
     return axes @ axes.transpose(1, 2)
 
 
-def packed_covariances(
-    quats: Float[Tensor, "gaussian 4"], scales: Float[Tensor, "gaussian 3"]
-) -> Float[Tensor, "6 gaussian"]:
-    """Distinct entries xx, yy, zz, xy, xz, yz of `covariances`, one row each.
-
-    Written out per entry: torch takes four times as long for many products of 3x3 matrices.
-    """
-    quats = torch.nn.functional.normalize(quats, dim=-1)
-    rows = rotation_rows(*quats.T.contiguous().unbind(0))
-    first, second, third = (scales.T.contiguous() ** 2).unbind(0)
-    weighted = [(a * first, b * second, c * third) for a, b, c in rows]
-    entries = [
-        sum(left * right for left, right in zip(weighted[a], rows[b], strict=True))
-        for a, b in zip(PACKED_ROWS, PACKED_COLS, strict=True)
-    ]
-    return torch.stack([torch.as_tensor(entry) for entry in entries])
-
-
 def covariances_by_products(
     quats: Float[Tensor, "gaussian 4"], scales: Float[Tensor, "gaussian 3"]
 ) -> Float[Tensor, "6 gaussian"]:
-    """As `packed_covariances`, in a few large steps: small ones make a GPU wait.
+    """Their entries xx, yy, zz, xy, xz, yz in a few large steps: small ones make a GPU wait.
 
     A rotation is linear in the products of its unit quaternion's entries.
     """

@@ -12,8 +12,12 @@ from jaxtyping import Complex, Float
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
-from rfgs_core.propagation import kernels_scatter, kernels_scatter_gradient, kernels_shadow
-from rfgs_core.propagation.covariance import packed_covariances
+from rfgs_core.propagation import (
+    kernels_covariance,
+    kernels_scatter,
+    kernels_scatter_gradient,
+    kernels_shadow,
+)
 from rfgs_core.propagation.fresnel import leg_frames
 from rfgs_core.propagation.geometry import EnvironmentPaths, Links, Subcarriers
 from rfgs_core.propagation.kernels_scatter import UNROLL, Cloud, Plan
@@ -83,6 +87,34 @@ def _gain_basis(subcarriers: Subcarriers, knots: int, at: int, centre: float) ->
 def _rows(tensor: Tensor, real: torch.dtype) -> np.ndarray:
     """A contiguous array of the tensor's values."""
     return tensor.detach().to(real).contiguous().numpy()
+
+
+class _Covariances(torch.autograd.Function):
+    """Distinct entries xx, yy, zz, xy, xz, yz of covariances, one row each."""
+
+    @staticmethod
+    def forward(ctx: Any, quats: Tensor, scales: Tensor) -> Tensor:
+        """Args: see `rfgs_core.propagation.covariance.covariances`; of one precision."""
+        ctx.rows = _rows(quats.T, scales.dtype), _rows(scales.T, scales.dtype)
+        entries = np.zeros((6, len(scales)), dtype=ctx.rows[1].dtype)
+        kernels_covariance.covariance_forward(*ctx.rows, entries)
+        return torch.from_numpy(entries)
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, *grads: Tensor) -> tuple[Tensor, ...]:
+        """Chains the gradient of the entries to quaternions and scales."""
+        (quats, scales), seed = ctx.rows, _rows(grads[0], grads[0].dtype)
+        by_quats, by_scales = np.zeros_like(quats), np.zeros_like(scales)
+        kernels_covariance.covariance_backward(quats, scales, seed, by_quats, by_scales)
+        return torch.from_numpy(by_quats).T, torch.from_numpy(by_scales).T
+
+
+def packed_covariances(
+    quats: Float[Tensor, "gaussian 4"], scales: Float[Tensor, "gaussian 3"]
+) -> Float[Tensor, "6 gaussian"]:
+    """Twin of `covariances`: distinct entries xx, yy, zz, xy, xz, yz, one row each."""
+    return _Covariances.apply(quats.to(scales.dtype), scales)
 
 
 class _Scatter(torch.autograd.Function):

@@ -66,12 +66,16 @@ class CloudGradient(NamedTuple):
 
 
 @njit(inline="always", **OPTIONS)
-def _add(x: float, y: float, g: float, h: float, at: float, sums: Any) -> Any:
-    """Adds one subcarrier, (x + jy)(g + jh) kappa^n, to the moments n = 0, 1, 2."""
-    p, q = x * g - y * h, x * h + y * g
-    p1, q1 = p * at, q * at
+def _add(x: float, y: float, g: float, h: float, sums: Any) -> Any:
+    """Adds one subcarrier, (x + jy)(g + jh), to sums, sums of these, and sums of those.
+
+    Additions alone: moments by multiples of kappa would keep the multipliers busy, which the
+    recurrence needs.
+    """
     s, t, s1, t1, s2, t2 = sums
-    return s + p, t + q, s1 + p1, t1 + q1, s2 + p1 * at, t2 + q1 * at
+    s, t = s + (x * g - y * h), t + (x * h + y * g)
+    s1, t1 = s1 + s, t1 + t
+    return s, t, s1, t1, s2 + s1, t2 + t1
 
 
 @njit(forceinline=True, **OPTIONS)
@@ -80,29 +84,37 @@ def _moment_subcarriers(n: int, seed: np.ndarray, centre: float, w: np.ndarray) 
     zr, zi, rr, ri, e = w[ZR], w[ZI], w[RR], w[RI], w[E]
     c0, d0, c1 = w[MOMENTS], w[MOMENTS + 1], w[MOMENTS + 2]
     d1, c2, d2 = w[MOMENTS + 3], w[MOMENTS + 4], w[MOMENTS + 5]
-    real, zero = w.dtype.type, w.dtype.type(0.0)
-    w[MOMENTS:ROWS, :n] = zero
+    w[MOMENTS:ROWS, :n] = w.dtype.type(0.0)
     for m in range(0, seed.shape[1], UNROLL):
         g0, g1, g2, g3 = seed[0, m], seed[0, m + 1], seed[0, m + 2], seed[0, m + 3]
         h0, h1, h2, h3 = seed[1, m], seed[1, m + 1], seed[1, m + 2], seed[1, m + 3]
-        a0, a1 = real(m - centre), real(m + 1 - centre)
-        a2, a3 = real(m + 2 - centre), real(m + 3 - centre)
         for b in range(n):
             x, y, u, v, s = zr[b], zi[b], rr[b], ri[b], e[b]
-            sums = _add(x, y, g0, h0, a0, (zero, zero, zero, zero, zero, zero))
+            sums = _add(x, y, g0, h0, (c0[b], d0[b], c1[b], d1[b], c2[b], d2[b]))
             x, y, u, v = turn(x, y, u, v, s)
-            sums = _add(x, y, g1, h1, a1, sums)
+            sums = _add(x, y, g1, h1, sums)
             x, y, u, v = turn(x, y, u, v, s)
-            sums = _add(x, y, g2, h2, a2, sums)
+            sums = _add(x, y, g2, h2, sums)
             x, y, u, v = turn(x, y, u, v, s)
-            sums = _add(x, y, g3, h3, a3, sums)
+            sums = _add(x, y, g3, h3, sums)
             zr[b], zi[b], rr[b], ri[b] = turn(x, y, u, v, s)
-            c0[b] += sums[0]
-            d0[b] += sums[1]
-            c1[b] += sums[2]
-            d1[b] += sums[3]
-            c2[b] += sums[4]
-            d2[b] += sums[5]
+            c0[b], d0[b], c1[b], d1[b], c2[b], d2[b] = sums
+    _about_centre(n, w.dtype.type(seed.shape[1] - centre), w)
+
+
+@njit(forceinline=True, **OPTIONS)
+def _about_centre(n: int, centre: float, w: np.ndarray) -> None:
+    """From sums of sums to moments about the centre, so many subcarriers before the end.
+
+    Of the subcarrier j before the end, 1 being the last, they hold j and j (j + 1) / 2 times.
+    """
+    c0, d0, c1 = w[MOMENTS], w[MOMENTS + 1], w[MOMENTS + 2]
+    d1, c2, d2 = w[MOMENTS + 3], w[MOMENTS + 4], w[MOMENTS + 5]
+    for b in range(n):
+        x, y = centre * c0[b] - c1[b], centre * d0[b] - d1[b]
+        c2[b] = centre * (x - c1[b]) + (c2[b] + c2[b]) - c1[b]
+        d2[b] = centre * (y - d1[b]) + (d2[b] + d2[b]) - d1[b]
+        c1[b], d1[b] = x, y
 
 
 @njit(forceinline=True, **OPTIONS)

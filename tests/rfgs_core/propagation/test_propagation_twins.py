@@ -10,7 +10,13 @@ import torch
 
 from rfgs_core.bench import PropagationBench, bench_propagation
 from rfgs_core.propagation import Links, Subcarriers, scatter, shadow
-from rfgs_core.propagation.covariance import covariances_by_products, packed_covariances
+from rfgs_core.propagation.covariance import (
+    PACKED_COLS,
+    PACKED_ROWS,
+    covariances,
+    covariances_by_products,
+)
+from rfgs_core.propagation.fast import packed_covariances
 
 SCATTER = ("means", "quats", "scales_rf", "gamma", "normals", "visibility")
 SHADOW = ("means", "quats", "scales", "alpha")
@@ -50,11 +56,13 @@ def test_the_gradient_of_reflectivities_alone_is_the_twin_s(
     assert_twins_agree(run, {"gamma": every["gamma"]})
 
 
-def test_covariances_of_a_gpu_are_those_of_the_cpu(make_cloud) -> None:
+@pytest.mark.parametrize("fast", [packed_covariances, covariances_by_products])
+@pytest.mark.parametrize("count", [1, 57, 128, 300])
+def test_covariances_of_cpu_and_gpu_are_those_of_products(make_cloud, fast, count) -> None:
     """Quaternions of any length, and thin Gaussians."""
-    cloud = make_cloud(57, dtype=torch.float64)
+    cloud = make_cloud(count, dtype=torch.float64)
     quats, scales = 3.0 * cloud["quats"], cloud["scales"] * torch.tensor([1.0, 1e-3, 1.0])
-    plain, found = packed_covariances(quats, scales), covariances_by_products(quats, scales)
+    plain, found = covariances(quats, scales)[:, PACKED_ROWS, PACKED_COLS].T, fast(quats, scales)
     torch.testing.assert_close(found, plain, rtol=1e-12, atol=1e-18)
     weights = torch.linspace(-1.0, 2.0, plain.numel(), dtype=torch.float64).reshape(plain.shape)
     leaves = (cloud["quats"], cloud["scales"])
@@ -63,6 +71,14 @@ def test_covariances_of_a_gpu_are_those_of_the_cpu(make_cloud) -> None:
     ]
     for slope, expected in zip(ends[1], ends[0], strict=True):
         torch.testing.assert_close(slope, expected, rtol=1e-9, atol=1e-15)
+
+
+def test_covariances_have_no_numerical_slope_but_their_own(make_cloud) -> None:
+    """Twins may share a mistake; differences of the values do not."""
+    cloud = make_cloud(5, dtype=torch.float64)
+    quats = (2.0 * cloud["quats"]).detach().requires_grad_(True)
+    scales = (20.0 * cloud["scales"]).detach().requires_grad_(True)
+    assert torch.autograd.gradcheck(packed_covariances, (quats, scales))
 
 
 @pytest.mark.parametrize("wavelength_m", [0.052, 0.0048])

@@ -53,8 +53,8 @@ USUAL_POINT_S, USUAL_PAPER_STEP_S, USUAL_PAPER_GAUSSIAN_S = 3e-4, 0.01, 2e-6
 #: Bars of what comes before frames are fitted.
 FIND, POSE = "finding people", "posing people"
 #: Finding who is in a frame there, times the square of their number, and a look at a frame while
-#: one of them is posed [s].
-USUAL_FIND_S, USUAL_LOOK_S = 1.0, 0.5
+#: one of them is posed, 2026-11-30 [s].
+USUAL_FIND_S, USUAL_LOOK_S = 1.2, 0.13
 #: Counting people in a frame there, times the square of their number [s].
 USUAL_COUNT_S = 6.0
 #: PLY, features and checkpoint of a Gaussian of a frame [B].

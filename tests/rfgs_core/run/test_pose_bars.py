@@ -30,7 +30,7 @@ def test_each_stage_has_a_bar_and_a_speed_of_its_own(
 
 
 def test_a_stage_left_before_its_end_tells_no_speed(capsys: pytest.CaptureFixture[str]) -> None:
-    """People who do not walk are seen not to long before all looks are taken."""
+    """That people do not walk is clear before all looks are taken."""
     with PoseBars() as bars:
         step = bars.begin("posing people", 4)
         step()

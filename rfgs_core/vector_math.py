@@ -62,6 +62,13 @@ def three_rows(table: np.ndarray, first: int, n: int) -> tuple[np.ndarray, ...]:
 
 
 @njit(inline="always", **_OPTIONS)
+def four_rows(table: np.ndarray, first: int, n: int) -> tuple[np.ndarray, ...]:
+    """Views of n columns of a table's four rows, as `three_rows`."""
+    end = first + n
+    return table[0, first:end], table[1, first:end], table[2, first:end], table[3, first:end]
+
+
+@njit(inline="always", **_OPTIONS)
 def six_rows(table: np.ndarray, first: int, n: int) -> tuple[np.ndarray, ...]:
     """Views of n columns of a table's six rows, as `three_rows`."""
     end = first + n

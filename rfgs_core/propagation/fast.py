@@ -268,6 +268,6 @@ def shadow(
     paths: EnvironmentPaths,
 ) -> Complex[Tensor, "path"]:
     """Twin of `rfgs_core.propagation.shadow` on the CPU's vector units."""
-    shape = packed_covariances(quats.to(torch.float64), scales.to(torch.float64))
+    shape = packed_covariances(quats, scales.to(torch.float64))
     legs = leg_frames(paths).table().numpy()
     return _Shadow.apply(means.T, shape, alpha.to(scales.dtype), legs, paths.wavelength_m)

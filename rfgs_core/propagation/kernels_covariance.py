@@ -18,17 +18,10 @@ import numpy as np
 from numba import njit, prange
 
 from rfgs_core.propagation.kernels_scatter import OPTIONS
-from rfgs_core.vector_math import BLOCK, six_rows, three_rows
+from rfgs_core.vector_math import BLOCK, four_rows, six_rows, three_rows
 
 #: A quaternion shorter than this is taken as this long, as `torch.nn.functional.normalize` does.
 _SHORTEST = 1e-12
-
-
-@njit(inline="always", **OPTIONS)
-def _four_rows(table: np.ndarray, first: int, n: int) -> Any:
-    """Views of n columns of a table's four rows, as `three_rows`."""
-    end = first + n
-    return table[0, first:end], table[1, first:end], table[2, first:end], table[3, first:end]
 
 
 @njit(inline="always", **OPTIONS)
@@ -52,7 +45,7 @@ def _axes(w: float, x: float, y: float, z: float, one: float) -> Any:
 def _entries(quats: np.ndarray, scales: np.ndarray, first: int, n: int, out: np.ndarray) -> None:
     """One block of `covariance_forward`."""
     real = quats.dtype.type
-    qw, qx, qy, qz = _four_rows(quats, first, n)
+    qw, qx, qy, qz = four_rows(quats, first, n)
     s1, s2, s3 = three_rows(scales, first, n)
     xx, yy, zz, xy, xz, yz = six_rows(out, first, n)
     shortest, one = real(_SHORTEST), real(1.0)
@@ -81,10 +74,10 @@ def _chain(
 ) -> None:
     """One block of `covariance_backward`."""
     real = quats.dtype.type
-    qw, qx, qy, qz = _four_rows(quats, first, n)
+    qw, qx, qy, qz = four_rows(quats, first, n)
     s1, s2, s3 = three_rows(scales, first, n)
     xx, yy, zz, xy, xz, yz = six_rows(seed, first, n)
-    gw, gx, gy, gz = _four_rows(by_quats, first, n)
+    gw, gx, gy, gz = four_rows(by_quats, first, n)
     g1, g2, g3 = three_rows(by_scales, first, n)
     shortest, one, half = real(_SHORTEST), real(1.0), real(0.5)
     for b in range(n):

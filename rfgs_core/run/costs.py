@@ -98,10 +98,11 @@ def pose_stages(run: Run, frames: int, looks: int, people: int) -> list[Stage]:
     """
     what = [run.config.radio, run.sequence.layout(run.config.radio).measured.shape, people]
     find_s = USUAL_FIND_S * max(people, 1) ** 2
-    return [
+    both = (
         Stage(FIND, "train-find-people", what, frames, Speed(0.0, find_s)),
         Stage(POSE, "train-pose", what, looks, Speed(0.0, USUAL_LOOK_S)),
-    ]
+    )
+    return [stage for stage in both if stage.steps]
 
 
 def count_stage(sequence: Sequence, radio: str, votes: int, instances: int) -> Stage:

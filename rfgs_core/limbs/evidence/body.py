@@ -95,12 +95,12 @@ def images_of(
         bounds_m: Corners of the room [m].
         centre: Middle of the body [m].
     """
-    away_m = [float(np.linalg.norm(end.centre - centre)) for end in (pair.tx, pair.rx)]
-    images = []
-    for axis in range(3):
-        for at_m in bounds_m[:, axis].tolist():
-            for which, end in enumerate((pair.tx, pair.rx)):
-                mirrored = end.mirrored(axis, at_m).centre
-                if float(np.linalg.norm(mirrored - centre)) - away_m[which] <= _LATEST_M:
-                    images.append((which, axis, at_m))
-    return Images.of(images)
+    ends = np.array([pair.tx.centre, pair.rx.centre]).T - centre[:, None]
+    walls = bounds_m.T - centre[:, None]
+    squares = ends**2
+    away_m = np.sqrt(squares.sum(axis=0))
+    # By axis, wall and end.
+    mirrored = (2.0 * walls[:, :, None] - ends[:, None]) ** 2
+    late_m = np.sqrt(mirrored + (squares.sum(axis=0) - squares)[:, None]) - away_m
+    axis, wall, end = np.nonzero(late_m <= _LATEST_M)
+    return Images(end, axis, bounds_m[wall, axis])

@@ -30,6 +30,8 @@ class End(NamedTuple):
 
     xyz: Float64[np.ndarray, "element 3"]
     """Where they are [m]."""
+    centre: Float64[np.ndarray, "3"]
+    """Mean of the elements [m]."""
     steered_m: Float64[np.ndarray, "element"]
     """Distance of each to the place that they are steered to [m]."""
     block: Int64[np.ndarray, "element"]
@@ -47,18 +49,8 @@ class End(NamedTuple):
         )
         block = np.unique(up * (across.max() + 1) + across, return_inverse=True)[1].astype(np.int64)
         steered_m = np.linalg.norm(xyz - centre, axis=1)
-        return End(np.ascontiguousarray(xyz), steered_m, block, 1.0 / np.sqrt(np.bincount(block)))
-
-    @property
-    def centre(self) -> Float64[np.ndarray, "3"]:
-        """Mean of the elements [m]."""
-        return self.xyz.mean(axis=0)
-
-    def mirrored(self, axis: int, at_m: float) -> End:
-        """Its image in a wall across one of the world's axes; it stays steered as it is."""
-        xyz = self.xyz.copy()
-        xyz[:, axis] = 2.0 * at_m - xyz[:, axis]
-        return self._replace(xyz=xyz)
+        share = 1.0 / np.sqrt(np.bincount(block))
+        return End(np.ascontiguousarray(xyz), xyz.mean(axis=0), steered_m, block, share)
 
 
 class Bands(NamedTuple):

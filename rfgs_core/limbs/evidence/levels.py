@@ -54,7 +54,10 @@ class Levels(NamedTuple):
             parts: Covariances of at least an upper triangle; one without power has no say.
             start: Levels to start from, noise first; None: equal ones.
         """
-        whole = np.array([np.eye(len(change)), *map(_whole, parts)], dtype=np.complex128)
+        whole = np.zeros((1 + len(parts), len(change), len(change)), dtype=np.complex128)
+        np.fill_diagonal(whole[0], 1.0)
+        for part, here in zip(parts, whole[1:], strict=True):
+            _fill(part, here)
         if len(whole) == 1:
             # White noise alone has the mean power.
             power = float(np.vdot(change, change).real) / len(change)
@@ -108,7 +111,10 @@ class Levels(NamedTuple):
         whitener = np.linalg.inv(np.linalg.cholesky(self.covariance))
         white = whitener @ self.change
         before = -len(white) * (math.log(np.vdot(white, white).real / len(white)) + 1.0)
-        whitened = whitener @ _whole(np.array(parts)) @ whitener.conj().T
+        whole = np.zeros((len(parts), *whitener.shape), dtype=np.complex128)
+        for part, here in zip(parts, whole, strict=True):
+            _fill(part, here)
+        whitened = whitener @ whole @ whitener.conj().T
         return np.maximum([log_evidence(white, part) - before for part in whitened], 0.0)
 
 
@@ -172,10 +178,16 @@ def _least_noise(level: np.ndarray, entries: int) -> float:
     return max(LEAST_NOISE, _ROUNDING * entries * level[1:].sum())
 
 
-def _whole(
-    upper: Complex[np.ndarray, "*part entry entry"],
-) -> Complex128[np.ndarray, "*part entry entry"]:
-    """Both triangles of covariances, at mean power 1."""
-    level = np.diagonal(upper, axis1=-2, axis2=-1).real.mean(axis=-1)[..., None, None]
-    matrix = np.triu(upper) + np.triu(upper, 1).conj().swapaxes(-2, -1)
-    return (matrix / np.where(level > 0.0, level, 1.0)).astype(np.complex128)
+@numba.njit(cache=True, nogil=True)
+def _fill(upper: np.ndarray, whole: np.ndarray) -> None:
+    """Both triangles of a covariance, zero on entry, at mean power 1; no power fills nothing."""
+    size, level = len(upper), 0.0
+    for n in range(size):
+        level += upper[n, n].real / size
+    if level <= 0.0:
+        return
+    for n in range(size):
+        whole[n, n] = upper[n, n].real / level
+        for m in range(n + 1, size):
+            entry = upper[n, m] / level
+            whole[n, m], whole[m, n] = entry, entry.conjugate()

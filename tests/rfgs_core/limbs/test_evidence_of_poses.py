@@ -97,11 +97,18 @@ def plain(pair: Pair, facets: Facets, tx: End, rx: End) -> np.ndarray:
     return kept.T @ kept.conj()
 
 
+def mirrored(end: End, axis: int, at_m: float) -> End:
+    """Its image in a wall across one of the world's axes; it stays steered as it is."""
+    xyz = end.xyz.copy()
+    xyz[:, axis] = 2.0 * at_m - xyz[:, axis]
+    return end._replace(xyz=xyz, centre=xyz.mean(axis=0))
+
+
 @pytest.mark.parametrize("pair", [0, 1, 6])
 @pytest.mark.parametrize("mirror", [False, True])
 def test_the_kernel_is_its_formula(frame, facets, pair: int, mirror: bool) -> None:
     one = pairs_of(frame, CENTRE)[pair]
-    rx = one.rx.mirrored(1, 2.5) if mirror else one.rx
+    rx = mirrored(one.rx, 1, 2.5) if mirror else one.rx
     every = np.ones(len(facets.points), bool)
     images = Images.of([(1, 1, 2.5)]) if mirror else STRAIGHT
     got = np.triu(covariance(one, facets, every, every, LOBE_RAD, images))
@@ -193,6 +200,20 @@ def test_what_is_hidden_has_no_influence(frame) -> None:
     assert np.isfinite(one).all() and (one != stacked([table(frame, [PHASE])])).any()
 
 
+def test_images_count_that_lead_no_more_than_six_metres_astray(frame) -> None:
+    middle = np.array([1.2, 2.1, 1.0])
+    for pair in pairs_of(frame, CENTRE):
+        wanted = []
+        for axis, at_m in ((0, -2.0), (0, 9.0), (1, -7.5), (1, 4.5), (2, 0.0), (2, 2.4)):
+            for which, end in enumerate((pair.tx, pair.rx)):
+                there = mirrored(end, axis, at_m).centre
+                longer_m = np.linalg.norm(there - middle) - np.linalg.norm(end.centre - middle)
+                wanted += [(which, axis, at_m)] if longer_m <= 6.0 else []
+        assert 0 < len(wanted) < 12
+        got = images_of(pair, np.array([[-2.0, -7.5, 0.0], [9.0, 4.5, 2.4]]), middle)
+        assert list(zip(*got, strict=True)) == wanted
+
+
 def test_a_wall_sends_what_images_of_the_ends_send(frame) -> None:
     pair = pairs_of(frame, CENTRE)[1]
     body = people().body(np.zeros(0))
@@ -202,8 +223,8 @@ def test_a_wall_sends_what_images_of_the_ends_send(frame) -> None:
     few = there.facets.thinned(8)
     every = np.ones(len(few.points), bool)
     images = (
-        pair._replace(tx=pair.tx.mirrored(1, 2.5)),
-        pair._replace(rx=pair.rx.mirrored(1, 2.5)),
+        pair._replace(tx=mirrored(pair.tx, 1, 2.5)),
+        pair._replace(rx=mirrored(pair.rx, 1, 2.5)),
     )
     wanted = sum(covariance(image, few, every, every, LOBE_RAD) for image in images)
     got = by_bounces(there.facets, pair, images_of(pair, bounds_m, CENTRE))

@@ -40,11 +40,18 @@ def walk_with_network(
     *,
     others: bool = False,
 ) -> Joints:
-    """Joints told by evidence of a walk of mean bodies and by the network: of both.
+    """Joints told by evidence of a walk of mean bodies and by the network: of both, if they agree.
 
-    The walk becomes that of bodies of the size that the network tells. Beside others, or where
-    packets were filtered, it stays as it is: what is left of the others, and noise that is put
-    back, make bodies too small or too tall, and the network is further off than it says.
+    Evidence finds the likeliest walk on the floor, whoever it is; the network does not assume one.
+    Where they contradict each other in more than a quarter of the frames, it alone counts. If they
+    do in single ones only, the walk does there: it is one walk for all frames, while the network is
+    asked for each by itself and takes a back for a front now and then.
+
+    The walk becomes that of bodies of the size that the network tells, and less sure where it is
+    still far from it. That is after they were found to agree: made as tall as the network says,
+    any walk is nearer to it. Beside others, or where packets were filtered, it stays as it is:
+    what is left of the others, and noise that is put back, make bodies too small or too tall, and
+    the network is further off than it says.
 
     Args:
         walk: Of all frames, shape (frame, body, 17, ·).
@@ -53,30 +60,11 @@ def walk_with_network(
         seen: The frames.
         others: Whether others are there.
     """
-    if others or any(one.packets is not None for one in seen):
-        return of_walk_and_network(walk, network, honest=False)
-    own = sized(walk, shapes, float(seen[0].bounds_m[0, 2]))
-    return of_walk_and_network(own, network)
-
-
-def of_walk_and_network(walk: Joints, network: Joints, *, honest: bool = True) -> Joints:
-    """Joints told by evidence of a walk and by the network: of both, as long as they agree.
-
-    Evidence finds the likeliest walk on the floor, whoever it is; the network does not assume one.
-    Where they contradict each other in more than a quarter of the frames, it alone counts. If they
-    do in single ones only, the walk does there: it is one walk for all frames, while the network is
-    asked for each by itself and takes a back for a front now and then.
-
-    Args:
-        walk: Of all frames, shape (frame, body, 17, ·).
-        network: The same.
-        honest: Whether the network is off by no more than it says, so that a walk too far from it
-            is further off than that says.
-    """
     contradicted = contradiction(walk, network) > _CONTRADICTION
     if contradicted.mean() > _TURNED_AROUND:
         return network
-    if honest:
+    if not others and all(one.packets is None for one in seen):
+        walk = sized(walk, shapes, float(seen[0].bounds_m[0, 2]))
         walk = _doubted(walk, network, ~contradicted)
     both, lonely = combined(walk, network), contradicted[:, None, None]
     return Joints(

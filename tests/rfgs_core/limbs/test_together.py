@@ -3,20 +3,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from rfgs_core.articulated import people
+from rfgs_core.articulated import Pose, people
 from rfgs_core.limbs.propose import Joints, combined
 from rfgs_core.limbs.skins import sized
-from rfgs_core.limbs.together import contradiction, of_walk_and_network, walk_with_network
+from rfgs_core.limbs.together import contradiction, walk_with_network
 from rfgs_core.measure.observations import Observations
 from rfgs_core.worlds.motion import random_motion
 
+#: Shape of the mean body.
+MEAN = np.zeros((1, len(people().components)))
 
-def test_a_walk_that_the_network_contradicts_has_no_say() -> None:
+
+@pytest.fixture
+def seen(make_observations: Callable[..., Observations]) -> list[Observations]:
+    return [make_observations()]
+
+
+def of_mean_size(walk: Joints, network: Joints, seen: list[Observations]) -> Joints:
+    """What both tell of somebody whom the network says to be as tall as walks are."""
+    return walk_with_network(walk, network, MEAN, seen)
+
+
+def test_a_walk_that_the_network_contradicts_has_no_say(seen: list[Observations]) -> None:
     """They agree as long as they are apart by less than √3 of what both are expected to be off."""
     walk = Joints(np.zeros((4, 1, 17, 3)), np.full((4, 1, 17), 0.06))
     for share, apart in ((0.98, False), (1.02, True)):
@@ -25,12 +39,14 @@ def test_a_walk_that_the_network_contradicts_has_no_say() -> None:
         off[:, :, ::2, 1] = share * np.sqrt(3.0 * 17 / 9) * np.hypot(0.06, 0.15)
         network = Joints(off, np.full((4, 1, 17), 0.15))
         assert ((contradiction(walk, network) > 3.0) == apart).all()
-        told = of_walk_and_network(walk, network)
+        told = of_mean_size(walk, network, seen)
         assert np.array_equal(told.xyz, network.xyz) == apart
         assert np.array_equal(told.sigma_m, network.sigma_m) == apart
 
 
-def test_a_walk_far_from_the_network_counts_as_if_it_had_said_so() -> None:
+def test_a_walk_far_from_the_network_counts_as_if_it_had_said_so(
+    seen: list[Observations],
+) -> None:
     """Joints √½ of what both are expected to be off apart leave the walk as sure as it says.
 
     Further apart, it has the σ that brings them there.
@@ -43,20 +59,30 @@ def test_a_walk_far_from_the_network_counts_as_if_it_had_said_so() -> None:
         proud = Joints(off, np.full((3, 1, 17), 0.05))
         if (contradiction(proud, network) > 3.0).any():
             # Too far to be of the same person: the network alone counts.
-            np.testing.assert_array_equal(of_walk_and_network(proud, network).xyz, network.xyz)
+            told = of_mean_size(proud, network, seen)
+            np.testing.assert_array_equal(told.xyz, network.xyz)
             continue
-        wanted, told = combined(right, network), of_walk_and_network(proud, network)
+        wanted, told = combined(right, network), of_mean_size(proud, network, seen)
         np.testing.assert_allclose(told.xyz, wanted.xyz, atol=1e-6)
         np.testing.assert_allclose(told.sigma_m, wanted.sigma_m, rtol=1e-5)
 
 
-def test_a_walk_far_from_a_network_that_may_be_wrong_is_as_sure_as_it_says() -> None:
-    walk = Joints(np.zeros((3, 1, 17, 3)), np.full((3, 1, 17), 0.05))
-    network = Joints(np.full((3, 1, 17, 3), 0.06), np.full((3, 1, 17), 0.08))
-    assert (contradiction(walk, network) > 0.6).all()
-    told, wanted = of_walk_and_network(walk, network, honest=False), combined(walk, network)
-    np.testing.assert_array_equal(told.xyz, wanted.xyz)
-    np.testing.assert_array_equal(told.sigma_m, wanted.sigma_m)
+def test_whether_they_agree_is_asked_before_the_walk_is_as_tall_as_the_network_says(
+    seen: list[Observations],
+) -> None:
+    """Somebody small who squats is nearer to a walk of a small body than to one of a mean body."""
+    body = people().body(np.zeros(0))
+    small = MEAN.copy()
+    small[0, 0] = -2.0
+    floor_m = float(seen[0].bounds_m[0, 2])
+    upright = body.joints17(Pose(body.heads[0], body.neutral))
+    upright[:, 2] += floor_m
+    walk = Joints(np.tile(upright, (4, 1, 1, 1)), np.full((4, 1, 17), 0.07))
+    own = sized(walk, small, floor_m)
+    network = Joints(own.xyz - [0.06, 0.0, 0.08], np.full((4, 1, 17), 0.07))
+    assert (contradiction(walk, network) > 3.0).all() and (contradiction(own, network) < 3.0).all()
+    told = walk_with_network(walk, network, small, seen)
+    np.testing.assert_array_equal(told.xyz, network.xyz)
 
 
 def test_beside_others_or_of_filtered_packets_a_walk_does_not_take_the_size_of_the_network(
@@ -65,30 +91,36 @@ def test_beside_others_or_of_filtered_packets_a_walk_does_not_take_the_size_of_t
     observations, joints = heard_by_radars
     walk = Joints(joints[None, None], np.full((1, 1, 17), 0.06))
     network = Joints(walk.xyz + 0.04, np.full((1, 1, 17), 0.05))
-    small = np.zeros((1, len(people().components)))
+    small = MEAN.copy()
     small[0, 0] = -2.0
     floor_m = float(observations.bounds_m[0, 2])
-    told = walk_with_network(walk, network, small, [observations])
-    own = of_walk_and_network(sized(walk, small, floor_m), network)
-    np.testing.assert_array_equal(told.xyz, own.xyz)
+    own = sized(walk, small, floor_m)
+    told, plain = walk_with_network(walk, network, small, [observations]), combined(own, network)
+    # Doubted, it has less weight than its own σ gives it, and is as tall as the network says.
+    far, near = (np.abs(one.xyz - network.xyz).max() for one in (plain, told))
+    assert 0.0 < near < far and (told.sigma_m > plain.sigma_m).all()
+    assert np.abs(np.cross(told.xyz - network.xyz, own.xyz - network.xyz)).max() < 1e-9
     beside = walk_with_network(walk, network, small, [observations], others=True)
     np.testing.assert_array_equal(beside.xyz, combined(walk, network).xyz)
+    np.testing.assert_array_equal(beside.sigma_m, combined(walk, network).sigma_m)
     filtered = replace(observations, packets=np.stack([observations.delta] * 2))
     told = walk_with_network(walk, network, small, [observations, filtered])
     np.testing.assert_array_equal(told.xyz, combined(walk, network).xyz)
 
 
-def test_a_frame_that_the_network_turns_around_is_left_to_the_walk() -> None:
+def test_a_frame_that_the_network_turns_around_is_left_to_the_walk(
+    seen: list[Observations],
+) -> None:
     rng = np.random.default_rng(5)
     walk = Joints(rng.normal(size=(6, 1, 17, 3)) * 0.1, np.full((6, 1, 17), 0.07))
     said = walk.xyz + 0.02
     said[2, ..., :2] *= -1.0
     network = Joints(said, np.full((6, 1, 17), 0.07))
-    told, both = of_walk_and_network(walk, network), combined(walk, network)
-    np.testing.assert_array_equal(told.xyz[2], walk.xyz[2])
+    told, both = of_mean_size(walk, network, seen), combined(walk, network)
+    np.testing.assert_allclose(told.xyz[2], walk.xyz[2], atol=1e-12)
     np.testing.assert_array_equal(told.sigma_m[2], walk.sigma_m[2])
     others = [0, 1, 3, 4, 5]
-    np.testing.assert_array_equal(told.xyz[others], both.xyz[others])
+    np.testing.assert_allclose(told.xyz[others], both.xyz[others], atol=1e-12)
     np.testing.assert_array_equal(told.sigma_m[others], both.sigma_m[others])
 
 

@@ -54,10 +54,7 @@ class Levels(NamedTuple):
             parts: Covariances of at least an upper triangle; one without power has no say.
             start: Levels to start from, noise first; None: equal ones.
         """
-        whole = np.zeros((1 + len(parts), len(change), len(change)), dtype=np.complex128)
-        np.fill_diagonal(whole[0], 1.0)
-        for part, here in zip(parts, whole[1:], strict=True):
-            _fill(part, here)
+        whole = _whole([np.eye(len(change), dtype=np.complex64), *parts])
         if len(whole) == 1:
             # White noise alone has the mean power.
             power = float(np.vdot(change, change).real) / len(change)
@@ -111,10 +108,7 @@ class Levels(NamedTuple):
         whitener = np.linalg.inv(np.linalg.cholesky(self.covariance))
         white = whitener @ self.change
         before = -len(white) * (math.log(np.vdot(white, white).real / len(white)) + 1.0)
-        whole = np.zeros((len(parts), *whitener.shape), dtype=np.complex128)
-        for part, here in zip(parts, whole, strict=True):
-            _fill(part, here)
-        whitened = whitener @ whole @ whitener.conj().T
+        whitened = whitener @ _whole(parts) @ whitener.conj().T
         return np.maximum([log_evidence(white, part) - before for part in whitened], 0.0)
 
 
@@ -178,9 +172,19 @@ def _least_noise(level: np.ndarray, entries: int) -> float:
     return max(LEAST_NOISE, _ROUNDING * entries * level[1:].sum())
 
 
+def _whole(
+    upper: list[Complex[np.ndarray, "entry entry"]],
+) -> Complex128[np.ndarray, "part entry entry"]:
+    """Both triangles of covariances, at mean power 1; of those without power nothing."""
+    whole = np.zeros((len(upper), *upper[0].shape), dtype=np.complex128)
+    for part, here in zip(upper, whole, strict=True):
+        _fill(part, here)
+    return whole
+
+
 @numba.njit(cache=True, nogil=True)
 def _fill(upper: np.ndarray, whole: np.ndarray) -> None:
-    """Both triangles of a covariance, zero on entry, at mean power 1; no power fills nothing."""
+    """Writes both triangles of a covariance at mean power 1 over zeros."""
     size, level = len(upper), 0.0
     for n in range(size):
         level += upper[n, n].real / size

@@ -173,13 +173,24 @@ def quick_config() -> TrainConfig:
 
 @pytest.fixture(scope="session")
 def train() -> Train:
-    """Trains both frames of a dataset into a folder, places settled by one step, which is a third
-    of the time that it takes to settle them well."""
+    """Trains both frames of a dataset into a folder.
 
-    def call(dataset: Path, out: Path, config: TrainConfig, frames: list[int] | None = None) -> Run:
+    Places are settled by one step, in a third of the time, unless they shall be `settled` as
+    programs do.
+    """
+
+    def call(
+        dataset: Path,
+        out: Path,
+        config: TrainConfig,
+        frames: list[int] | None = None,
+        *,
+        settled: bool = False,
+    ) -> Run:
         data = open_dataset(dataset)
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(likeliest_place, "_LAST_STEP_M", likeliest_place._FIRST_STEP_M)
+            if not settled:
+                patch.setattr(likeliest_place, "_LAST_STEP_M", likeliest_place._FIRST_STEP_M)
             return train_sequence(data, data.sequence(), "wifi", frames or [1, 2], config, out)
 
     return call

@@ -27,7 +27,6 @@ from rfgs_core.fit.frame import explained_change, solved_frame
 from rfgs_core.measure.offsets import CrossSpectra, Offsets, estimate_offsets
 from rfgs_core.run import Run, open_run
 from rfgs_core.run.calibration import read_calibration
-from rfgs_core.run.training import train_sequence
 from rfgs_core.settings import TrainConfig
 
 CAPTURE = Offsets(np.array([0.0, 2.5, -1.2, 0.7]), np.array([0.0, 4e-9, -7e-9, 5e-9]))
@@ -191,23 +190,17 @@ def off_by_map(run: Run, scene: Scene, frame: int) -> float:
     return float(np.linalg.norm(place - scene.reference(frame).mean(axis=0)[:2]))
 
 
-def settled_well(dataset: Path, out: Path, config: TrainConfig) -> Run:
-    """A run whose places are settled as programs do, not by the single step of `train`."""
-    data = open_dataset(dataset)
-    return train_sequence(data, data.sequence(), "wifi", [1, 2], config, out)
-
-
 def test_a_calibrated_fit_stands_where_the_clean_one_does(
-    tiny_dataset: Path, tmp_path: Path, quick_config
+    tiny_dataset: Path, tmp_path: Path, train, quick_config
 ) -> None:
     """F10 of the clean, the calibrated and the uncalibrated fit of the same ball."""
     turned = inject(Path(shutil.copytree(tiny_dataset, tmp_path / "turned")))
     plain = replace(quick_config, num_gaussians=1500, solver_steps=8, iterations=20)
     runs = {
-        "clean": settled_well(tiny_dataset, tmp_path / "clean", plain),
-        "uncalibrated": settled_well(turned, tmp_path / "uncalibrated", plain),
-        "calibrated": settled_well(
-            turned, tmp_path / "calibrated", replace(plain, calibrate="both")
+        "clean": train(tiny_dataset, tmp_path / "clean", plain, settled=True),
+        "uncalibrated": train(turned, tmp_path / "uncalibrated", plain, settled=True),
+        "calibrated": train(
+            turned, tmp_path / "calibrated", replace(plain, calibrate="both"), settled=True
         ),
     }
     score = {}

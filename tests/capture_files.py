@@ -194,16 +194,28 @@ ESP_HEADER = (
 )
 
 
+def esp32_line(
+    samples: np.ndarray, time: int = 0, *, second: int = 0, wide: int = 0, stbc: int = 0
+) -> str:
+    """A line of esp-csi of an HT packet, up to the ESP32-S3 and C3."""
+    numbers = np.stack([samples.imag, samples.real], -1).astype(int).ravel()
+    fields = f"CSI_DATA,{time},1a:00:00:00:00:00,-40,11,1,0,{wide},1,1,0,{stbc},0,0,-96,0,11,"
+    fields += f"{second},{1000 * (time + 1)},0,101,0,{len(numbers)},0,"
+    return f'{fields}"[{",".join(map(str, numbers))}]"\n'
+
+
+def new_esp32_line(samples: np.ndarray, time: int = 0, agc: int = 20, fft: int = 8) -> str:
+    """A line of esp-csi of a chip since the ESP32-C5."""
+    numbers = np.stack([samples.imag, samples.real], -1).astype(int).ravel()
+    fields = f"CSI_DATA,{time},1a:00:00:00:00:00,-40,11,-96,{fft},{agc},11,{1000 * (time + 1)},101"
+    return f'{fields},0,{len(numbers)},0,"[{",".join(map(str, numbers))}]"\n'
+
+
 def esp32_file(path: Path, packets: int = 3) -> np.ndarray:
     """Writes esp-csi lines of 20 MHz HT packets; returns (time, 128) in the chip's order."""
     value = integers((packets, 128), 100)
-    lines = [ESP_HEADER]
-    for time in range(packets):
-        numbers = np.stack([value[time].imag, value[time].real], -1).astype(int).ravel()
-        fields = f"CSI_DATA,{time},1a:00:00:00:00:00,-40,11,1,0,0,1,1,0,0,0,0,-96,0,11,0,"
-        fields += f"{1000 * (time + 1)},0,101,0,256,0,"
-        lines.append(f'{fields}"[{",".join(map(str, numbers))}]"\n')
-    path.write_text("".join(lines))
+    lines = [esp32_line(value[time], time) for time in range(packets)]
+    path.write_text(ESP_HEADER + "".join(lines))
     return value
 
 

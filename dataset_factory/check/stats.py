@@ -71,8 +71,9 @@ def radio_stats(sequence: Sequence, radio: str) -> dict[str, Any]:
     for frame in tqdm(sequence.frames, desc=radio, unit="frame"):
         csi = sequence.csi_samples(radio, frame)[: len(static), layout.measured]
         csi = csi.astype(np.complex128)
-        moving.append((np.abs(csi - static) ** 2).sum() / (np.abs(static) ** 2).sum())
+        moving.append((np.abs(csi - static) ** 2).sum())
         levels.append((np.abs(csi) ** 2).mean(axis=-1).ravel())
+    still = (np.abs(static) ** 2).sum()
     level_db = decibels(np.concatenate(levels))
     low, middle, high = np.percentile(level_db, [1, 50, 99])
     spread_ns = 1e9 * delay_spread_s(
@@ -90,7 +91,8 @@ def radio_stats(sequence: Sequence, radio: str) -> dict[str, Any]:
         "trace_depth": sequence.trace_depth(radio),
         "level_db": {"p01": low, "median": middle, "p99": high},
         "dynamic_range_db": high - low,
-        "dynamic_to_static_db": float(decibels(float(np.median(moving)))),
+        # Imported apertures have no empty room.
+        "dynamic_to_static_db": decibels(float(np.median(moving) / still)) if still else None,
         "delay_spread_ns": {
             "median": float(np.median(spread_ns)),
             "p90": float(np.percentile(spread_ns, 90)),

@@ -30,7 +30,7 @@ def run(args: StatsArgs) -> int:
 
     found = stats(args.dataset, args.sequence)
     if args.json:
-        sys.stdout.write(json.dumps(found, indent=1, sort_keys=True) + "\n")
+        sys.stdout.write(json.dumps(found, indent=1, sort_keys=True, allow_nan=False) + "\n")
         return 0
     for name, numbers in found["sequences"].items():
         sys.stdout.write(f"{name}\n")

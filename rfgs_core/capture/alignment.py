@@ -49,8 +49,15 @@ def schedule(
         rate_hz: Samples per second; None takes the lowest of the receivers' own rates.
 
     Raises:
-        RfgsError: The receivers share no time, or the result has too many frames.
+        RfgsError: The receivers share no time, one of several has a single packet, or the result
+            has too many frames.
     """
+    single = [number for number, row in enumerate(times_s, 1) if len(row) < 2]
+    if single and len(single) < len(times_s):
+        raise RfgsError(
+            f"receiver {single[0]} of the layout has a single packet where others have up to "
+            f"{max(map(len, times_s))}: leave it out of --layout"
+        )
     rates = [_own_rate_hz(row) for row in times_s]
     if min(rates) <= 0 or any(len(row) < 2 for row in times_s):
         first = [np.zeros(1, np.int64) for _ in times_s]

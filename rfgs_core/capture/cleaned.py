@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -44,8 +44,7 @@ def steps(capture: Capture) -> Iterator[Step]:
     over_subcarriers = capture.axis == "subcarrier" and len(capture.bins) > 1
     values, packets = capture.values, capture.packets
     if "agc_gain" in packets:
-        gain_db = packets["agc_gain"].astype(np.float64)
-        capture = replace(capture, values=sanitize.undo_gain(values, gain_db))
+        capture = replace(capture, values=sanitize.undo_gain(values, _gain_db(packets)))
         yield Step("gain that the radio reports undone", capture)
     elif capture.source == "intel5300":
         scaled = sanitize.scale_intel5300(
@@ -63,6 +62,17 @@ def steps(capture: Capture) -> Iterator[Step]:
     else:
         cleaned, changed = sanitize.hampel(capture.values)
         yield Step(f"{int(changed.sum())} outliers replaced", replace(capture, values=cleaned))
+
+
+def _gain_db(packets: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Gain of ESP32 chips [dB]: steps of 1 dB of the AGC, of ¼ dB of the FFT's (a signed byte).
+
+    Source: `esp_csi_gain_ctrl` of Espressif's esp-csi.
+    """
+    gain_db = packets["agc_gain"].astype(np.float64)
+    if "fft_gain" in packets:
+        gain_db += 0.25 * ((packets["fft_gain"] + 128) % 256 - 128)
+    return gain_db
 
 
 def cleaned(capture: Capture) -> tuple[Capture, list[str]]:

@@ -3,8 +3,7 @@
 
 One line per packet: fields, then signed bytes, imaginary part before real. ESP32-CSI-Tool writes
 them apart by spaces, esp-csi apart by commas in quotes, with the names of the fields in its first
-line. The bytes are the legacy training field, then those of HT (`wifi_csi_info_t` in Espressif's
-programming guide, chapter Wi-Fi Channel State Information, tells which subcarrier is where).
+line. The bytes are the packet's training fields (`esp32_fields` tells which subcarrier is where).
 """
 
 from __future__ import annotations
@@ -15,9 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
+from rfgs_core.capture.esp32_fields import Kind, carries, field_of
 from rfgs_core.capture.file_bytes import read_bytes, refuse_too_many, unwrapped_s
 from rfgs_core.capture.model import Capture, Reading, reading
-from rfgs_core.capture.wifi_grid import SPACING_HZ, channel_hz, occupied
+from rfgs_core.capture.wifi_grid import SPACING_HZ, channel_hz
 
 NAME = "esp32"
 TITLE = "ESP32, ESP32-CSI-Tool and esp-csi"
@@ -47,7 +47,7 @@ _LONGEST_CHANNEL = 1024
 
 #: Fields that are kept of each line.
 _KEPT = (
-    *("channel", "secondary_channel", "sig_mode", "bandwidth"),
+    *("channel", "secondary_channel", "sig_mode", "bandwidth", "stbc"),
     *("rssi", "noise_floor", "local_timestamp", "agc_gain", "fft_gain"),
 )
 
@@ -60,9 +60,10 @@ class _Row:
     numbers: np.ndarray
 
     @property
-    def kind(self) -> tuple[int, ...]:
-        """What decides where each byte belongs: channel, second channel, mode, width, count."""
-        return (*(value or 0 for value in self.fields[:4]), len(self.numbers))
+    def kind(self) -> Kind:
+        """What decides where each byte belongs."""
+        told = [value or 0 for value in self.fields[:5]]
+        return Kind(*told, short=self.fields[2] is None, count=len(self.numbers) // 2)
 
 
 def _column(rows: list[_Row], name: str) -> np.ndarray:
@@ -80,9 +81,9 @@ def read(path: Path) -> Reading:
     """Reads a capture.
 
     Returns:
-        Channels (time, 1, 1, 1, subcarrier) as the chip's signed bytes, of the HT training field
-        where the packet has one, else of the legacy one; one capture for each channel, width and
-        length. Nulls and the first two samples, which the chip spoils, are not `valid`.
+        Channels (time, 1, 1, 1, subcarrier) as the chip's signed bytes, of the HT or HE training
+        field where the packet has one, else of the legacy one; one capture for each channel, width
+        and length. Nulls and the first two samples, which the chip spoils, are not `valid`.
         `packets` holds rssi_dbm, noise_dbm and clock_us, and agc_gain and fft_gain where reported.
 
     Raises:
@@ -109,7 +110,7 @@ def decode(path: Path, data: bytes) -> Reading:
         RfgsFormatError: They hold no channel, or too many.
     """
     damage = {"lines that hold no whole channel": 0}
-    groups: dict[tuple[int, ...], list[_Row]] = {}
+    groups: dict[Kind, list[_Row]] = {}
     for row in _rows(data, damage):
         groups.setdefault(row.kind, []).append(row)
     captures = []
@@ -166,24 +167,16 @@ def _whole(text: str) -> int:
     return number if abs(number) < 1 << 62 else 0
 
 
-def _capture(path: Path, kind: tuple[int, ...], rows: list[_Row]) -> Capture | None:
-    channel, second, _, _, _ = kind
-    found = _subcarriers(kind)
-    if found is None:
-        return None
-    part, index, used = found
-    refuse_too_many(path, len(rows) * len(index))
+def _capture(path: Path, kind: Kind, rows: list[_Row]) -> Capture | None:
+    refuse_too_many(path, len(rows) * kind.count)
     numbers = np.stack([row.numbers for row in rows]).astype(np.float32)
-    values = (numbers[:, 1::2] + 1j * numbers[:, ::2]).astype(np.complex64)[:, part]
-    order = np.argsort(index, kind="stable")
-    index, values = index[order], values[:, order]
-    usable = np.isin(index, used) & (order + part.start >= 2)
-    values = np.where(usable, values, 0)[:, None, None, None]
-    wide = second in (1, 2) and len(index) > 64
-    centre = channel_hz(channel)
-    if centre is not None and second in (1, 2):
-        # Numbers of a 40 MHz channel count from its middle, 10 MHz from the primary one.
-        centre += 10e6 if second == 1 else -10e6
+    samples = (numbers[:, 1::2] + 1j * numbers[:, ::2]).astype(np.complex64)
+    field = field_of(kind, samples)
+    if field is None:
+        return None
+    order = np.argsort(field.index, kind="stable")
+    index, usable = field.index[order], carries(field)[order]
+    values = np.where(usable, samples[:, field.part][:, order], 0)[:, None, None, None]
     stamps = _column(rows, "local_timestamp")
     packets = {
         "rssi_dbm": _column(rows, "rssi").astype(np.float64),
@@ -199,43 +192,20 @@ def _capture(path: Path, kind: tuple[int, ...], rows: list[_Row]) -> Capture | N
         valid=np.broadcast_to(usable, values.shape).copy(),
         time_s=unwrapped_s(stamps, 32, 1e-6),
         axis="subcarrier",
-        bins=index * SPACING_HZ["HT"],
+        bins=index * SPACING_HZ[field.form],
         index=index,
-        centre_hz=centre,
+        centre_hz=_centre_hz(kind, field),
         packets=packets,
-        info={"bandwidth_mhz": 40 if wide else 20, "format": "HT" if part.start else "non-HT"},
+        info={"bandwidth_mhz": 40 if field.wide else 20, "format": field.form},
     )
 
 
-def _subcarriers(kind: tuple[int, ...]) -> tuple[slice, np.ndarray, np.ndarray] | None:
-    """Samples to take, the subcarrier of each, and which of them carry anything.
-
-    The programming guide's table: the legacy field has 64 samples; alone in its channel they are
-    0…31, −32…−1, with a second channel below 0…63, above −64…−1, counted from the middle of both.
-    A 20 MHz HT field follows with 64 samples in the first order, a 40 MHz one with 128 in the
-    order 0…63, −64…−1 (of an STBC packet 121, of which the first is 0…60).
-    """
-    _, second, mode, wide, numbers = kind
-    count = numbers // 2
-    around = np.concatenate([np.arange(32), np.arange(-32, 0)])
-    if count < 64:
-        return None
-    ht = occupied("HT", 40 if wide else 20)
-    assert ht is not None
-    if mode == 1 and not wide and count >= 128:
-        return slice(64, 128), _shifted(around, second), _shifted(ht, second)
-    if mode == 1 and wide and count >= 192:
-        return slice(64, 192), np.concatenate([np.arange(64), np.arange(-64, 0)]), ht
-    legacy = occupied("non-HT", 20)
-    assert legacy is not None
-    if second in (1, 2):
-        # The primary channel is the half that the second one is not.
-        low = second == 1
-        index = np.arange(-64, 0) if low else np.arange(64)
-        return slice(0, 64), index, legacy + (-32 if low else 32)
-    return slice(0, 64), around, legacy
-
-
-def _shifted(index: np.ndarray, second: int) -> np.ndarray:
-    """Numbers counted from the middle of both channels."""
-    return index + {1: -32, 2: 32}.get(second, 0)
+def _centre_hz(kind: Kind, field: Field) -> float | None:
+    """Where subcarriers are counted from [Hz]; None where nobody says."""
+    centre = channel_hz(kind.channel)
+    if kind.short and field.wide:
+        return None  # Whether the second channel lies above or below is not reported.
+    if centre is not None and kind.second in (1, 2):
+        # Numbers of a 40 MHz channel count from its middle, 10 MHz from the primary one.
+        centre += 10e6 if kind.second == 1 else -10e6
+    return centre

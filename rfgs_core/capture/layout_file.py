@@ -62,6 +62,13 @@ class CaptureLayout:
         """Devices that hear, each of which has a file."""
         return [i for i, device in enumerate(self.devices) if device.role != "TRANSMITTER"]
 
+    def senders(self, device: int) -> list[int]:
+        """Devices that a receiving one may have heard: all others that send, or itself if alone."""
+        if len(self.devices) == 1:
+            return [device]
+        sent = [i for i, other in enumerate(self.devices) if other.role != "RECEIVER"]
+        return [i for i in sent if i != device]
+
 
 class _Device(DeviceRow, kw_only=True, forbid_unknown_fields=True):
     """A device of the file."""
@@ -113,7 +120,26 @@ def read_layout(path: Path) -> CaptureLayout:
             f"{path}: expected a device that transmits and one that receives, or one that does "
             f"both (role ACCESS_POINT), for example {EXAMPLE}"
         )
+    _need_one_sender(path, layout)
     return layout
+
+
+def _need_one_sender(path: Path, layout: CaptureLayout) -> None:
+    """Files do not say who sent, so each receiving device has to have a single one to hear."""
+    for device in layout.receivers:
+        name = layout.devices[device].name
+        senders = [layout.devices[sender].name for sender in layout.senders(device)]
+        if not senders:
+            raise RfgsFormatError(
+                f"{path}: {name!r} is the only device that transmits, so its own file would hold "
+                "nothing of the others; give it role TRANSMITTER, and no file"
+            )
+        if len(senders) > 1:
+            raise RfgsFormatError(
+                f"{path}: {name!r} may have heard any of {', '.join(map(repr, senders))}, and its "
+                "file does not say which; import the packets of each as a capture of its own, "
+                "with a layout of one device with role TRANSMITTER and others with role RECEIVER"
+            )
 
 
 def assign(layout: CaptureLayout, files: list[Path]) -> dict[int, Path]:

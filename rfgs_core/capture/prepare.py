@@ -16,6 +16,7 @@ from rfgs_core.capture.channels import Channels, channels_of
 from rfgs_core.capture.cleaned import cleaned
 from rfgs_core.capture.layout_file import CaptureLayout, assign
 from rfgs_core.capture.model import MOST_VALUES, Capture
+from rfgs_core.capture.prepare_placed import tells_places
 from rfgs_core.capture.prepared import Prepared, bounds_around, guess, scale_to_free_space
 from rfgs_core.capture.readers import read_capture
 from rfgs_core.errors import RfgsError
@@ -97,6 +98,10 @@ def _receivers(
             warnings.append(
                 f"{path.name}: {left} packets of {len(reading.captures) - 1} other formats are "
                 "left out"
+            )
+        if tells_places(reading.largest):
+            raise RfgsError(
+                f"{path}: the file tells where its antennas were; import it without --layout"
             )
         capture = cleaned(reading.largest)[0] if sanitise else reading.largest
         found[device] = _Receiver(path, capture, channels_of(capture, 0, given.centre_hz))
@@ -183,11 +188,7 @@ def _arranged(
     used: np.ndarray,
     packet: np.ndarray,
 ) -> Complex64[np.ndarray, "frame sample tx rx subcarrier"]:
-    """Channels in the order of the layout's elements; zero where no link is.
-
-    All transmitters but one are silent in a capture: what a receiver heard came from the first
-    device that sends, or, of a device that does both alone, from itself.
-    """
+    """Channels in the order of the layout's elements; zero where no link is."""
     elements = layout(radio, list(given.devices))
     shape = (*packet.shape[1:], *elements.measured.shape, radio.num_subcarriers)
     if math.prod(shape) > 2 * MOST_VALUES:
@@ -196,10 +197,10 @@ def _arranged(
             "in --layout, or cut the captures into pieces"
         )
     csi = np.zeros(shape, np.complex64)
-    sender = int(elements.tx_device[0])
     for number, (device, value) in enumerate(zip(given.receivers, values, strict=True)):
-        source = device if len(given.devices) == 1 else sender
-        tx, rx = elements.block_of(source, device)
+        # `read_layout` takes layouts alone in which who was heard is sure.
+        (sender,) = given.senders(device)
+        tx, rx = elements.block_of(sender, device)
         chosen = value[packet[number]][:, :, used]
         csi[:, :, tx, rx] = np.swapaxes(chosen, 2, 3)
     return csi

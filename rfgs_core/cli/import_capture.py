@@ -66,6 +66,12 @@ def run(args: ImportArgs) -> int:
                 f"{first}: the file does not tell where its antennas were; give --layout "
                 f"with {EXAMPLE}"
             )
+        unused = [f"--{name}" for name in ("empty", "sanitize") if getattr(args, name)]
+        if unused:
+            raise RfgsError(
+                f"{first}: {' and '.join(unused)}: expected captures of several packets over time; "
+                "each of this one is from a place of its own, so leave it out"
+            )
         prepared, warnings = prepare_placed(reading.largest, "capture"), reading.warnings
     config = {"files": [path.name for path in args.files], "program": "rfgs import"}
     write_dataset(args.out, prepared, config)

@@ -146,6 +146,7 @@ def _check(args: LiveArgs) -> None:
         "people": (1, 20),
         "gaussians": (1, 20_000),
         "updates_per_s": (0.1, 200),
+        "port": (1, 65_535),
         "most_per_s": (1, 1e5),
         "learn_s": (0.0, 3600),
         "wait_s": (0.1, 3600),
@@ -157,6 +158,28 @@ def _check(args: LiveArgs) -> None:
             raise RfgsError(f"--{option} {getattr(args, name)}: expected {least:g} to {most:g}")
     if args.seconds is not None and not args.seconds > 0.0:
         raise RfgsError(f"--seconds {args.seconds:g}: expected more than 0")
+    _refuse_without_effect(args)
+
+
+def _refuse_without_effect(args: LiveArgs) -> None:
+    """Refuses options of another source than the one that is followed.
+
+    Raises:
+        RfgsError: Naming them.
+    """
+    from rfgs_core.errors import RfgsError
+
+    listening, played = ("format", "port", "most_per_s", "wait_s"), ("rate", "sequence", "radio")
+    if not args.replay:
+        others, source = played, "packets that arrive"
+    elif args.layout is not None:
+        others, source = (*listening, "sequence", "radio"), "captures"
+    else:
+        others, source = listening, "a dataset"
+    idle = [name for name in others if getattr(args, name) != getattr(LiveArgs, name)]
+    if idle:
+        options = ", ".join(f"--{name.replace('_', '-')}" for name in idle)
+        raise RfgsError(f"live: {options} says nothing about {source}; leave it out")
 
 
 def _follow(args: LiveArgs, session: Session) -> None:
@@ -185,7 +208,13 @@ def _source(args: LiveArgs) -> Stream | Replay:
         raise RfgsError(f"live: expected --layout with where the radios stand, like {EXAMPLE}")
     given = read_layout(args.layout)
     if args.replay:
-        return Replay(recorded_captures(args.replay, given, reported), args.rate)
+        recording = recorded_captures(
+            args.replay,
+            given,
+            reported,
+            lambda warning: sys.stderr.write(f"warning: {warning}\n"),
+        )
+        return Replay(recording, args.rate)
     names = [given.devices[device].name for device in given.receivers]
     sys.stderr.write(
         f"listening at {args.host} for {args.format} packets of "

@@ -44,7 +44,7 @@ def head_count_table(
         `people` in the scene, and what the frames' `vote` is; how many frames are `right`, count
         somebody `over` or somebody `under`. Mean count of noise alone and of the empty room heard
         anew. Of the people counted, the share whom the
-        radio of the frame half a sequence away confirms at their places.
+        radio of the frame half a sequence away confirms at their places; not of a single frame.
     """
     true = told(sequence)
     seen = [observe(sequence, radio, frame, everything=everything) for frame in frames]
@@ -63,6 +63,7 @@ def head_count_table(
             for name, nobody_there in (("noise", noise_alone), ("empty", empty_room_anew)):
                 nobody[name].append(len(count_bodies(nobody_there(now, seed), config, seed)))
         on_frame()
+    confirms = {"confirmed by another frame": confirmed / max(sum(counts), 1)}
     return {
         "people": true,
         "vote": voted(counts),
@@ -72,7 +73,7 @@ def head_count_table(
         "frames": len(counts),
         "noise alone": float(np.mean(nobody["noise"])),
         "empty room heard anew": float(np.mean(nobody["empty"])),
-        "confirmed by another frame": confirmed / max(sum(counts), 1),
+        **(confirms if len(frames) > 1 else {}),
     }
 
 

@@ -45,6 +45,7 @@ LIMBS = [
 WRISTS = [JOINTS.index(f"{s}_wrist") for s in ("left", "right")]
 #: Rows that are told together.
 _SMOOTH, _EVIDENCE = "network, smoothed", "evidence of a walk"
+_ANOTHER = "radio of another frame"
 #: Seed of walks and of whose radio is swapped.
 _SEED = 0
 #: Walks whose mean pose is a row, and moments of each.
@@ -130,7 +131,8 @@ def limb_table(
 
     Returns:
         For each row: joints, with the pelvis in place, limbs and wrists [m], F-scores at 5 and
-        10 cm of the posed surface. Rows of the evidence are missing where it tells nothing.
+        10 cm of the posed surface. Rows of the evidence are missing where it tells nothing, those
+        of the radio of another frame where there is one only.
     """
     config = TrainConfig(channel=channel)
     person = Person.of(sequence, radio, frames, config, everything, on_frame)
@@ -146,6 +148,9 @@ def limb_table(
         told = {"evidence and network together": _on_bodies(both, shapes)} | told
     if _SMOOTH in told:
         told[_SMOOTH] = _on_bodies(told[_SMOOTH], shapes_of(told[_SMOOTH]))
+    if len(frames) == 1:
+        # There is no other frame.
+        told = {name: joints for name, joints in told.items() if _ANOTHER not in name}
     rows = others(person) | {name: joints.xyz[:, 0] for name, joints in told.items()}
     mean, phases = _walking(person, _SEED)
     own = people().body(np.zeros(0))
@@ -171,14 +176,14 @@ def _by_network(network: LimbNetwork, person: Person, other: list[int]) -> dict[
     return {
         _SMOOTH: smoothed(proposed, person.time_s),
         "network, one frame": proposed,
-        "radio of another frame": swapped,
+        _ANOTHER: swapped,
     }
 
 
 def _by_evidence(person: Person, other: list[int], seed: int) -> dict[str, Joints]:
     """Joints by evidence, and by that of other frames' radio, where they are told."""
     swapped = _swapped(person, other)
-    rows = {_EVIDENCE: person.seen, "evidence, radio of another frame": swapped}
+    rows = {_EVIDENCE: person.seen, f"evidence, {_ANOTHER}": swapped}
     told = {name: tell(seen, person.axes_xy, seed) for name, seen in rows.items()}
     return {name: one.joints for name, one in told.items() if one is not None}
 
@@ -187,7 +192,7 @@ def _by_postures(person: Person, other: list[int], seed: int) -> dict[str, Joint
     """The same by evidence of any pose."""
     rows = {
         "evidence of any pose": person.seen,
-        "evidence of any pose, radio of another frame": _swapped(person, other),
+        f"evidence of any pose, {_ANOTHER}": _swapped(person, other),
     }
     found = {}
     with tqdm(total=len(rows) * looks(len(person.seen)), desc="seeking postures") as bar:

@@ -187,7 +187,10 @@ class Scene:
         bodies = self.run.bodies(frame)
         if bodies is None:
             return None
-        people = surface_centroids(*self.run.sequence.moving_mesh(frame))
+        # Vehicles and furniture may move as well; bodies are people.
+        known = {row["id"] for row in self.run.sequence.instances if row["class"] == "person"}
+        moving = surface_centroids(*self.run.sequence.moving_mesh(frame))
+        people = {number: place for number, place in moving.items() if number in known}
         return match_people(self.predicted(score), bodies.axes_xy, people)
 
     def reference(self, frame: int) -> Float64[np.ndarray, "n 3"]:

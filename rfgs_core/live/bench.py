@@ -61,7 +61,7 @@ def bench_live(
         place.
 
     Raises:
-        RfgsError: The sender does not start.
+        RfgsError: The sender does not start, or nothing was followed.
     """
     options, config = options or LiveOptions(), config or live_config(bodies=1)
     given, truth = stand(), _Truth()
@@ -85,10 +85,15 @@ def bench_live(
             elapsed_s, used_s = time.monotonic() - before[0], time.process_time() - before[1]
         finally:
             session.close()
+    if not truth.error_m:
+        raise RfgsError(
+            f"bench live: no update in {seconds:g} s, of {session.tally.total.received} packets; "
+            "give --seconds more"
+        )
     return {
         "packets sent": sent,
         **_outcome(session.tally),
-        "place error median m": float(np.median(truth.error_m)) if truth.error_m else float("nan"),
+        "place error median m": float(np.median(truth.error_m)),
         "place error of the room's middle m": _guess_m(),
         "gaussians": config.num_gaussians,
         "cpu s per s": used_s / max(elapsed_s, 1e-9),

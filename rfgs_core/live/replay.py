@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Complex64, Float64
@@ -89,18 +90,26 @@ def recorded_dataset(
     return Recording(setting, np.concatenate(times), read, kept)
 
 
-def recorded_captures(files: Sequence[Path], given: CaptureLayout, reported: Reported) -> Recording:
+def recorded_captures(
+    files: Sequence[Path],
+    given: CaptureLayout,
+    reported: Reported,
+    on_warning: Callable[[str], Any] = lambda _: None,
+) -> Recording:
     """Captures of one radio, a file for each device that receives.
 
     Args:
         files: The files.
         given: Where the devices stood.
         reported: What of the packets is trusted.
+        on_warning: Is told what readers found damaged or left out.
 
     Raises:
         RfgsError: A file cannot be read, or files and devices do not go together.
     """
-    prepared, _ = prepare(list(files), given)
+    prepared, warnings = prepare(list(files), given)
+    for warning in warnings:
+        on_warning(warning)
     radio, devices = prepared.radio, prepared.devices
     frames, samples = prepared.csi.shape[:2]
     kept = every_nth(radio.num_subcarriers)

@@ -58,13 +58,14 @@ def _even(
     root = np.array([pose.root for pose in poses]) @ _TO_FILE.T
     if len(time_s) == 1:
         return root, [Rotation.from_matrix(local[:, bone]) for bone in range(len(BONES))], 1.0
-    step_s = float(np.diff(time_s).min())
-    even = np.arange(time_s[0], time_s[-1] + 1e-6, step_s).clip(max=time_s[-1])
+    # About the shortest step there is, and one that ends with the last pose.
+    steps = round(float((time_s[-1] - time_s[0]) / np.diff(time_s).min()))
+    even, step_s = np.linspace(time_s[0], time_s[-1], steps + 1, retstep=True)
     places = np.stack([np.interp(even, time_s, root[:, axis]) for axis in range(3)], axis=1)
     turns = [
         Slerp(time_s, Rotation.from_matrix(local[:, bone]))(even) for bone in range(len(BONES))
     ]
-    return places, turns, step_s
+    return places, turns, float(step_s)
 
 
 def _children(bone: int) -> list[int]:

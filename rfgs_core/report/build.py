@@ -219,9 +219,11 @@ def _views(run: EvaluatedRun) -> list[list[Shot]]:
     if not has_pictures(run):
         return []
     unseen = pictures_of(run, "test")
+    if not unseen:
+        return []
     chosen = [unseen[i] for i in np.unique(np.linspace(0, len(unseen) - 1, VIEW_ROWS).astype(int))]
     rows = []
-    for camera, frame in chosen if unseen else []:
+    for camera, frame in chosen:
         true, rendered = true_picture(run, camera, frame), rendered_picture(run, camera, frame)
         where = f"{camera}, frame {frame}"
         rows.append(

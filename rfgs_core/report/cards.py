@@ -81,11 +81,15 @@ def _shape(metrics: Mapping[str, Any], key: str, distance_cm: int) -> Card:
 
 def _place(metrics: Mapping[str, Any]) -> Card:
     people, own = metrics.get("people"), metrics["geometry"]
-    if people is None:
+    if people is None or people["found"] is None:
         found = f"within half a metre in {show(100 * own['tracked'], 0)} % of the frames"
-        return Card(f"{show(100 * own['centroid_m'], 0)} cm", "from the true position", found)
+        return Card(_cm(own["centroid_m"]), "from the true position", found)
     found = f"{show(100 * people['found'], 0)} % of the people are found"
-    return Card(f"{show(100 * people['centroid_m'], 0)} cm", "from each true position", found)
+    return Card(_cm(people["centroid_m"]), "from each true position", found)
+
+
+def _cm(far_m: float | None) -> str:
+    return "–" if far_m is None else f"{show(100 * far_m, 0)} cm"
 
 
 def _unseen(metrics: Mapping[str, Any]) -> list[Card]:

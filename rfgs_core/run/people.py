@@ -39,8 +39,8 @@ PEOPLE_FILE = "people.json"
 VOTES = 5
 #: Visible device pairs without which people are not sensed unasked: three radars count too many.
 AUTO_PAIRS = 4
-#: Nobody counts more.
-_Count = Annotated[int, Meta(ge=0, le=1000)]
+#: Nobody counts more (`settings`).
+_Count = Annotated[int, Meta(ge=0, le=10**4)]
 _LOG = logging.getLogger(__name__)
 _REMEDY = "delete the run and train again"
 

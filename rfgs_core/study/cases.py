@@ -163,9 +163,9 @@ def cases(
         raise RfgsError(f"--seeds {seeds}: expected at least 1")
     chosen = [
         Case(scene, condition, radio, seed)
-        for scene in scenes
-        for radio in radios
-        for condition in conditions
+        for scene in dict.fromkeys(scenes)
+        for radio in dict.fromkeys(radios)
+        for condition in dict.fromkeys(conditions)
         for seed in range(seeds)
     ]
     traced = [case for case in chosen if case.depth <= preset(case.radio).deepest]

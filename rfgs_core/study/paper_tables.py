@@ -186,5 +186,10 @@ def narrowed(
         for one in asked:
             if one not in known:
                 raise RfgsError(f"--{kind} {one}: expected some of {', '.join(known)} in {name}")
-    narrow = Table(tuple(radios or table.radios), tuple(methods or table.methods))
-    return narrow, replace(size, scenes=tuple(scenes or size.scenes))
+    # Whoever names one twice wants it once.
+    narrow = Table(_each(radios or table.radios), _each(methods or table.methods))
+    return narrow, replace(size, scenes=_each(scenes or size.scenes))
+
+
+def _each(names: Sequence[str]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(names))

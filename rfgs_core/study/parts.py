@@ -207,12 +207,13 @@ def _place(archive: bytes, part: Part, out: Path) -> None:
     """Puts what a worker made where it belongs, instead of what an earlier run began."""
     with tempfile.TemporaryDirectory(prefix=".tmp-", dir=out) as folder:
         unpack(archive, Path(folder))
-        for name in part.made:
+        for number, name in enumerate(part.made):
             place = out / name
             refuse_link(place)
             place.parent.mkdir(parents=True, exist_ok=True)
             if place.is_dir():
-                shutil.rmtree(place)
+                # Not deleted before the new one is there.
+                os.replace(place, Path(folder) / f".old-{number}")
             os.replace(Path(folder) / name, place)
 
 

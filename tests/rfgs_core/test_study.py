@@ -66,6 +66,11 @@ def test_every_case_once_and_seeds_share_a_dataset() -> None:
     assert {case.depth for case in chosen if case.scene == "through_wall"} == {3}
 
 
+def test_names_given_twice_are_meant_once() -> None:
+    once = cases(["living_room_walk"], ["clean"], ["wifi"], 2)
+    assert cases(["living_room_walk"] * 2, ["clean"] * 3, ["wifi"] * 2, 2) == once
+
+
 def test_unknown_names_and_empty_choices_are_refused() -> None:
     with pytest.raises(RfgsError, match="scene 'kitchen': expected some of living_room_walk"):
         cases(["kitchen"], ["clean"], ["wifi"], 1)

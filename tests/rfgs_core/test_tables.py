@@ -214,6 +214,8 @@ def test_a_table_may_be_narrowed_to_what_it_has() -> None:
         "two_crossing-wifi-paper-seed0",
     ]
     assert narrowed("table2", SIZES["smoke"]) == (TABLES["table2"], SIZES["smoke"])
+    twice = [["two_crossing"] * 2, ["wifi"] * 2, ["rfgs", "paper", "rfgs"]]
+    assert narrowed("table1", SIZES["smoke"], *twice) == (table, size)
     with pytest.raises(RfgsError, match=r"--radios uwb: expected some of wifi, mmwave in table1"):
         narrowed("table1", SIZES["smoke"], radios=["uwb"])
     with pytest.raises(RfgsError, match="--scenes kitchen: expected some of living_room_walk"):

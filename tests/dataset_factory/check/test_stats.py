@@ -8,9 +8,12 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
+import capture_files as files
 import numpy as np
 
 from dataset_factory.check.stats import delay_spread_s, stats
+from dataset_factory.cli.stats import StatsArgs, run
+from rfgs_core.cli import main
 from rfgs_core.dataset import open_dataset
 
 
@@ -47,6 +50,15 @@ def test_numbers_of_a_known_dataset(tiny_dataset: Path) -> None:
     assert labels["people"] == 1 and labels["actions_frames"] == {"stand": 2}
     assert np.isclose(labels["path_m"]["1"], 0.2)
     assert np.isclose(labels["floor_visited_share"], 2 / 144, atol=1e-4)
+
+
+def test_an_aperture_has_no_empty_room(tmp_path: Path, capsys) -> None:
+    files.afrl_file(tmp_path / "a.mat")
+    assert main(["import", str(tmp_path / "a.mat"), "--out", str(tmp_path / "out")]) == 0
+    capsys.readouterr()
+    assert run(StatsArgs(tmp_path / "out", json=True)) == 0
+    (sequence,) = json.loads(capsys.readouterr().out)["sequences"].values()
+    assert sequence["radios"]["sar_capture"]["dynamic_to_static_db"] is None
 
 
 def test_the_command_prints_a_table_and_json(

@@ -23,6 +23,7 @@ devices:
   - {name: tx, role: TRANSMITTER, position_m: [0, 0, 1], quat_wxyz: [1, 0, 0, 0]}
   - {name: rx, role: RECEIVER, position_m: [3, 0, 1]}
 """
+THIRD = "  - {name: third, role: TRANSMITTER, position_m: [0, 3, 1]}"
 RADAR = "name: lab\nradio: radar\ndevices: [{name: radar, position_m: [0, 0, 1]}]\n"
 TWO = (
     PAIR + "  - {name: rx2, role: RECEIVER, position_m: [0, 3, 1], file: b.dat, offset_s: 0.002}\n"
@@ -142,6 +143,45 @@ def test_ranges_of_a_radar_become_subcarriers(tmp_path: Path) -> None:
     np.testing.assert_allclose((turn * csi).sum(axis=1) / 4, value[0, 0, :4], rtol=1e-3)
 
 
+def test_two_access_points_hear_each_other(tmp_path: Path) -> None:
+    value = {name: files.integers((20, 1, 1, 56), 300) for name in "ab"}
+    for name, rows in value.items():
+        records = [files.feitcsi_record(row, 10_000 * k) for k, row in enumerate(rows)]
+        (tmp_path / f"{name}.csi").write_bytes(b"".join(records))
+    given = PAIR.replace("TRANSMITTER", "ACCESS_POINT").replace("RECEIVER", "ACCESS_POINT")
+    sequence = imported(tmp_path, tmp_path / "a.csi", tmp_path / "b.csi", layout=given)
+    layout, kept = sequence.layout("wifi"), beside(sequence, "wifi")
+    assert layout.device_pairs == [(0, 1), (1, 0)]
+    csi = sequence.csi_samples("wifi", sequence.frames[0]) / kept["scale"]
+    # The first file is what the first device heard of the second one.
+    for name, pair in (("a", (1, 0)), ("b", (0, 1))):
+        links = layout.links_between(*pair)
+        got = csi[0, links][..., kept["subcarrier_of_bin"]].ravel()
+        assert np.isin(np.round(got), value[name][0].ravel()).mean() > 0.9
+
+
+@pytest.mark.parametrize("extra", [["--sanitize"], ["--empty", "a.mat"]])
+def test_what_says_nothing_of_captures_with_places_is_refused(tmp_path, capsys, extra) -> None:
+    files.newrf_file(tmp_path / "a.mat")
+    (tmp_path / "radios.yaml").write_text(PAIR)
+    command = ["import", str(tmp_path / "a.mat"), "--out", str(tmp_path / "out")]
+    assert f"{extra[0]}: expected captures of several packets" in refused(
+        [*command, *extra], capsys
+    )
+    line = refused([*command, "--layout", str(tmp_path / "radios.yaml")], capsys)
+    assert "import it without --layout" in line
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_receiver_with_a_single_packet_is_named(tmp_path: Path, capsys) -> None:
+    files.intel5300_file(tmp_path / "a.dat", packets=100)
+    files.intel5300_file(tmp_path / "b.dat", packets=1)
+    (tmp_path / "two.yaml").write_text(TWO)
+    command = ["import", str(tmp_path / "a.dat"), str(tmp_path / "b.dat")]
+    command += ["--layout", str(tmp_path / "two.yaml"), "--out", str(tmp_path / "out")]
+    assert "receiver 2 of the layout has a single packet" in refused(command, capsys)
+
+
 def test_captures_that_tell_places_need_no_layout(tmp_path: Path) -> None:
     value = files.newrf_file(tmp_path / "a.mat")
     sequence = imported(tmp_path, tmp_path / "a.mat", layout=None)
@@ -197,6 +237,8 @@ def test_what_is_imported_trains_and_is_shown(tmp_path: Path) -> None:
         (("devices:", "devices: 3 #"), "devices: expected a list|no valid YAML"),
         (("centre_hz: 5.825e9\n", ""), "give centre_hz in --layout"),
         (("name: lab", "name: ../lab"), "leads outside the dataset"),
+        (("role: TRANSMITTER", "role: ACCESS_POINT"), "'tx' is the only device that transmits"),
+        (("devices:", f"devices:\n{THIRD}"), "'rx' may have heard any of 'third', 'tx'"),
     ],
 )
 def test_layouts_are_checked(tmp_path: Path, capsys, change: tuple[str, str], message: str) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from rfgs_core.evaluate.people import match_people, people_metrics, surface_centroids
+from rfgs_core.evaluate.scene import Scene
 from rfgs_core.pose.score import identity_kept
 
 PEOPLE = {3: np.array([1.0, 1.0, 0.9]), 7: np.array([3.0, 1.0, 0.9])}
@@ -54,3 +55,14 @@ def test_bodies_that_swap_their_people_are_seen() -> None:
     swapped = match_people(voxels((3.0, 1.0, 0.9, 5), (1.0, 1.0, 0.9, 5)), AXES[::-1], PEOPLE)
     assert people_metrics([there, swapped, there])["identity_kept"] == pytest.approx(4 / 6)
     assert identity_kept([[], []]) is None
+
+
+def test_cars_and_chairs_that_move_are_nobody(surface_run) -> None:
+    scene = Scene.of(surface_run)
+    score = scene.score(1)
+    there = scene.people(1, score)
+    assert there is not None and there.present == 1
+    for row in surface_run.sequence.info.instances:
+        row["class"] = "vehicle"
+    empty = scene.people(1, score)
+    assert empty is not None and (empty.present, empty.person) == (0, ())

@@ -18,8 +18,11 @@ from rfgs_core.cli.compare import CompareArgs
 from rfgs_core.cli.compare import run as compare
 from rfgs_core.errors import MissingToolError, RfgsError, RfgsFormatError
 from rfgs_core.evaluate.baselines import BASELINES
+from rfgs_core.evaluate.pictures import has_pictures
 from rfgs_core.figures.shapes import colouring
+from rfgs_core.render.view import pictures_of
 from rfgs_core.report import write_demo_report, write_run_report
+from rfgs_core.report.build import _views
 from rfgs_core.report.cards import WORDS, headline_cards, in_words
 from rfgs_core.report.metrics_file import read_metrics
 from rfgs_core.report.tables import metric_tables, show, text_table
@@ -96,6 +99,30 @@ def test_report_before_evaluation_says_what_to_do(surface_run) -> None:
     surface_run.path.joinpath("config.json").write_text("{}")
     with pytest.raises(RfgsError, match="rfgs eval"):
         write_run_report(surface_run)
+
+
+def test_pictures_of_training_alone_are_no_views(surface_run, monkeypatch) -> None:
+    """As of a dataset with one camera, when a single frame was trained on."""
+    whole = surface_run.sequence.splits["images"]
+    seen = {name: [] for name in whole if name.startswith("test")}
+    monkeypatch.setitem(surface_run.sequence.splits, "images", {**whole, **seen})
+    assert has_pictures(surface_run) and not pictures_of(surface_run, "test")
+    assert _views(surface_run) == []
+
+
+@pytest.mark.parametrize(
+    ("people", "value", "note"),
+    [
+        ({"centroid_m": None, "found": 0.0}, "–", "0 % of the people are found"),
+        ({"centroid_m": None, "found": None}, "5 cm", "in 100 % of the frames"),
+        ({"centroid_m": 0.12, "found": 1.0}, "12 cm", "100 % of the people are found"),
+    ],
+)
+def test_a_place_is_told_or_its_lack(evaluated_run, people, value, note) -> None:
+    metrics = json.loads((evaluated_run.path / "metrics.json").read_text())
+    metrics["geometry"] |= {"centroid_m": 0.05, "tracked": 1.0}
+    card = headline_cards({**metrics, "people": people})[2]
+    assert (card.value, note in card.note) == (value, True)
 
 
 def test_radios_without_unseen_elements_have_no_card_of_them(evaluated_run) -> None:

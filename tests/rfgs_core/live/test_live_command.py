@@ -98,6 +98,13 @@ def test_a_rate_of_nothing_is_refused(tiny_dataset: Path) -> None:
         (["--updates-per-s", "1e9"], "--updates-per-s 1000000000"),
         (["--seconds", "0"], "--seconds 0"),
         (["--replay", "nowhere", "--no-view"], "expected --layout"),
+        (["--port", "0"], "--port 0: expected 1 to 65535"),
+        (
+            ["--replay", "data", "--port", "6000", "--format", "esp32"],
+            "--format, --port says nothing",
+        ),
+        (["--replay", "a.csi", "--layout", "l.yaml", "--radio", "wifi"], "nothing about captures"),
+        (["--layout", "l.yaml", "--rate", "2"], "--rate says nothing about packets that arrive"),
     ],
 )
 def test_mistakes_are_told_in_one_line(

@@ -6,6 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from rfgs_core.articulated import BONES, people
 from rfgs_core.limbs.propose import Joints
@@ -40,6 +41,17 @@ def test_bones_come_back_where_they_were(tmp_path: Path) -> None:
         heads = body.heads_at(walker.pose(frame, 0))
         got = np.array([ours[row, file.joints.index(bone)] for bone in BONES])
         np.testing.assert_allclose(got, heads, atol=2e-4)
+
+
+def test_uneven_times_end_with_the_last_pose(tmp_path: Path) -> None:
+    walker, times_s = posed(), np.array([0.0, 0.1, 0.25, 0.37])
+    write_bvh(tmp_path / "walk.bvh", walker, 0, times_s)
+    file = read_bvh(tmp_path / "walk.bvh")
+    assert (len(file.root) - 1) * file.frame_s == pytest.approx(0.37, abs=1e-5)
+    ours = file.places()[..., [0, 2, 1]] * [1.0, -1.0, 1.0]
+    heads = walker.body(0).heads_at(walker.pose(3, 0))
+    got = np.array([ours[-1, file.joints.index(bone)] for bone in BONES])
+    np.testing.assert_allclose(got, heads, atol=2e-4)
 
 
 def test_a_single_frame_is_a_motion_too(tmp_path: Path) -> None:

@@ -145,3 +145,5 @@ def test_nobody_is_counted_where_nobody_is(tiny_dataset: Path) -> None:
     table = head_count_table(sequence, "wifi", [1])
     assert (table["right"], table["over"], table["under"]) == (1, 0, 0)
     assert table["noise alone"] == table["empty room heard anew"] == 0.0
+    # A single frame has no other one that could confirm it.
+    assert "confirmed by another frame" not in table

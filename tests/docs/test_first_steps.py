@@ -23,6 +23,7 @@ def test_the_notebook_is_kept_without_outputs() -> None:
         assert not cell.get("outputs") and cell.get("execution_count") is None, cell.source[:60]
 
 
+@pytest.mark.slow
 def test_the_notebook_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As a reader runs it: on the dataset that comes with the package."""
     monkeypatch.delenv("RFGS_DATASET", raising=False)

@@ -171,12 +171,24 @@ def quick_config() -> TrainConfig:
     )
 
 
+OneStep = Callable[[pytest.MonkeyPatch], None]
+
+
 @pytest.fixture(scope="session")
-def train() -> Train:
+def one_step() -> OneStep:
+    """Has places settled by one step, in a third of the time, as long as a patch lasts."""
+
+    def settle(patch: pytest.MonkeyPatch) -> None:
+        patch.setattr(likeliest_place, "_LAST_STEP_M", likeliest_place._FIRST_STEP_M)
+
+    return settle
+
+
+@pytest.fixture(scope="session")
+def train(one_step: OneStep) -> Train:
     """Trains both frames of a dataset into a folder.
 
-    Places are settled by one step, in a third of the time, unless they shall be `settled` as
-    programs do.
+    Places are settled by one step unless they shall be `settled` as programs do.
     """
 
     def call(
@@ -190,7 +202,7 @@ def train() -> Train:
         data = open_dataset(dataset)
         with pytest.MonkeyPatch.context() as patch:
             if not settled:
-                patch.setattr(likeliest_place, "_LAST_STEP_M", likeliest_place._FIRST_STEP_M)
+                one_step(patch)
             return train_sequence(data, data.sequence(), "wifi", frames or [1, 2], config, out)
 
     return call

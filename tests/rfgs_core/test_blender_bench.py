@@ -14,6 +14,7 @@ from rfgs_core.errors import MissingToolError
 pytestmark = pytest.mark.skipif(find_spec("bpy") is None, reason="needs bpy")
 
 
+@pytest.mark.slow
 def test_arrays_beat_a_loop_over_points(monkeypatch: pytest.MonkeyPatch) -> None:
     """Sizes are taken at their word: counts come from the meshes in Blender."""
     monkeypatch.delenv("BLENDER", raising=False)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -119,8 +120,9 @@ def test_signal_to_noise_is_that_of_the_change(own_dataset: Path) -> None:
 
 
 @pytest.fixture
-def quick(monkeypatch: pytest.MonkeyPatch) -> Setup:
+def quick(monkeypatch: pytest.MonkeyPatch, one_step: Callable[[pytest.MonkeyPatch], None]) -> Setup:
     """A setup whose fit takes a moment."""
+    one_step(monkeypatch)
     small = TrainConfig(num_gaussians=200, posture="standing", iterations=3, solver_steps=2)
     monkeypatch.setattr(Setup, "config", small)
     return Setup("living_room_walk", "wifi", "1:2")

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,9 @@ METHODS = ("rfgs", "paper_fixed", "nerf_features")
 
 @pytest.fixture(scope="module")
 def table(
-    tiny_dataset: Path, tmp_path_factory: pytest.TempPathFactory
+    tiny_dataset: Path,
+    tmp_path_factory: pytest.TempPathFactory,
+    one_step: Callable[[pytest.MonkeyPatch], None],
 ) -> tuple[Path, dict[Cell, dict[str, Any]]]:
     """A folder with a few small cells, and what they say."""
     out, whole = tmp_path_factory.mktemp("table"), study.cells.train_config
@@ -32,6 +35,7 @@ def table(
     shutil.copytree(tiny_dataset, out / cells[0].dataset)
     quick = {"posture": "standing", "num_gaussians": 200, "limbs": "off"}
     with pytest.MonkeyPatch.context() as patch:
+        one_step(patch)
         patch.setattr(
             study.cells, "train_config", lambda cell, size: replace(whole(cell, size), **quick)
         )

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -137,8 +138,11 @@ def test_every_radio_is_traced_as_deep_as_it_can_be() -> None:
 
 
 @pytest.fixture
-def everybody_stands(monkeypatch: pytest.MonkeyPatch) -> None:
+def everybody_stands(
+    monkeypatch: pytest.MonkeyPatch, one_step: Callable[[pytest.MonkeyPatch], None]
+) -> None:
     """Nobody is asked whether they sit, which takes longer than all the rest of a small cell."""
+    one_step(monkeypatch)
     whole = study.cells.train_config
     monkeypatch.setattr(
         study.cells,

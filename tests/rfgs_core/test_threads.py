@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 #: More threads than cores do not spin.
 THREADS = min(4, len(os.sched_getaffinity(0)))
 #: A program of fifty short kernels on all threads, 10 ms of sleep after each.
@@ -23,6 +25,7 @@ def _processor_s(**env: str) -> float:
     return float(done.stdout)
 
 
+@pytest.mark.slow
 def test_threads_sleep_between_kernels_unless_told_otherwise() -> None:
     """Spinning threads take the half second of pauses on every core but one."""
     assert _processor_s() < 0.2

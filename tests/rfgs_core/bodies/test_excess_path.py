@@ -58,7 +58,7 @@ def test_taking_off_what_was_put_on_gives_the_same_frame(empty: Observations) ->
 def test_an_excess_path_is_found_where_there_is_one(empty: Observations, path_m: float) -> None:
     lefts: list[int] = []
     seen = lit(empty, BODIES[:1], seed=2).lengthened(path_m)
-    found = excess_path_m([seen], TrainConfig(), 0, lefts.append)
+    found = excess_path_m([seen], TrainConfig(num_gaussians=1000), 0, lefts.append)
     if path_m:
         assert found == pytest.approx(path_m, abs=0.2)
     else:

@@ -9,6 +9,7 @@ import io
 import json
 import re
 import shutil
+from collections.abc import Callable
 from dataclasses import replace
 from html import unescape
 from pathlib import Path
@@ -32,6 +33,8 @@ from rfgs_core.study.cells import make
 from rfgs_core.study.gallery import SIZE, gallery_cells, ranked_baselines
 from rfgs_core.study.paper_tables import Cell
 from rfgs_core.view.browser import find_chromium, open_page
+
+OneStep = Callable[[pytest.MonkeyPatch], None]
 
 
 def f_scores(f10: float | None) -> dict[str, Any]:
@@ -233,8 +236,11 @@ def test_a_cell_of_other_frames_is_refused(tiny_dataset: Path, tmp_path: Path) -
 
 
 @pytest.fixture
-def tiny_scenes(tiny_dataset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def tiny_scenes(
+    tiny_dataset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, one_step: OneStep
+) -> Path:
     """A folder with the datasets of two scenes, one of them damaged; trainings are short."""
+    one_step(monkeypatch)
     whole = study.cells.train_config
     monkeypatch.setattr(
         study.cells,

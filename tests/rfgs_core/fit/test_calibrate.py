@@ -182,7 +182,6 @@ def test_what_cannot_be_calibrated_leaves_nothing_behind(
     assert not (tmp_path / "run").exists()
 
 
-@pytest.mark.slow
 def off_by_map(run: Run, scene: Scene, frame: int) -> float:
     """How far the peak of a frame's map is from where the ball is, seen from above [m]."""
     seen = run.observations(frame)
@@ -190,6 +189,7 @@ def off_by_map(run: Run, scene: Scene, frame: int) -> float:
     return float(np.linalg.norm(place - scene.reference(frame).mean(axis=0)[:2]))
 
 
+@pytest.mark.slow
 def test_a_calibrated_fit_stands_where_the_clean_one_does(
     tiny_dataset: Path, tmp_path: Path, train, quick_config
 ) -> None:

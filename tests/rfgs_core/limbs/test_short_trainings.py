@@ -36,6 +36,6 @@ def test_a_training_without_a_step_tells_no_error_of_one(monkeypatch: pytest.Mon
     monkeypatch.setattr(learning, "JUDGED", 1)
     said = []
     config = LearnConfig(hours=1e-9, workers=0)
-    learn(preset("wifi"), config, lambda _frames, words: said.append(words))
+    learn(preset("wifi_commodity"), config, lambda _frames, words: said.append(words))
     assert len(said) == 1
     assert said[0].startswith("in unseen worlds ") and "nan" not in said[0]

@@ -20,6 +20,8 @@ from rfgs_core.propagation.fast import packed_covariances
 
 SCATTER = ("means", "quats", "scales_rf", "gamma", "normals", "visibility")
 SHADOW = ("means", "quats", "scales", "alpha")
+#: Kernels in double precision, which programs never ask for, take twenty seconds to compile.
+IN_DOUBLE = [pytest.param("numba", marks=pytest.mark.slow), "torch"]
 BANDS = [(5.72e9, 2.5e6, 1), (60e9, 12.5e6, 1), (3.1e9, 12.3e6, 4)]
 
 
@@ -127,7 +129,7 @@ def test_no_gaussians_scatter_nothing_and_block_nothing(make_cloud, make_links, 
     assert every["means"].grad.shape == (0, 3)
 
 
-@pytest.mark.parametrize("backend", ["numba", "torch"])
+@pytest.mark.parametrize("backend", IN_DOUBLE)
 @pytest.mark.parametrize("knots", [1, 3])
 def test_scatter_gradients_pass_gradcheck(make_cloud, make_links, backend, knots) -> None:
     every = make_cloud(4, knots=knots, dtype=torch.float64)
@@ -142,7 +144,7 @@ def test_scatter_gradients_pass_gradcheck(make_cloud, make_links, backend, knots
     assert torch.autograd.gradcheck(run, values, eps=1e-7, atol=1e-5, rtol=1e-4)
 
 
-@pytest.mark.parametrize("backend", ["numba", "torch"])
+@pytest.mark.parametrize("backend", IN_DOUBLE)
 def test_shadow_gradients_pass_gradcheck(make_cloud, make_paths, backend) -> None:
     every = make_cloud(4, dtype=torch.float64)
     paths = make_paths(3, 0.05)

@@ -20,15 +20,19 @@ from rfgs_core.render.splat import ALPHA_MAX, DILATION_PX2
 SHAPE = ("means", "quats", "log_scales", "logit_opacities")
 
 
-def leaves_of(cloud: Gaussians, values: Tensor) -> tuple[Gaussians, Tensor]:
-    """The same in double precision, each tensor asking for its gradient."""
-    parts = {name: value.detach().double().requires_grad_() for name, value in cloud.items()}
-    return Gaussians(**parts), values.detach().double().requires_grad_()
+def leaves_of(
+    cloud: Gaussians, values: Tensor, dtype: torch.dtype = torch.float32
+) -> tuple[Gaussians, Tensor]:
+    """The same, in single precision as programs have them, each asking for its gradient."""
+    parts = {name: value.detach().to(dtype).requires_grad_() for name, value in cloud.items()}
+    return Gaussians(**parts), values.detach().to(dtype).requires_grad_()
 
 
-def slopes(draw, cloud: Gaussians, values: Tensor, camera) -> dict[str, Tensor]:
+def slopes(
+    draw, cloud: Gaussians, values: Tensor, camera, dtype: torch.dtype = torch.float32
+) -> dict[str, Tensor]:
     """Gradients of a loss that weighs colours, cover and depth of every pixel differently."""
-    there, colours = leaves_of(cloud, values)
+    there, colours = leaves_of(cloud, values, dtype)
     drawn = draw(there, colours, camera)
     generator = torch.Generator().manual_seed(1)
     weights = torch.randn(drawn.rgb.shape, generator=generator, dtype=torch.float64)
@@ -38,7 +42,7 @@ def slopes(draw, cloud: Gaussians, values: Tensor, camera) -> dict[str, Tensor]:
     (loss + (drawn.depth * by_cover)[well].sum()).backward()
     parts = {**{name: getattr(there, name) for name in SHAPE}, "values": colours}
     return {
-        name: torch.zeros_like(part) if part.grad is None else part.grad
+        name: (torch.zeros_like(part) if part.grad is None else part.grad).double()
         for name, part in parts.items()
     }
 
@@ -51,7 +55,8 @@ def slopes(draw, cloud: Gaussians, values: Tensor, camera) -> dict[str, Tensor]:
 def test_gradients_are_those_of_the_plain_twin(count, edge_px, channels, seed) -> None:
     cloud, _, camera = random_cloud(count, edge_px, seed)
     values = torch.randn(count, channels, generator=torch.Generator().manual_seed(seed))
-    found, exact = (slopes(draw, cloud, values, camera) for draw in (splat, splat_plain))
+    found = slopes(splat, cloud, values, camera)
+    exact = slopes(splat_plain, cloud, values, camera, torch.float64)
     for name, expected in exact.items():
         # The cover of the tiled rasteriser is in float32, and expected depths divide by it.
         torch.testing.assert_close(
@@ -62,7 +67,8 @@ def test_gradients_are_those_of_the_plain_twin(count, edge_px, channels, seed) -
 def test_a_crowd_of_features_has_the_twins_gradients() -> None:
     cloud, _, camera = random_cloud(1500, 75, seed=3)
     values = torch.randn(1500, 32, generator=torch.Generator().manual_seed(2))
-    found, exact = (slopes(draw, cloud, values, camera) for draw in (splat, splat_plain))
+    found = slopes(splat, cloud, values, camera)
+    exact = slopes(splat_plain, cloud, values, camera, torch.float64)
     for name, expected in exact.items():
         assert float(expected.abs().max()) > 1.0
         difference = (found[name] - expected).norm() / expected.norm()
@@ -72,7 +78,8 @@ def test_a_crowd_of_features_has_the_twins_gradients() -> None:
 def test_one_round_gaussian_has_its_closed_form(camera, gaussians) -> None:
     focal, sigma_m, depth_m, opacity = 40.0, 0.1, 2.0, 0.6
     eye = camera(size=(41, 31), focal=focal)
-    cloud, rgb = leaves_of(gaussians([[0.0, 0.0, -depth_m]], sigma_m, opacity), torch.ones(1, 3))
+    round_one = gaussians([[0.0, 0.0, -depth_m]], sigma_m, opacity)
+    cloud, rgb = leaves_of(round_one, torch.ones(1, 3))
     off_x, off_y = 2.0, -1.0  # pixels from the middle, (20.5, 15.5)
     splat(cloud, rgb, eye).alpha[14, 22].backward()
     spread = (focal * sigma_m / depth_m) ** 2
@@ -96,6 +103,7 @@ def test_one_round_gaussian_has_its_closed_form(camera, gaussians) -> None:
     assert float(cloud.quats.grad.abs().max()) == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_gradients_are_differences_of_the_picture(camera, gaussians) -> None:
     eye = camera(size=(19, 18), focal=20.0)
     cloud = gaussians([[0.0, 0.0, -1.0], [0.1, 0.05, -1.4], [-0.3, 0.1, -2.0]], 0.2, 0.5)
@@ -105,7 +113,7 @@ def test_gradients_are_differences_of_the_picture(camera, gaussians) -> None:
         quats=torch.randn(3, 4, generator=generator),
         log_scales=cloud.log_scales + 0.5 * torch.randn(3, 3, generator=generator),
     )
-    there, rgb = leaves_of(cloud, torch.rand(3, 3, generator=generator))
+    there, rgb = leaves_of(cloud, torch.rand(3, 3, generator=generator), torch.float64)
     # Every pixel is well inside of what each Gaussian reaches: nothing is cut off on the way.
     middle = (slice(8, 11), slice(8, 11))
 
@@ -134,17 +142,18 @@ def test_hidden_gaussians_get_what_the_little_light_behind_gives_them(camera, ga
     layers = gaussians([[0.0, 0.0, -1.0 - 0.05 * i] for i in range(12)], 0.4, 0.7)
     rgb = torch.linspace(0.1, 1.0, 36).reshape(12, 3)
     eye = camera(size=(16, 16))
-    found, exact = (_single(draw, layers, rgb, eye).grad for draw in (splat, splat_plain))
-    assert found is not None and exact is not None
+    found = _single(splat, layers, rgb, eye, torch.float32)
+    exact = _single(splat_plain, layers, rgb, eye, torch.float64)
     assert 0.0 < float(exact[-1].abs()) < 1e-3 * float(exact[0].abs())
     torch.testing.assert_close(found, exact, rtol=1e-4, atol=0.0)
 
 
-def _single(draw, cloud: Gaussians, rgb: Tensor, eye) -> Tensor:
-    """Logits of Gaussians with the gradient of all brightness."""
-    there, _ = leaves_of(cloud, rgb)
-    draw(there, rgb.double(), eye).rgb.sum().backward()
-    return there.logit_opacities
+def _single(draw, cloud: Gaussians, rgb: Tensor, eye, dtype: torch.dtype) -> Tensor:
+    """Slopes of all brightness by the logits of Gaussians."""
+    there, _ = leaves_of(cloud, rgb, dtype)
+    draw(there, rgb.to(dtype), eye).rgb.sum().backward()
+    assert there.logit_opacities.grad is not None
+    return there.logit_opacities.grad.double()
 
 
 def test_only_what_asks_gets_a_gradient(camera, gaussians) -> None:

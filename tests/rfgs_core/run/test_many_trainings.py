@@ -169,7 +169,7 @@ def test_workers_make_the_same_bytes_as_one_process(
     assert open_run(out / "tiny-wifi").sequence.path == two_sequences / "tiny"
 
 
-@pytest.mark.parametrize("workers", ["1", "2"])
+@pytest.mark.parametrize("workers", ["1", pytest.param("2", marks=pytest.mark.slow)])
 def test_finished_runs_are_kept_and_a_begun_one_goes_on(
     two_sequences: Path, by_one_process: Path, begun: Path, workers: str, capsys
 ) -> None:

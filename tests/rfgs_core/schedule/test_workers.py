@@ -186,7 +186,9 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow), signal.SIGKILL]
+)
 def test_workers_end_with_the_run_however_it_ends(number: signal.Signals, tmp_path: Path) -> None:
     """Also while they compute and do not answer."""
     (tmp_path / "program.py").write_text(PROGRAM)

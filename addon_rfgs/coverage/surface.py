@@ -16,7 +16,7 @@ from ..gaussians.coloring import COLOR_ATTRIBUTE, SCALE
 from ..gaussians.legend import COVERAGE as COLLECTION
 from ..gaussians.look import material
 from ..json_file import Fields, read_json
-from ..ownership import collections_of, drop_empty, own_collection
+from ..ownership import collections_of, drop_empty, found_collection, own_collection
 from ..scene.frames import unit_scale
 
 #: Custom property: marks what this module made, and says of whom.
@@ -93,7 +93,7 @@ def show_coverage(scene: bpy.types.Scene, found: CoverageMap, number: int) -> bp
     name, gain_db = found.of(number)
     if not np.isfinite(gain_db).any():
         raise AddonError(f"{name} is heard nowhere on this plane")
-    clear_coverage()
+    clear_coverage(scene)
     mesh = _mesh(gain_db, found.cell_m)
     low, high = found_range([gain_db])
     mesh[SCALE] = {"mode": "COVERAGE", "low": low, "high": high, "attribute": ""}
@@ -129,14 +129,15 @@ def _mesh(gain_db: np.ndarray, cell_m: float) -> bpy.types.Mesh:
     return mesh
 
 
-def coverages() -> list[bpy.types.Object]:
-    """Surfaces that are shown, of all scenes."""
-    return [item for row in collections_of(COLLECTION) for item in row.objects if OF in item]
+def coverages(scene: bpy.types.Scene | None = None) -> list[bpy.types.Object]:
+    """Surfaces that are shown, of one scene or of all."""
+    homes = collections_of(COLLECTION) if scene is None else [found_collection(scene, COLLECTION)]
+    return [item for home in homes if home is not None for item in home.objects if OF in item]
 
 
-def clear_coverage() -> int:
-    """Removes every map; returns how many there were."""
-    found = coverages()
+def clear_coverage(scene: bpy.types.Scene | None = None) -> int:
+    """Removes every map, of one scene or of all; returns how many there were."""
+    found = coverages(scene)
     for item in found:
         mesh = item.data
         bpy.data.objects.remove(item)

@@ -18,6 +18,7 @@ import numpy as np
 
 from ..errors import AddonError
 from ..files import replacing
+from ..ownership import is_shown_by_us
 from ..scene.cameras import View, find_views, place_camera
 from ..scene.content import Content, content_ready
 from ..scene.findings import refuse
@@ -25,7 +26,7 @@ from ..scene.frames import file_label, unit_scale
 from ..scene.lights import lights_ready
 from ..scene.outlines import give_to_renders
 from ..scene.overrides import Overrides
-from ..scene.state import Keeper
+from ..scene.state import Keeper, free_camera
 from .exr import read_exr, write_exr
 
 #: Depths above this are misses; Cycles writes 1e10 [Blender units].
@@ -77,9 +78,12 @@ def render_groundtruth(
             _number_instances(keeper, content)
             give_to_renders(keeper, (surface.source for surface in content.moving))
             _configure(keeper, scene, views[0])
+            for item in scene.objects:
+                if item.rfgs.object_class == "IGNORE" and is_shown_by_us(item):
+                    keeper.make_invisible(item)
             if empty:
                 for surface in content.moving:
-                    keeper.set(surface.source, "hide_render", True)
+                    keeper.make_invisible(surface.source)
                 numbers = [scene.frame_start]
             names = ["empty"] if empty else [f"{number:06d}" for number in numbers]
             stems = dict(zip(numbers, names, strict=True))
@@ -147,6 +151,7 @@ def _configure(keeper: Keeper, scene: bpy.types.Scene, view: View) -> None:
         if name.startswith("use_stamp"):
             keeper.set(render, name, False)
     keep_format(keeper, scene)
+    free_camera(keeper, scene)
     layer = bpy.context.view_layer
     for other in scene.view_layers:
         keeper.set(other, "use", other == layer)

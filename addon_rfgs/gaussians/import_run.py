@@ -18,8 +18,7 @@ from ..saving import save_copy
 from ..scene.cameras import picture_size
 from ..scene.frames import file_label
 from ..scene.lights import lights_ready
-from ..scene.outlines import RAYS
-from ..scene.state import Keeper, kept, show_what_renders
+from ..scene.state import Keeper, free_camera, kept, show_what_renders
 from ..scene.survey import survey
 from .clouds import Imported, Inspection, import_gaussians
 from .compare import compare_with_mesh, keep_result
@@ -155,6 +154,7 @@ def _configure(keeper: Keeper, scene: bpy.types.Scene, size: tuple[int, int], sa
         "film_transparent": False,
     }.items():
         keeper.set(scene.render, name, value)
+    free_camera(keeper, scene)
     keeper.set(scene.cycles, "device", "CPU")
     keeper.set(scene.cycles, "samples", samples)
     keeper.set(scene.cycles, "use_adaptive_sampling", False)
@@ -167,8 +167,7 @@ def _invisible(items: list[bpy.types.Object]) -> Iterator[None]:
     keeper = Keeper()
     try:
         for item in items:
-            for kind in RAYS:
-                keeper.set(item, f"visible_{kind}", False)
+            keeper.make_invisible(item)
         yield
     finally:
         keeper.restore()

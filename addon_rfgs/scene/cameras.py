@@ -98,8 +98,11 @@ def find_views(
             continue
         evaluated = item.evaluated_get(graph)
         matrix = np.array(evaluated.matrix_world, dtype=np.float64)
-        lens = _intrinsics(evaluated, width, height)
-        views.append(View(f"cam{len(views):02d}", item.name, item.data, _rigid(matrix), lens))
+        lens, rigid = _intrinsics(evaluated, width, height), _rigid(matrix)
+        if not np.allclose(rigid[:3, :3], _unscaled(matrix), atol=1e-4):
+            note = {"what": "camera", "object": item.name, "value": "straightened"}
+            guesses.append({**note, "why": "something above it mirrors or shears it"})
+        views.append(View(f"cam{len(views):02d}", item.name, item.data, rigid, lens))
     if not views:
         raise AddonError(f"{file_label()}: no perspective camera; add one")
     if count is not None and count > len(views):
@@ -108,6 +111,7 @@ def find_views(
     guesses.extend(
         _moving(scene, "camera", {view.source: view.world_from_camera for view in views})
     )
+    guesses.extend(_zooming(scene, views, (width, height)))
     return views, guesses
 
 
@@ -201,7 +205,8 @@ def look_at(place: np.ndarray, target: np.ndarray) -> np.ndarray:
 
 
 def place_camera(scene: bpy.types.Scene, view: View) -> bpy.types.Object:
-    """Adds a camera that stays at a view's pose, whatever animates the original."""
+    """Adds a camera that stays at a view's pose and lens, whatever animates the original."""
+    scene.frame_set(scene.frame_start)
     data = view.data.copy()
     data.animation_data_clear()
     item = bpy.data.objects.new(f"RFGS {view.name}", data)
@@ -257,11 +262,40 @@ def _intrinsics(camera: bpy.types.Object, width: int, height: int) -> dict[str, 
     }
 
 
+def _unscaled(matrix: np.ndarray) -> np.ndarray:
+    """Axes [3, 3] of a matrix without their lengths, as Blender takes them to render."""
+    return matrix[:3, :3] / np.linalg.norm(matrix[:3, :3], axis=0)
+
+
 def _rigid(matrix: np.ndarray) -> np.ndarray:
-    """Takes the scale out of a camera's matrix, as Blender does when it renders."""
+    """The pose in a camera's matrix: it looks along the same line, and up is as near as can be.
+
+    Empties above a camera may mirror it or, where scales differ, shear it; no dataset knows such
+    cameras.
+    """
     out = matrix.copy()
-    out[:3, :3] /= np.linalg.norm(out[:3, :3], axis=0)
+    axes = _unscaled(matrix)
+    across = np.cross(axes[:, 1], axes[:, 2])
+    across /= np.linalg.norm(across)
+    out[:3, :3] = np.stack([across, np.cross(axes[:, 2], across), axes[:, 2]], axis=1)
     return out
+
+
+def _zooming(
+    scene: bpy.types.Scene, views: list[View], size: tuple[int, int]
+) -> list[dict[str, Any]]:
+    """Notes about cameras whose lens in later frames differs from that of the first."""
+    notes = {}
+    for frame in (scene.frame_end, (scene.frame_start + scene.frame_end) // 2):
+        scene.frame_set(frame)
+        graph = bpy.context.evaluated_depsgraph_get()
+        for view in views:
+            now = _intrinsics(scene.objects[view.source].evaluated_get(graph), *size)
+            if not np.allclose([*now.values()], [*view.intrinsics.values()], rtol=1e-5):
+                note = {"what": "camera", "object": view.source}
+                note |= {"value": f"lens of frame {scene.frame_start}"}
+                notes[view.source] = {**note, "why": "it zooms; a camera of a dataset has one lens"}
+    return list(notes.values())
 
 
 def _moving(

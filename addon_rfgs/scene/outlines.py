@@ -7,10 +7,8 @@ from collections.abc import Iterable
 
 import bpy
 
-from .state import Keeper
+from .state import RAYS, Keeper
 
-#: Kinds of rays that may see an object.
-RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
 #: Tells outlines from what the user has taken from rays.
 _MARK = "rfgs_outline"
 

@@ -107,6 +107,7 @@ def apply(overrides: Overrides, keeper: Keeper, scene: bpy.types.Scene) -> None:
             keeper.set(item.rfgs, "object_class", value)
             if value == "IGNORE":
                 keeper.set(item, "hide_render", True)
+                keeper.make_invisible(item)
                 keeper.set(item.rfgs, "role", "NONE")
     for key in ("moving", "object_materials"):
         matching_objects(getattr(overrides, key), f"{overrides.label}: {key}")

@@ -9,6 +9,9 @@ from typing import Any
 
 import bpy
 
+#: Kinds of rays that Cycles lets objects be invisible to.
+RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
+
 
 class Keeper:
     """Sets attributes and remembers what was there."""
@@ -36,6 +39,11 @@ class Keeper:
             return
         self._old.append((owner, name, old))
 
+    def make_invisible(self, item: bpy.types.Object) -> None:
+        """Hides an object from every ray; whether it renders at all may be keyed or driven."""
+        for kind in RAYS:
+            self.set(item, f"visible_{kind}", False)
+
     def unhide(self, item: bpy.types.Object) -> None:
         """Opens the eye of an object in the outliner, which renders do not look at."""
         if item.hide_get():
@@ -62,6 +70,12 @@ def kept(scene: bpy.types.Scene) -> Iterator[Keeper]:
         keeper.restore()
         scene.camera = camera
         scene.frame_set(frame)
+
+
+def free_camera(keeper: Keeper, scene: bpy.types.Scene) -> None:
+    """Unbinds cameras from markers, which else take over from the scene's when it is rendered."""
+    for marker in scene.timeline_markers:
+        keeper.set(marker, "camera", None)
 
 
 def show_what_renders(keeper: Keeper, scene: bpy.types.Scene) -> None:

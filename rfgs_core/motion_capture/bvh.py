@@ -5,12 +5,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rfgs_core.errors import RfgsFormatError
+from rfgs_core.motion_capture.joints import named_joints
 from rfgs_core.motion_capture.recording import Recording
 
 _ABOUT = dict(zip(("Xrotation", "Yrotation", "Zrotation"), np.eye(3), strict=True))
@@ -18,6 +20,8 @@ _ALONG = {"Xposition": 0, "Yposition": 1, "Zposition": 2}
 #: Largest file [bytes], most joints, most rotations of all frames, and longest time from frame to
 #: frame [s]: beyond them it is no recording of a person, or one to be cut.
 _MOST_BYTES, _MOST_JOINTS, _MOST_TURNS, _LONGEST_S = 2**27, 1000, 5_000_000, 10.0
+#: What moves by less of the skeleton's size against its parent is held to stay where it is.
+_STILL = 1e-3
 #: Longest word that a message shows.
 _SHOWN = 40
 
@@ -42,18 +46,59 @@ def read_bvh(path: Path) -> Recording:
         raise RfgsFormatError(f"{path}: {len(names)} joints; expected at most {_MOST_JOINTS}")
     values, frame_s = _motion(path, body, sum(len(row) for row in channels), len(names))
     turns = np.broadcast_to(np.eye(3), (len(values), len(names), 3, 3)).copy()
-    root = np.broadcast_to(offsets[0], (len(values), 3)).copy()
+    places = np.broadcast_to(np.array(offsets), (len(values), len(names), 3)).copy()
     column = 0
     for joint, row in enumerate(channels):
         for name in row:
-            # Other joints than the root keep their offsets: bones do not stretch.
-            if name in _ALONG and joint == 0:
-                root[:, _ALONG[name]] = values[:, column]
-            elif name in _ABOUT:
+            if name in _ALONG:
+                places[:, joint, _ALONG[name]] = values[:, column]
+            else:
                 turn = np.radians(values[:, column, None]) * _ABOUT[name]
                 turns[:, joint] @= Rotation.from_rotvec(turn).as_matrix()
             column += 1
-    return Recording(tuple(names), tuple(parents), np.array(offsets), turns, root, frame_s)
+    whole = Recording(tuple(names), tuple(parents), np.array(offsets), turns, places[:, 0], frame_s)
+    return _from_what_moves(whole, places)
+
+
+def _from_what_moves(whole: Recording, places: np.ndarray) -> Recording:
+    """The part of a skeleton below the last joint that carries the whole person.
+
+    Many rigs have hips that move below a root that stands still. Joints further down keep their
+    offsets: bones do not stretch.
+
+    Args:
+        whole: The skeleton, whose joints but the first have constant offsets.
+        places: Every joint's place against its parent in every frame, shape (F, J, 3).
+    """
+    below = [{joint} for joint in range(len(whole.joints))]
+    for joint in range(len(whole.joints) - 1, 0, -1):
+        below[whole.parents[joint]] |= below[joint]
+    person = {joint for bone, joint in named_joints(whole).items() if bone != "pelvis"}
+    first = replace(whole, turns=whole.turns[:1], root=whole.root[:1]).places()[0]
+    moves = np.ptp(places, axis=0).max(axis=1) > _STILL * np.ptp(first, axis=0).max()
+    carriers = [joint for joint in range(1, len(moves)) if moves[joint] and person <= below[joint]]
+    if not person or not carriers:
+        return whole
+    hips = carriers[-1]
+    root, turn = places[:, 0], whole.turns[:, 0]
+    way, joint = [], hips
+    while joint > 0:
+        way.append(joint)
+        joint = whole.parents[joint]
+    for joint in reversed(way):
+        root = root + np.einsum("fij,fj->fi", turn, places[:, joint])
+        turn = turn @ whole.turns[:, joint]
+    kept = sorted(below[hips])
+    turns = whole.turns[:, kept]
+    turns[:, 0] = turn
+    return Recording(
+        tuple(whole.joints[joint] for joint in kept),
+        tuple(kept.index(whole.parents[joint]) if joint != hips else -1 for joint in kept),
+        whole.offsets[kept],
+        turns,
+        root,
+        whole.frame_s,
+    )
 
 
 def _hierarchy(

@@ -10,14 +10,14 @@ from rfgs_core.motion_capture.recording import Recording
 
 #: Names that recordings use for each of our bones, in plain lower case, without sides.
 _NAMES = {
-    "pelvis": ("root", "hips", "pelvis", "hip"),
+    "pelvis": ("hips", "pelvis", "root", "hip"),
     "spine_lower": ("spine04", "spinelower", "spine", "abdomen", "lowerback"),
     "spine_middle": ("spine02", "spinemiddle", "spine1", "chest"),
     "spine_upper": ("spine01", "spineupper", "spine2", "chest2", "upperchest", "thorax"),
     "neck": ("neck01", "neck", "neck1"),
     "head": ("head",),
-    "clavicle": ("clavicle", "shoulder", "collar"),
-    "upperarm": ("upperarm01", "upperarm", "arm", "uparm"),
+    "clavicle": ("clavicle", "collar", "shoulder"),
+    "upperarm": ("upperarm01", "upperarm", "arm", "uparm", "shoulder"),
     "lowerarm": ("lowerarm01", "lowerarm", "forearm", "lowarm", "elbow"),
     "hand": ("wrist", "hand"),
     "upperleg": ("upperleg01", "upleg", "thigh", "upperleg", "hip", "hipjoint"),
@@ -58,12 +58,8 @@ def _bare(name: str) -> str:
     return re.sub(r"[ ._]", "", name).lower()
 
 
-def match_joints(recording: Recording) -> dict[str, int]:
-    """Which recorded joint stands for each of our bones (`articulated.BONES`, and toes).
-
-    Raises:
-        RfgsFormatError: Hips, thighs or shins are not among the joints.
-    """
+def named_joints(recording: Recording) -> dict[str, int]:
+    """Which recorded joint stands for each of our bones, as far as names tell."""
     rows = reversed(list(enumerate(recording.joints)))
     known = {plain_name(joint): index for index, joint in rows}
     found: dict[str, int] = {}
@@ -72,6 +68,20 @@ def match_joints(recording: Recording) -> dict[str, int]:
             joint = next((known[name, side] for name in names if (name, side) in known), None)
             if joint is not None:
                 found[f"{bone}_{SIDES[side]}" if side else bone] = joint
+    for side in SIDES.values():
+        # A shoulder is the clavicle where an arm follows, else it is where the arm begins.
+        if found.get(f"clavicle_{side}", -1) == found.get(f"upperarm_{side}"):
+            del found[f"clavicle_{side}"]
+    return found
+
+
+def match_joints(recording: Recording) -> dict[str, int]:
+    """Which recorded joint stands for each of our bones (`articulated.BONES`, and toes).
+
+    Raises:
+        RfgsFormatError: Hips, thighs or shins are not among the joints.
+    """
+    found = named_joints(recording)
     missing = [bone for bone in _NEEDED if bone not in found]
     if missing:
         raise RfgsFormatError(

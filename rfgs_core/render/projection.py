@@ -44,10 +44,13 @@ def _slopes(
     place: tuple[float, float, float], eye: np.ndarray, size: tuple[int, int]
 ) -> tuple[float, float]:
     """Slopes of the line of sight, clamped to the picture and a margin."""
-    limit_x = SLOPE_MARGIN * 0.5 * size[0] / eye[0]
-    limit_y = SLOPE_MARGIN * 0.5 * size[1] / eye[1]
-    slope_x = min(max(place[0] / place[2], -limit_x), limit_x)
-    return slope_x, min(max(place[1] / place[2], -limit_y), limit_y)
+    beyond_x, beyond_y = SLOPE_MARGIN * size[0], SLOPE_MARGIN * size[1]
+    slope_x = max(place[0] / place[2], -(eye[2] + beyond_x) / eye[0])
+    slope_y = max(place[1] / place[2], -(eye[3] + beyond_y) / eye[1])
+    return (
+        min(slope_x, (size[0] - eye[2] + beyond_x) / eye[0]),
+        min(slope_y, (size[1] - eye[3] + beyond_y) / eye[1]),
+    )
 
 
 @numba.njit(cache=True, inline="always")

@@ -86,11 +86,17 @@ def project_plain(
     centres = torch.stack(
         [camera.fl_x * slope_x + camera.cx, camera.fl_y * slope_y + camera.cy], dim=1
     )
-    limit_x = SLOPE_MARGIN * 0.5 * camera.width / camera.fl_x
-    limit_y = SLOPE_MARGIN * 0.5 * camera.height / camera.fl_y
+    # Where the picture and its margin end; the axis need not be in its middle.
+    ends_x, ends_y = (
+        [(-SLOPE_MARGIN * size - axis) / focal, (size + SLOPE_MARGIN * size - axis) / focal]
+        for size, axis, focal in (
+            (camera.width, camera.cx, camera.fl_x),
+            (camera.height, camera.cy, camera.fl_y),
+        )
+    )
     zero = torch.zeros_like(safe)
-    row_x = [camera.fl_x / safe, zero, -camera.fl_x * slope_x.clamp(-limit_x, limit_x) / safe]
-    row_y = [zero, camera.fl_y / safe, -camera.fl_y * slope_y.clamp(-limit_y, limit_y) / safe]
+    row_x = [camera.fl_x / safe, zero, -camera.fl_x * slope_x.clamp(*ends_x) / safe]
+    row_y = [zero, camera.fl_y / safe, -camera.fl_y * slope_y.clamp(*ends_y) / safe]
     jacobian = torch.stack([torch.stack(row_x, dim=1), torch.stack(row_y, dim=1)], dim=1)
     double = Gaussians(**{name: value.double() for name, value in gaussians.items()})
     mapped = jacobian @ matrix[:3, :3]

@@ -34,8 +34,8 @@ ALPHA_MAX = 0.99
 #: Edge of a tile of a picture [px] (paper section 3.7).
 TILE_PX = 16
 
-#: Slopes beyond this multiple of the picture's half angle are clamped in the Jacobian.
-SLOPE_MARGIN = 1.3
+#: Slopes are clamped in the Jacobian where they leave the picture by this share of its side.
+SLOPE_MARGIN = 0.15
 
 
 @dataclass(frozen=True)

@@ -142,14 +142,19 @@ class World:
         return np.stack(rows).astype(np.float32)
 
     def segment_velocity(self, time_s: float, step_s: float) -> Float32[np.ndarray, "person 17 3"]:
-        """Velocity of every body segment's skin [m/s], a central difference over a step [s]."""
+        """Velocity of every body segment's skin [m/s], a central difference over a step [s].
+
+        Of half a step where somebody's motion begins or ends, as it is held beyond.
+        """
         half = 0.5 * step_s
-        rows = [
-            segment_centres(actor, segment, time_s + half)
-            - segment_centres(actor, segment, time_s - half)
-            for actor, segment in zip(self.actors, self.segment, strict=True)
-        ]
-        return (np.stack(rows) / step_s).astype(np.float32)
+        rows = []
+        for actor, segment in zip(self.actors, self.segment, strict=True):
+            begins_s, ends_s = -actor.start_s, actor.motion.duration_s - actor.start_s
+            before_s, after_s = max(time_s - half, begins_s), min(time_s + half, ends_s)
+            way_m = segment_centres(actor, segment, after_s)
+            way_m = way_m - segment_centres(actor, segment, before_s)
+            rows.append(way_m / (after_s - before_s) if after_s > before_s else 0.0 * way_m)
+        return np.stack(rows).astype(np.float32)
 
     def tracer(self, depth: int, seed: int = 0) -> FastTracer:
         """The fast tracer of this world."""

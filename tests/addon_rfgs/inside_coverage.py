@@ -12,7 +12,7 @@ import pytest
 from blank_file import open_blank_file
 
 from addon_rfgs.cli import open_blend, run
-from addon_rfgs.coverage.surface import read_map
+from addon_rfgs.coverage.surface import clear_coverage, coverages, read_map, show_coverage
 from addon_rfgs.errors import AddonError
 from addon_rfgs.gaussians.coloring import Scale
 from addon_rfgs.gaussians.legend import legend_of
@@ -64,6 +64,16 @@ def test_cells_stand_where_they_were_traced(scene: bpy.types.Scene) -> None:
     np.testing.assert_allclose(found[0], GAIN_DB[0][0])
     # Where nothing arrives is a hole.
     assert np.isnan(found[1, 2]) and len(item.data.polygons) == 1
+
+
+def test_each_scene_keeps_its_own_map(scene: bpy.types.Scene, file: Path) -> None:
+    assert bpy.ops.rfgs.show_coverage() == {"FINISHED"}
+    other = bpy.data.scenes.new("other")
+    show_coverage(other, read_map(file), 1)
+    assert [len(coverages(each)) for each in (scene, other)] == [1, 1]
+    show_coverage(other, read_map(file), 0)
+    assert [len(coverages(each)) for each in (scene, other)] == [1, 1] and len(coverages()) == 2
+    assert clear_coverage() == 2
 
 
 def test_the_loudest_is_shown_unless_one_is_named(scene: bpy.types.Scene) -> None:

@@ -12,6 +12,7 @@ import torch
 
 from rfgs_core.gaussians import Gaussians
 from rfgs_core.render.bench import bench_raster, random_cloud
+from rfgs_core.render.cameras import Camera
 from rfgs_core.render.rasterizer import SMALL_ENTRIES, plan_splats, splat
 from rfgs_core.render.reference import splat_plain
 from rfgs_core.render.splat import NEAR_M
@@ -153,6 +154,19 @@ def test_stopping_early_behind_opaque_layers_stays_within_tolerance(camera, gaus
     eye = camera(size=(48, 48))
     tiled, plain = splat(layers, rgb, eye), splat_plain(layers, rgb, eye)
     np.testing.assert_allclose(tiled.rgb, plain.rgb, atol=2e-5)
+
+
+@pytest.mark.parametrize("draw", [splat, splat_plain])
+def test_a_part_of_a_picture_is_a_picture_of_its_own(draw, gaussians) -> None:
+    """Cameras with shift: the optical axis of the right half stands at its left edge."""
+    whole = Camera("whole", 200, 120, 100.0, 100.0, 100.0, 60.0, np.eye(4))
+    half = Camera("half", 100, 120, 100.0, 100.0, 0.0, 60.0, np.eye(4))
+    cloud = gaussians([[2.7, 0.3, -3.0], [1.2, -0.5, -2.0]], 0.15, 0.9)
+    rgb = torch.rand(2, 3, generator=torch.Generator().manual_seed(1))
+    seen, cut = draw(cloud, rgb, whole), draw(cloud, rgb, half)
+    assert float(cut.alpha[:, 70:].max()) > 0.5
+    np.testing.assert_allclose(cut.rgb, seen.rgb[:, 100:], atol=1e-6)
+    np.testing.assert_allclose(cut.alpha, seen.alpha[:, 100:], atol=1e-6)
 
 
 def test_gradient_to_colours_equals_autograd_of_the_twin() -> None:

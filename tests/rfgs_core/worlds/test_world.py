@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
@@ -141,6 +142,20 @@ def test_segments_move_with_their_joints(worlds) -> None:
     still, moved = worlds[0].joints(0.1)[0], worlds[0].joints(0.2)[0]
     speed = worlds[0].segment_velocity(0.15, 0.1)[0]
     np.testing.assert_allclose(speed[0], (moved - still)[0] / 0.1, atol=0.15)
+
+
+def test_where_a_motion_begins_or_ends_velocity_is_that_of_the_half_that_there_is(worlds) -> None:
+    actor = worlds[0].actors[0]
+    lasts_s = actor.motion.duration_s
+    for start_s, ends_s in ((0.0, (0.0, 0.05)), (lasts_s, (-0.05, 0.0)), (lasts_s + 1.0, None)):
+        there = replace(actor, start_s=start_s)
+        world = replace(worlds[0], actors=[there])
+        found = world.segment_velocity(0.0, 0.1)[0]
+        if ends_s is None:
+            assert not found.any()
+            continue
+        before, after = (segment_centres(there, world.segment[0], at_s) for at_s in ends_s)
+        np.testing.assert_allclose(found, (after - before) / 0.05, atol=1e-4)
 
 
 def test_a_stream_hears_people_and_its_workers_share_it() -> None:

@@ -52,7 +52,7 @@ def read_bvh(path: Path) -> Recording:
         for name in row:
             if name in _ALONG:
                 places[:, joint, _ALONG[name]] = values[:, column]
-            else:
+            elif name in _ABOUT:
                 turn = np.radians(values[:, column, None]) * _ABOUT[name]
                 turns[:, joint] @= Rotation.from_rotvec(turn).as_matrix()
             column += 1

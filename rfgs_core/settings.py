@@ -85,7 +85,8 @@ class TrainOptions:
     """Weight with which Gaussians are held to their place on the body from frame to frame."""
     posture: Posture = "told"
     """told: the radio decides in every frame who stands, who sits and where the knees point, and
-    who lies and which way; standing: everybody stands, as is assumed without phases anyway."""
+    who lies and which way; standing: everybody stands, as is assumed without phases anyway, unless
+    limbs are told, see `limbs`."""
 
     limbs: Limbs = "auto"
     """auto: evidence tells the limbs of people who walk, and of others where six device pairs or
@@ -122,6 +123,7 @@ _LIMITS: dict[str, tuple[float, float]] = {
     "iterations": (0, 10**9), "bodies": (1, 10**4), "excess_m": (0.0, 20.0),
     "solver_steps": (0, 10**6), "batch_entries": (1, 2**31), "batch_points": (1, 2**31),
     "grid_side": (1, 1024), "refine_levels": (0, 64), "unexplained": (0.0, 1.0),
+    "temporal": (0.0, 1e9),
 }  # fmt: skip
 
 

@@ -229,7 +229,7 @@ def read_features(ply: Path, count: int) -> dict[str, np.ndarray]:
     if not path.is_file():
         return {}
     for file in (ply, path):
-        check_seal(file, "train this run again")
+        check_seal(file, "delete what is damaged and run the same `rfgs train` again")
     with array_file(path) as arrays:
         return {
             name: arrays.read(name, lambda *found, name=name: _check(path, name, count, *found))

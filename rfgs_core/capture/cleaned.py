@@ -82,18 +82,19 @@ def cleaned(capture: Capture) -> tuple[Capture, list[str]]:
 
 
 def _over_subcarriers(capture: Capture) -> Iterator[Step]:
-    """Gaps, rotations, outliers, one clock and linear phase."""
-    received = capture.valid.any(axis=-1, keepdims=True)
-    if (~capture.valid & received).any():
-        filled = sanitize.fill_gaps(capture.values, capture.valid, capture.index)
-        capture = replace(capture, values=filled.astype(np.complex64))
-        yield Step("nulls, pilots and centre filled", capture)
+    """Rotations, gaps, outliers, one clock and linear phase."""
     form, width = str(capture.info.get("format", "")), int(capture.info.get("bandwidth_mhz", 0))
     if form in ("HT", "VHT") and width >= 40 and capture.source not in ("feitcsi", "picoscenes"):
         # Firmware of AX200 and AX210 takes the rotations back itself.
         turned = sanitize.undo_rotations(capture.values, capture.index, form, width)
         capture = replace(capture, values=turned.astype(np.complex64))
         yield Step("rotations of the standard undone", capture)
+    # Only then, as phases jump where rotations begin.
+    received = capture.valid.any(axis=-1, keepdims=True)
+    if (~capture.valid & received).any():
+        filled = sanitize.fill_gaps(capture.values, capture.valid, capture.index)
+        capture = replace(capture, values=filled.astype(np.complex64))
+        yield Step("nulls, pilots and centre filled", capture)
     cleaned, changed = sanitize.hampel(capture.values)
     capture = replace(capture, values=cleaned)
     yield Step(f"{int(changed.sum())} outliers replaced", capture)

@@ -83,10 +83,15 @@ def run(args: ImportArgs) -> int:
     radio = prepared.radio
     # A capture does not tell who was there, and few radios can count: the reader knows.
     people = "--people N " if args.layout else ""
+    trains = (
+        f"next: rfgs train {args.out} --radio {radio.name} {people}--out RUN"
+        f"{' (N people were there)' if people else ''}"
+    )
+    if count < 2:
+        trains = "a single subcarrier tells no delays, so nothing can be trained on it"
     sys.stdout.write(
         f"{args.out}: {frames} frames of {samples} packets, {num_tx} x {num_rx} antennas, "
         f"{count} subcarriers ({int(prepared.measured.sum())} measured) at "
-        f"{radio.centre_hz / 1e9:.4f} GHz; next: rfgs train {args.out} --radio {radio.name} "
-        f"{people}--out RUN{' (N people were there)' if people else ''}\n"
+        f"{radio.centre_hz / 1e9:.4f} GHz; {trains}\n"
     )
     return 0

@@ -50,7 +50,6 @@ def run(args: LimbsArgs) -> int:
     import torch
     from tqdm import tqdm
 
-    from rfgs_core.device import need_device
     from rfgs_core.errors import RfgsError
     from rfgs_core.limbs.learn import LearnConfig, learn
     from rfgs_core.limbs.weights import save_network
@@ -67,13 +66,7 @@ def run(args: LimbsArgs) -> int:
     for name in ("frames", "kept", "batch"):
         if getattr(args, name) < 1:
             raise RfgsError(f"--{name} {getattr(args, name)}: expected at least 1")
-    if not (args.hours is None or 0.0 < args.hours < 10_000.0):
-        raise RfgsError(f"--hours {args.hours}: expected more than 0")
-    if not 0.0 < args.passes <= 10_000.0:
-        raise RfgsError(f"--passes {args.passes}: expected more than 0")
-    need_device(args.device)
-    if not 0 <= args.workers <= 256:
-        raise RfgsError(f"--workers {args.workers}: expected 0 to 256")
+    _check(args)
     config = LearnConfig(
         frames=args.frames, hours=args.hours, passes=args.passes, kept=args.kept,
         workers=args.workers, batch=args.batch, size=args.size, device=args.device, seed=args.seed,
@@ -109,3 +102,23 @@ def run(args: LimbsArgs) -> int:
         f"on, after {learned.progress.frames} frames\n"
     )
     return 0
+
+
+def _check(args: LimbsArgs) -> None:
+    """Refuses numbers that nothing comes of.
+
+    Raises:
+        RfgsError: One is out of range, or there is no such device.
+    """
+    from rfgs_core.device import need_device
+    from rfgs_core.errors import RfgsError
+
+    if not (args.hours is None or 0.0 < args.hours < 10_000.0):
+        raise RfgsError(f"--hours {args.hours}: expected more than 0")
+    if not 0.0 < args.passes <= 10_000.0:
+        raise RfgsError(f"--passes {args.passes}: expected more than 0")
+    need_device(args.device)
+    if not 0 <= args.seed < 2**63:
+        raise RfgsError(f"--seed {args.seed}: expected 0 to 2^63 - 1")
+    if not 0 <= args.workers <= 256:
+        raise RfgsError(f"--workers {args.workers}: expected 0 to 256")

@@ -70,6 +70,11 @@ def run(args: PredictArgs) -> int:
     lines = [*_table(prediction, arrays), *_reflectors(arrays), _material(trained, frame, args)]
     path = out or args.run / "predictions" / f"{frame:06d}.npz"
     _write(path, arrays)
+    if excess_m := trained.config.settings.excess_m:
+        lines.append(
+            f"echoes lack the {excess_m:.1f} m that paths over people are longer in this run: add "
+            "them where antennas stand behind the same wall"
+        )
     lines += [f"holds: {note_of(arrays)}", f"{path} and {path.with_suffix('.png').name} written"]
     sys.stdout.write("\n".join(lines) + "\n")
     return 0

@@ -106,9 +106,9 @@ def _first_frame(path: Path) -> Run:
     import time
 
     from rfgs_core.run import open_run
-    from rfgs_core.run.config import CONFIG_FILE
+    from rfgs_core.run.config import CONFIG_FILE, HEAD_FILE
 
-    while not (path / CONFIG_FILE).is_file() or not any((path / "gaussians").glob("[0-9]*.ply")):
+    while not (path / CONFIG_FILE).is_file() or not (path / HEAD_FILE).is_file():
         time.sleep(0.5)
     return open_run(path)
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -102,9 +102,11 @@ def learn(
     network = LimbNetwork(Ranges.of(radio.bandwidth_hz).count, config.size).to(config.device)
     optimiser = Adam.of(network.parameters(), config.rate, decay=0.02)
     kept = Kept(config.kept, radio, config.device)
-    progress = Progress(0, 0.0)
+    # How long it goes on, where and by how many workers may change.
+    fixed = replace(config, frames=0, hours=None, workers=0, device="cpu")
+    progress, asked = Progress(0, 0.0), f"{radio} {fixed}"
     if checkpoint is not None and checkpoint.exists():
-        progress = resume(checkpoint, network, optimiser)
+        progress = resume(checkpoint, network, optimiser, asked)
     judged = _judged(radio, config)
     # Whoever goes on sees other worlds than before.
     worlds = sub_seed(config.seed, "from", progress.frames)
@@ -133,7 +135,7 @@ def learn(
             told = f"off by {float(torch.stack(errors).mean()):.3f} m, " if errors else ""
             words = f"{told}in unseen worlds {unseen:.4f} m"
             if checkpoint is not None and errors:
-                keep(checkpoint, network, optimiser, progress)
+                keep(checkpoint, network, optimiser, progress, asked)
         on_chunk(progress.frames, words)
         if share >= 1.0:
             break

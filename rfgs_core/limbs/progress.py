@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 from typing import NamedTuple
 
@@ -30,24 +31,44 @@ class Progress(NamedTuple):
     """Time so far [s]."""
 
 
-def keep(path: Path, network: nn.Module, optimiser: Adam, progress: Progress) -> None:
-    """Writes the state of a training in one step."""
+def keep(
+    path: Path, network: nn.Module, optimiser: Adam, progress: Progress, asked: str = ""
+) -> None:
+    """Writes the state of a training in one step.
+
+    Args:
+        path: Where to.
+        network: Its weights.
+        optimiser: Its moments.
+        progress: How far it has come.
+        asked: Whatever decides how it goes on; it goes on with the same alone.
+    """
     state = {f"weight.{name}": value.cpu() for name, value in network.state_dict().items()}
     for name, parameter in network.named_parameters():
         for moment in _MOMENTS:
             state[f"{moment}.{name}"] = optimiser.state[parameter][moment].cpu()
     state["frames"] = torch.tensor(progress.frames)
     state["spent_s"] = torch.tensor(progress.spent_s, dtype=torch.float64)
+    state["asked"] = _digest(asked)
     write_bytes(path, sealed(save(state, {"seal": BLANK})))
 
 
-def resume(path: Path, network: nn.Module, optimiser: Adam) -> Progress:
+def _digest(asked: str) -> torch.Tensor:
+    return torch.tensor(list(hashlib.sha256(asked.encode()).digest()), dtype=torch.uint8)
+
+
+def resume(path: Path, network: nn.Module, optimiser: Adam, asked: str = "") -> Progress:
     """Reads what `keep` wrote into a network and its optimiser.
 
     Raises:
-        RfgsFormatError: The file is damaged, or of another network.
+        RfgsFormatError: The file is damaged, of another network, or of a training that was asked
+            for something else.
     """
     state, _ = read_tensors(path, _REMEDY)
+    if not torch.equal(state.pop("asked", torch.tensor(())), _digest(asked)):
+        raise RfgsFormatError(
+            f"{path}: is of a training with other options; give the same ones again, or {_REMEDY}"
+        )
     told = {name: state.pop(name, torch.tensor(())) for name in ("frames", "spent_s")}
     if any(value.numel() != 1 or float(value) < 0.0 for value in told.values()):
         raise RfgsFormatError(f"{path}: expected how far it had come and how long; {_REMEDY}")

@@ -87,6 +87,8 @@ class Resolving:
         rows = [
             f"{self.radio}: paths are resolved by {self.path_m:.3g} m (out and back: ranges by "
             f"{self.path_m / 2.0:.3g} m), delays repeat after {self.repeats_m:.4g} m of path"
+            if np.isfinite(self.path_m)
+            else f"{self.radio}: a single subcarrier resolves no paths"
         ]
         for row in self.across:
             rows.append(

@@ -81,9 +81,9 @@ def train(
         Steps, and how long they took.
     """
     optimiser = Adam.of(network.parameters(), training.rate, decay=0.02)
-    progress = Progress(0, 0.0)
+    progress, asked = Progress(0, 0.0), f"{training} of {len(known.joints)} examples"
     if checkpoint is not None and checkpoint.exists():
-        progress = resume(checkpoint, network, optimiser)
+        progress = resume(checkpoint, network, optimiser, asked)
     steps = training.steps(len(known.joints))
     begun, told = time.monotonic() - progress.spent_s, math.nan
     for step in range(progress.frames, steps):
@@ -102,7 +102,7 @@ def train(
         told = now if math.isnan(told) else 0.98 * told + 0.02 * now
         progress = Progress(step + 1, time.monotonic() - begun)
         if checkpoint is not None and (progress.frames % _KEPT == 0 or progress.frames == steps):
-            keep(checkpoint, network, optimiser, progress)
+            keep(checkpoint, network, optimiser, progress, asked)
         on_step(progress.frames, f"off by {told:.3f} m")
     network.eval()
     return progress

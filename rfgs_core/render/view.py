@@ -209,7 +209,7 @@ def color_run_files(run: TrainedRun, shader: Shader | None) -> None:
         path = run.path / name
         if not path.is_file():
             continue
-        stored = read_ply(path, "train this run again")
+        stored = read_ply(path, "delete what is damaged and run the same `rfgs train` again")
         if len(stored) != len(gaussians):
             raise RfgsFormatError(
                 f"{path}: holds {len(stored)} Gaussians, the run {len(gaussians)}"

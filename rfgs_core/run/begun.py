@@ -10,6 +10,7 @@ from rfgs_core.dataset import Dataset, Sequence
 from rfgs_core.dataset.observed import Observed
 from rfgs_core.errors import RfgsError
 from rfgs_core.links import refuse_link
+from rfgs_core.run.checkpoint import is_finished, lost_limbs
 from rfgs_core.run.config import CONFIG_FILE, RunConfig, relative_dataset
 from rfgs_core.run.excess import ExcessPath, excess_of_run
 from rfgs_core.run.folder import Run, open_run
@@ -43,7 +44,8 @@ def finished_run(
         return None
     asked, _ = asked_of(out, dataset, sequence, radio, frames, config, people, excess)
     run = open_or_create(out, asked)
-    return run if (out / POINT_CLOUD_FILE).exists() else None
+    whole = (out / POINT_CLOUD_FILE).exists() and not lost_limbs(run)
+    return run if whole and all(is_finished(run, frame) for frame in run.frames) else None
 
 
 def asked_of(

@@ -12,6 +12,7 @@ from rfgs_core.dataset import Sequence
 from rfgs_core.errors import RfgsError
 from rfgs_core.fit.calibrate import Calibration
 from rfgs_core.measure.offsets import Offsets
+from rfgs_core.run.config import REMEDY
 from rfgs_core.settings import TrainConfig
 
 _SHAPES: dict[str, Shape] = {
@@ -64,9 +65,8 @@ def read_calibration(run: Path, frame: int) -> Calibration:
         RfgsError: The frame has none.
         RfgsFormatError: The file is damaged.
     """
-    remedy = "run the same `rfgs train` again, without the file if it is damaged"
     path, types = calibration_path(run, frame), dict.fromkeys(_SHAPES, "f8")
-    arrays = load_arrays(path, remedy, _SHAPES, types=types)
+    arrays = load_arrays(path, REMEDY, _SHAPES, types=types)
     return Calibration(
         capture=Offsets(arrays["capture_phase_rad"], arrays["capture_delay_s"]),
         drift=Offsets(arrays["drift_phase_rad"], arrays["drift_delay_s"]),

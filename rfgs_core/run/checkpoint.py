@@ -18,7 +18,9 @@ from rfgs_core.gaussians import Gaussians
 from rfgs_core.gaussians.ply import cloud_of, write_ply
 from rfgs_core.model.head import HEAD_SHAPES, HEAD_TYPES, RadioHead
 from rfgs_core.radio.levels import decibels
-from rfgs_core.run.folder import Run, checkpoint_path
+from rfgs_core.run.calibration import calibration_path
+from rfgs_core.run.config import HEAD_FILE, REMEDY
+from rfgs_core.run.folder import LIMBS_FILE, Run, checkpoint_path
 from rfgs_core.run.static import static_ply
 
 _CHECKPOINT: dict[str, Shape] = {
@@ -81,7 +83,7 @@ def store_frame(
     if not static_ply(run.path).exists():
         write_ply(static_ply(run.path), cloud_of(Gaussians.none()))
     head = state.head.arrays()
-    save_arrays(run.path / "radio_head.npz", head)
+    save_arrays(run.path / HEAD_FILE, head)
     arrays = {name: value.numpy() for name, value in state.gaussians.items()}
     arrays |= {"power": state.power.numpy(), "track_id": state.track_id}
     arrays["next_track"] = np.array(state.unused_track)
@@ -92,11 +94,29 @@ def store_frame(
     partial_path(run, frame).unlink(missing_ok=True)
 
 
+def is_finished(run: Run, frame: int) -> bool:
+    """Whether a frame is fitted and everything that is kept of it is there."""
+    cloud = run.ply_path(frame)
+    kept = [checkpoint_path(run.path, frame), cloud, cloud.with_suffix(".features.npz")]
+    if run.config.settings.calibrate != "none":
+        kept.append(calibration_path(run.path, frame))
+    return all(path.exists() for path in (*kept, run.path / HEAD_FILE))
+
+
+def lost_limbs(run: Run) -> bool:
+    """Whether Gaussians of a run are on skins of people whose limbs are no longer there."""
+    first = run.ply_path(run.frames[0]).with_suffix(".features.npz")
+    if (run.path / LIMBS_FILE).exists() or not first.exists():
+        return False
+    bone: dict[str, Shape] = {"bone": ("M",)}
+    return "bone" in load_arrays(first, REMEDY, {}, types={"bone": "i8"}, optional=bone)
+
+
 def finished_frame(run: Run, frame: int) -> FrameState | None:
     """The state of a frame that is already fitted, for the next one to start from."""
-    path = checkpoint_path(run.path, frame)
-    if not path.exists():
+    if not is_finished(run, frame):
         return None
+    path = checkpoint_path(run.path, frame)
     remedy = "delete it to fit this frame again"
     arrays = load_arrays(
         path, remedy, _CHECKPOINT, _MAY_BE_NAN, types=_CHECKPOINT_TYPES, optional=_LYING

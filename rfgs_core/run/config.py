@@ -17,6 +17,10 @@ from rfgs_core.settings import TrainConfig
 SCHEMA = "rfgs-run/1"
 #: What the settings of a training are kept in, within a run.
 CONFIG_FILE = "config.json"
+#: What decodes reflectivities from features.
+HEAD_FILE = "radio_head.npz"
+#: What helps where a file of a run cannot be read.
+REMEDY = "delete what is damaged and run the same `rfgs train` again"
 #: Not a property of the result: a run may go on elsewhere.
 _NOT_KEPT = ("device",)
 

@@ -11,6 +11,19 @@ from rfgs_core.dataset.observed import Observed
 from rfgs_core.errors import RfgsError
 
 
+def need_a_band(sequence: Sequence, radio: str) -> None:
+    """Refuses radios that tell no delays.
+
+    Raises:
+        RfgsError: The radio has a single subcarrier.
+    """
+    if sequence.radio_spec(radio).num_subcarriers < 2:
+        raise RfgsError(
+            f"{radio} has a single subcarrier: it tells no delays, by which places are found; "
+            "expected a radio of two subcarriers or more"
+        )
+
+
 @lru_cache(maxsize=8)
 def trained_sequence(
     run: Path, place: Path, name: str, fingerprint: str, channel: Observed

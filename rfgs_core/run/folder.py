@@ -24,7 +24,7 @@ from rfgs_core.model.reflectivity import fitted_reflectivities
 from rfgs_core.model.unseen_pairs import levelled
 from rfgs_core.radio.levels import power_of
 from rfgs_core.run.calibration import read_calibration
-from rfgs_core.run.config import RunConfig, relative_dataset
+from rfgs_core.run.config import HEAD_FILE, REMEDY, RunConfig, relative_dataset
 from rfgs_core.run.data import trained_sequence
 from rfgs_core.run.static import static_gaussians
 from rfgs_core.threads import one_torch_thread
@@ -33,7 +33,6 @@ from rfgs_core.threads import one_torch_thread
 BACKGROUND_FILE = "background.npz"
 #: What `rfgs train` keeps of people's limbs, where it tells them.
 LIMBS_FILE = "limbs.npz"
-_REMEDY = "train this run again"
 _ATTRIBUTES: dict[str, Shape] = {
     "features": ("M", FEATURE_DIM),
     "gamma": ("M", 1),
@@ -126,7 +125,7 @@ class Run:
         types = {
             "empty": "f4" if self.config.settings.observe in ("power", "delay_power") else "c8"
         }
-        return load_arrays(self.path / BACKGROUND_FILE, _REMEDY, shapes, types=types)["empty"]
+        return load_arrays(self.path / BACKGROUND_FILE, REMEDY, shapes, types=types)["empty"]
 
     def ply_path(self, frame: int) -> Path:
         """Moving Gaussians of a frame."""
@@ -169,12 +168,12 @@ class Run:
             )
         posed = (self.path / LIMBS_FILE).exists()
         shapes = {**_ATTRIBUTES, **_ON_SKIN} if posed else _ATTRIBUTES
-        arrays = load_arrays(path, _REMEDY, shapes, types=_TYPES)
+        arrays = load_arrays(path, REMEDY, shapes, types=_TYPES)
         count = count_ply(self.ply_path(frame))
         if count != len(arrays["features"]):
             raise RfgsFormatError(
                 f"{self.ply_path(frame)}: holds {count} Gaussians, but there are features of "
-                f"{len(arrays['features'])}; {_REMEDY}"
+                f"{len(arrays['features'])}; {REMEDY}"
             )
         return arrays
 
@@ -185,7 +184,7 @@ class Run:
     def moving(self, frame: int) -> Gaussians:
         """Moving Gaussians of a frame with their features."""
         features = self.attributes(frame)["features"]
-        return read_ply(self.ply_path(frame), _REMEDY).to_gaussians(features)
+        return read_ply(self.ply_path(frame), REMEDY).to_gaussians(features)
 
     def bodies(self, frame: int) -> Bodies | None:
         """Where the bodies of a frame are and how they hold themselves.
@@ -203,7 +202,7 @@ class Run:
         types = dict.fromkeys(shapes, "f8")
         types["lying"] = "f8"
         may_be_nan, lying = ("knees_rad", "lying"), {"lying": ("body", 2)}
-        stored = load_arrays(path, _REMEDY, shapes, may_be_nan, types=types, optional=lying)
+        stored = load_arrays(path, REMEDY, shapes, may_be_nan, types=types, optional=lying)
         if len(stored["axes_xy"]) == 0:
             return None
         return Bodies(stored["axes_xy"], stored["knees_rad"], stored.get("lying"))
@@ -211,8 +210,7 @@ class Run:
     @property
     def head(self) -> RadioHead:
         """Decodes reflectivities from features."""
-        file = self.path / "radio_head.npz"
-        stored = load_arrays(file, _REMEDY, HEAD_SHAPES, types=HEAD_TYPES)
+        stored = load_arrays(self.path / HEAD_FILE, REMEDY, HEAD_SHAPES, types=HEAD_TYPES)
         return RadioHead.of_arrays(stored)
 
     def predict(self, frame: int) -> Complex64[np.ndarray, "tx rx subcarrier"]:

@@ -35,8 +35,16 @@ from rfgs_core.run.calibration import (
     read_calibration,
     write_calibration,
 )
-from rfgs_core.run.checkpoint import checkpoint_path, finished_frame, partial_path, store_frame
+from rfgs_core.run.checkpoint import (
+    finished_frame,
+    is_finished,
+    lost_limbs,
+    partial_path,
+    store_frame,
+)
+from rfgs_core.run.config import REMEDY
 from rfgs_core.run.costs import CostBar, cost_bar, pose_stages, price_line
+from rfgs_core.run.data import need_a_band
 from rfgs_core.run.encoders import (
     ENCODER_FILE,
     keep_encoder,
@@ -146,6 +154,7 @@ def _train(
 
 def _check(dataset: Dataset, sequence: Sequence, radio: str, config: TrainConfig) -> None:
     """Refuses settings that do not go together, or ask for what is not there."""
+    need_a_band(sequence, radio)
     need_shared_links(sequence, radio, config)
     need_phases(config)
     need_sample_points(config)
@@ -173,7 +182,7 @@ def _fit_frames(run: Run, config: TrainConfig, log: bool) -> float:
     begin = time.perf_counter()
     trained = limbs_network(run) if limbs_wanted(run, config) else None
     # What is told of limbs is not kept where it is of no use, and a finished run needs none of it.
-    left = [frame for frame in run.frames if not checkpoint_path(run.path, frame).exists()]
+    left = lost_limbs(run) or not all(is_finished(run, frame) for frame in run.frames)
     posing = _posing(run, trained) if left and (trained or _evidence(run, config)) else []
     can = resolving(run.sequence, run.config.radio, config.num_gaussians, config.observe)
     sys.stderr.write("".join(f"{line}\n" for line in [*can.lines(), price_line(run, posing)]))
@@ -283,7 +292,5 @@ def _write_point_cloud(run: Run) -> None:
     """Static Gaussians and those of the first frame in one file, for any splat viewer."""
     write_ply(
         run.path / POINT_CLOUD_FILE,
-        GaussianCloud.join(
-            static_cloud(run.path), read_ply(run.ply_path(run.frames[0]), "train this run again")
-        ),
+        GaussianCloud.join(static_cloud(run.path), read_ply(run.ply_path(run.frames[0]), REMEDY)),
     )

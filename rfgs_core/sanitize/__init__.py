@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sanitisation of measured channels: pure functions, each with its formula and source.
 
-In the order that survives review: gain, null, pilot and centre subcarriers, rotations of the
-standard, outliers, one clock; only then phases: slopes, products or ratios, Doppler, delay.
+In the order that survives review: gain, rotations of the standard, null, pilot and centre
+subcarriers, outliers, one clock; only then phases: slopes, products or ratios, Doppler, delay.
 """
 
 from __future__ import annotations

@@ -3,11 +3,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from jaxtyping import Bool, Complex, Float
 
 #: Standard deviations of a normal distribution in one median absolute deviation.
 MAD_TO_SIGMA = 1.4826
+#: Values of windows that are looked at together.
+_BLOCK = 2**22
 
 
 def hampel(
@@ -32,12 +36,19 @@ def hampel(
     Returns:
         A copy, and where it was changed.
     """
-    from scipy.ndimage import median_filter
-
     level = np.abs(values) if np.iscomplexobj(values) else np.asarray(values, np.float64)
-    size = (2 * half_window + 1, *[1] * (values.ndim - 1))
-    median = median_filter(level, size=size, mode="nearest")
-    deviation = median_filter(np.abs(level - median), size=size, mode="nearest")
+    median, deviation = np.zeros_like(level), np.zeros_like(level)
+    ends = [(half_window, half_window), *[(0, 0)] * (values.ndim - 1)]
+    padded = np.pad(level, ends, mode="edge")
+    # The deviation of every window is from its own median, so windows are written out, some at
+    # a time.
+    step = max(1, _BLOCK // max(1, (2 * half_window + 1) * math.prod(values.shape[1:])))
+    for first in range(0, len(level), step):
+        rows = padded[first : first + step + 2 * half_window]
+        around = np.lib.stride_tricks.sliding_window_view(rows, 2 * half_window + 1, axis=0)
+        part = slice(first, first + len(around))
+        median[part] = np.median(around, axis=-1)
+        deviation[part] = np.median(np.abs(around - median[part, ..., None]), axis=-1)
     outlying = np.abs(level - median) > sigmas * MAD_TO_SIGMA * deviation
     if not np.iscomplexobj(values):
         return np.where(outlying, median, values), outlying

@@ -14,6 +14,7 @@ from rfgs_core.arrays import load_arrays
 from rfgs_core.errors import RfgsError
 from rfgs_core.render.view import fitted_shader
 from rfgs_core.run import Run
+from rfgs_core.run.config import HEAD_FILE
 from rfgs_core.run.limbs import read_limbs
 from rfgs_core.skeleton import JOINTS, PARENTS
 from rfgs_core.view.frame import ShownFrame, load_frame
@@ -32,7 +33,14 @@ def finished_frames(run: Run) -> list[int]:
     Raises:
         RfgsError: There is none yet.
     """
-    frames = [frame for frame in run.frames if run.ply_path(frame).is_file()]
+
+    def fitted(frame: int) -> bool:
+        # Features and the head of reflectivities are written after the Gaussians.
+        cloud = run.ply_path(frame)
+        kept = (cloud, cloud.with_suffix(".features.npz"), run.path / HEAD_FILE)
+        return all(file.is_file() for file in kept)
+
+    frames = list(filter(fitted, run.frames))
     if not frames:
         raise RfgsError(f"{run.path}: no frame has been fitted yet; `rfgs train` goes on with it")
     return frames

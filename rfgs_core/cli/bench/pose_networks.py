@@ -67,6 +67,8 @@ class PoseNetworks(Part):
         need_at_least_one(frames=self.frames)
         if not (self.passes is None or 0.0 < self.passes <= 10_000.0):
             raise RfgsError(f"--passes {self.passes}: expected more than 0")
+        if not 0 <= self.seed < 2**63:
+            raise RfgsError(f"--seed {self.seed}: expected 0 to 2^63 - 1")
         need_folder(self.out)
         sequence = None if self.dataset is None else open_dataset(self.dataset).sequence()
         trial = self._trial(sequence)

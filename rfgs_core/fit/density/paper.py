@@ -107,6 +107,10 @@ class PaperDensity:
         if step % self.rule.densify_every == 0:
             self._densify(trained)
 
+    def _forget(self) -> None:
+        """Begins anew: rows have changed."""
+        self.error_sum, self.error_count = torch.zeros(0), torch.zeros(0)
+
     def _watch(self, step: int, trained: TrainableGaussians, points: SamplePoints) -> None:
         since_prune = step % self.rule.prune_every or self.rule.prune_every
         if len(self.error_sum) != len(trained.gaussians) or since_prune == 1:
@@ -128,7 +132,7 @@ class PaperDensity:
         drop |= redundant(g.means, g.opacities, self.rule.least_spacing_m)
         if bool(drop.any()) and not bool(drop.all()):
             trained.edit_rows(~drop)
-            self.error_sum = torch.zeros(0)
+            self._forget()
 
     def _densify(self, trained: TrainableGaussians) -> None:
         points = self.points
@@ -142,7 +146,7 @@ class PaperDensity:
         at = points.rows(chosen)
         new = lone_gaussians(at.xyz, at.features, self.rule.scale_m, self.rule.opacity)
         trained.edit_rows(torch.ones_like(trained.origin, dtype=torch.bool), new)
-        self.error_sum = torch.zeros(0)
+        self._forget()
 
     def state(self) -> dict[str, np.ndarray]:
         """Feature errors of the current window."""

@@ -191,6 +191,21 @@ def test_captures_that_tell_places_need_no_layout(tmp_path: Path) -> None:
     np.testing.assert_array_equal(csi, value[[0, 2, 3, 4, 5]])
 
 
+def test_nothing_is_trained_on_a_single_subcarrier(tmp_path: Path, capsys) -> None:
+    files.newrf_file(tmp_path / "a.mat")
+    imported(tmp_path, tmp_path / "a.mat", layout=None)
+    said = capsys.readouterr().out
+    assert "nothing can be trained on it" in said and "next: rfgs train" not in said
+    out = ["--out", str(tmp_path / "run")]
+    command = ["train", str(tmp_path / "out"), "--radio", "radio", "--no-shader", *out]
+    assert "radio has a single subcarrier" in refused(command, capsys)
+    encode = ["encode", str(tmp_path / "out"), "--radio", "radio", "--out", str(tmp_path / "a.npz")]
+    assert "radio has a single subcarrier" in refused(encode, capsys)
+    assert main(["inspect", str(tmp_path / "out")]) == 0
+    said = capsys.readouterr().out
+    assert "a single subcarrier resolves no paths" in said and "nan" not in said
+
+
 def test_an_aperture_keeps_its_phases(tmp_path: Path) -> None:
     value = files.afrl_file(tmp_path / "a.mat")
     sequence = imported(tmp_path, tmp_path / "a.mat", layout=None)

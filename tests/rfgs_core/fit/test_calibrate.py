@@ -156,7 +156,7 @@ def test_the_offsets_stand_among_the_conditions(calibrated: Run, trained_run: Ru
 def test_a_run_without_its_calibration_is_refused(calibrated: Run) -> None:
     run = copy_of(calibrated, "incomplete")
     (run.path / "calibration/000001.npz").unlink()
-    with pytest.raises(RfgsError, match=r"calibration/000001\.npz: no such file; run the same"):
+    with pytest.raises(RfgsError, match=r"calibration/000001\.npz: no such file; delete what"):
         run.predict(1)
 
 

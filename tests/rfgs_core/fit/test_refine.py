@@ -187,6 +187,31 @@ def test_density_control_resumes_exactly(
     assert len(again.power) == len(again.track_id) == len(again.gaussians) == counts[-1]
 
 
+def test_what_a_checkpoint_right_after_new_rows_holds_can_be_read(
+    tmp_path: Path, monkeypatch, observations, state, quick_config
+) -> None:
+    """Every checkpoint of the paper's recipe falls on a pruning and a densification."""
+    state.gaussians.features[:6] = 0.0
+    monkeypatch.setattr(refine_module, "CHECKPOINT_EVERY", 1)
+    config = replace(quick_config, iterations=101, objective="paper", recipe="paper")
+    counts: list[int] = []
+    for last in (49, 50, 99, 100):
+        checkpoint = tmp_path / f"{last}.npz"
+
+        def stop(_loss: float, count: int, last: int = last) -> None:
+            counts.append(count)
+            if len(counts) == last:
+                raise Stopped
+
+        counts.clear()
+        with pytest.raises(Stopped):
+            refine(observations, state, config, 0, checkpoint, stop)
+        saved = counts[-1]
+        counts.clear()
+        refine(observations, state, config, 0, checkpoint, lambda _loss, n: counts.append(n))
+        assert len(counts) == 101 - last, saved
+
+
 def assert_shares(fitted: FrameState, start: FrameState) -> None:
     """Powers are shared by α ‖f‖², and together those of the start."""
     share = fitted.gaussians.features.norm(dim=1) ** 2 * fitted.gaussians.opacities

@@ -91,6 +91,18 @@ def test_a_training_goes_on_where_it_was(network: LimbNetwork, tmp_path: Path) -
         np.testing.assert_array_equal(value.numpy(), other.state_dict()[name].numpy())
 
 
+def test_a_training_goes_on_with_what_it_was_asked_for_alone(
+    network: LimbNetwork, tmp_path: Path
+) -> None:
+    optimiser = Adam.of(network.parameters(), 1e-3, decay=0.01)
+    sum((value**2).sum() for value in network.parameters()).backward()
+    optimiser.step()
+    keep(tmp_path / "state", network, optimiser, Progress(1, 0.0), "seed 3, 800 frames")
+    assert resume(tmp_path / "state", network, optimiser, "seed 3, 800 frames").frames == 1
+    with pytest.raises(RfgsFormatError, match="other options; give the same ones again, or delete"):
+        resume(tmp_path / "state", network, optimiser, "seed 3, 8000 frames")
+
+
 def test_a_state_of_another_network_is_refused(network: LimbNetwork, tmp_path: Path) -> None:
     optimiser = Adam.of(network.parameters(), 1e-3, decay=0.01)
     sum((value**2).sum() for value in network.parameters()).backward()

@@ -59,7 +59,7 @@ def test_a_run_without_bodies_is_refused(own_run: Path) -> None:
     path = own_run / "gaussians" / "000002.features.npz"
     arrays = load_arrays(path, "try again")
     save_arrays(path, {name: value for name, value in arrays.items() if name != "body"})
-    with pytest.raises(RfgsError, match=r"000002\.features\.npz: .* missing body; train this run"):
+    with pytest.raises(RfgsError, match=r"000002\.features\.npz: .* missing body; delete what"):
         run(PoseArgs(own_run))
     save_arrays(path, {**arrays, "body": np.full_like(arrays["body"], 3)})
     with pytest.raises(RfgsError, match="no Gaussian of frame 2 belongs to body 0"):

@@ -167,7 +167,8 @@ def test_bodies_are_those_of_the_checkpoint(own_run: Path) -> None:
     # Versions that told no postures kept none.
     save_arrays(path, {name: value for name, value in arrays.items() if name != "knees_rad"})
     with pytest.raises(
-        RfgsFormatError, match=r"000001\.npz: .*missing knees_rad; train this run again"
+        RfgsFormatError,
+        match=r"000001\.npz: .*missing knees_rad; delete what is damaged and run",
     ):
         open_run(own_run).bodies(1)
     path.unlink()
@@ -229,7 +230,10 @@ def test_features_of_other_gaussians_are_refused(own_run: Path) -> None:
     with pytest.raises(RfgsFormatError, match=r"000001\.ply: holds \d+ Gaussians, but .* of \d+"):
         open_run(own_run).moving(1)
     save_arrays(file, {**arrays, "features": arrays["features"][:, :5]})
-    with pytest.raises(RfgsFormatError, match=r"features has shape .*; train this run again"):
+    with pytest.raises(
+        RfgsFormatError,
+        match=r"features has shape .*; delete what is damaged and run the same `rfgs train`",
+    ):
         open_run(own_run).moving(1)
 
 
@@ -238,7 +242,7 @@ def test_a_head_without_an_array_is_refused(own_run: Path) -> None:
     arrays = load_arrays(file, "")
     del arrays["rho_logit"]
     save_arrays(file, arrays)
-    with pytest.raises(RfgsFormatError, match=r"radio_head\.npz: .*missing rho_logit; train"):
+    with pytest.raises(RfgsFormatError, match=r"radio_head\.npz: .*missing rho_logit; delete"):
         _ = open_run(own_run).head
 
 
@@ -275,5 +279,8 @@ def test_damaged_arrays_are_refused(own_run: Path, name: str, size: int) -> None
 
 def test_a_missing_head_is_refused(own_run: Path) -> None:
     (own_run / "radio_head.npz").unlink()
-    with pytest.raises(RfgsError, match=r"radio_head\.npz: no such file; train this run again"):
+    with pytest.raises(
+        RfgsError,
+        match=r"radio_head\.npz: no such file; delete what is damaged",
+    ):
         open_run(own_run).predict(1)

@@ -70,7 +70,9 @@ def test_features_of_other_gaussians_are_refused(copy: Path) -> None:
 @pytest.mark.parametrize("name", ["gamma", "track_id", "body"])
 def test_missing_attributes_are_refused(copy: Path, name: str) -> None:
     changed(copy / "gaussians/000001.features.npz", lambda _: {name: None})
-    with pytest.raises(RfgsError, match=f"missing {name}; train this run again"):
+    with pytest.raises(
+        RfgsError, match=f"missing {name}; delete what is damaged and run the same `rfgs train`"
+    ):
         open_run(copy).attributes(1)
 
 

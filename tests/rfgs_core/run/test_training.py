@@ -25,6 +25,7 @@ from rfgs_core.measure.observations import observe
 from rfgs_core.render.shader import ShaderConfig
 from rfgs_core.render.view import fit_run_shader
 from rfgs_core.run import Run, open_run
+from rfgs_core.run.begun import finished_run
 from rfgs_core.run.training import train_sequence
 from rfgs_core.seals import write_sealed_json
 
@@ -211,6 +212,23 @@ def test_a_run_of_a_newer_version_is_not_continued(
     write_sealed_json(run / "config.json", {**trained_run.config.entries, "schema": "rfgs-run/2"})
     with pytest.raises(RfgsFormatError, match="expected schema rfgs-run/1, found rfgs-run/2"):
         train(tiny_dataset, run, quick_config)
+
+
+@pytest.mark.parametrize(
+    "gone", ["gaussians/000001.ply", "gaussians/000002.features.npz", "radio_head.npz"]
+)
+def test_the_same_command_makes_what_is_missing(
+    gone: str, trained_run: Run, tiny_dataset: Path, tmp_path: Path, train, quick_config
+) -> None:
+    """As messages about damaged files say: delete it and train again."""
+    own = open_run(Path(shutil.copytree(trained_run.path, tmp_path / "run")))
+    before = result_bytes(own)
+    (own.path / gone).unlink()
+    data = open_dataset(tiny_dataset)
+    asked = (own.path, data, data.sequence(), "wifi", [1, 2], quick_config)
+    assert finished_run(*asked, people="told", excess=0.0) is None
+    assert result_bytes(train(tiny_dataset, own.path, quick_config)) == before
+    assert finished_run(*asked, people="told", excess=0.0) is not None
 
 
 def test_a_damaged_finished_frame_says_what_to_do(

@@ -11,6 +11,7 @@ from rfgs_core import sanitize
 from rfgs_core.capture import read_capture
 from rfgs_core.capture.wifi_grid import INTEL_5300, occupied
 from rfgs_core.radio.levels import amplitude_of
+from rfgs_core.sanitize import outliers
 from rfgs_core.sanitize.phase import rotations
 
 INDEX = np.array(INTEL_5300[20])
@@ -215,6 +216,31 @@ def test_hampel_replaces_outliers_and_leaves_its_input() -> None:
     assert np.abs(np.abs(cleaned) - 10).max() < 0.5
     np.testing.assert_allclose(np.angle(cleaned), np.angle(values))
     np.testing.assert_array_equal(cleaned[~changed], values[~changed])
+
+
+@pytest.mark.parametrize("per_cycle", [20, 40, 80])
+def test_hampel_leaves_what_only_sways(per_cycle: int) -> None:
+    """A crest is far from nobody's median, whatever windows beside it hold."""
+    values = 10.0 + np.sin(2 * np.pi * np.arange(400) / per_cycle)
+    cleaned, changed = sanitize.hampel(values)
+    assert not changed.any()
+    np.testing.assert_array_equal(cleaned, values)
+
+
+def test_hampel_is_its_formula_in_any_number_of_blocks(monkeypatch) -> None:
+    values = np.random.default_rng(3).standard_cauchy((60, 3))
+    whole = sanitize.hampel(values, 3)
+    median, told = np.zeros_like(values), np.zeros(values.shape, bool)
+    for at in range(60):
+        around = values[np.clip(np.arange(at - 3, at + 4), 0, 59)]
+        median[at] = np.median(around, axis=0)
+        spread = 3.0 * 1.4826 * np.median(np.abs(around - median[at]), axis=0)
+        told[at] = np.abs(values[at] - median[at]) > spread
+    np.testing.assert_array_equal(whole[1], told)
+    np.testing.assert_array_equal(whole[0], np.where(told, median, values))
+    monkeypatch.setattr(outliers, "_BLOCK", 50)
+    for one, other in zip(sanitize.hampel(values, 3), whole, strict=True):
+        np.testing.assert_array_equal(one, other)
 
 
 def test_irregular_packets_on_a_common_clock() -> None:

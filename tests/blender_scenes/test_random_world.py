@@ -33,6 +33,7 @@ def level_db(error: np.ndarray, truth: np.ndarray) -> float:
     return 10.0 * float(np.log10((np.abs(error) ** 2).sum() / (np.abs(truth) ** 2).sum()))
 
 
+@pytest.mark.slow
 def test_blender_s_channels_are_those_of_the_world(made: Path) -> None:
     """Two ways to one world: drawn here, or built, saved, opened and exported by Blender."""
     assert validate(made / "world_0000000") == []
@@ -54,6 +55,7 @@ def test_blender_s_channels_are_those_of_the_world(made: Path) -> None:
     assert sequence.actions(1) == [actor.motion.family for actor in world.actors]
 
 
+@pytest.mark.slow
 def test_the_same_command_changes_nothing(made: Path) -> None:
     scene = made / "scenes" / "world_0000000.blend"
     before = scene.stat().st_mtime_ns

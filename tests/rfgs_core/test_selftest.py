@@ -21,6 +21,7 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(selftest, "throughput", lambda device: Throughput(0.5, 2e9, 4e9))
 
 
+@pytest.mark.slow
 def test_all_kernels_hold_and_the_numbers_are_kept(tmp_path: Path, capsys) -> None:
     assert main(["selftest", "--json", str(tmp_path / "a.json")]) == 0
     text = capsys.readouterr().out

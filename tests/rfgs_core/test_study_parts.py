@@ -48,7 +48,7 @@ def doublings(out: Path) -> list[Doubling]:
     return [Doubling(f"{of}{index}", Path("data") / of) for of in "ab" for index in range(2)]
 
 
-@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_what_fails_is_named_and_the_others_are_made(workers: int, tmp_path: Path) -> None:
     parts = doublings(tmp_path)
     if workers > 1:

@@ -37,6 +37,7 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return digests(out)
 
 
+@pytest.mark.slow
 def test_two_workers_make_the_same_worlds(two_worlds: Path, tmp_path: Path) -> None:
     out = tmp_path / "two"
     assert main([*ASKED, "--count", "2", "--workers", "2", "--out", str(out)]) == 0

@@ -229,6 +229,7 @@ def test_no_link_leads_out_of_the_folder_of_runs(
     assert not list((tmp_path / "victim").iterdir()) and not (tmp_path / "nowhere").exists()
 
 
+@pytest.mark.slow
 def test_a_cluster_makes_a_single_run_in_the_folder_itself(
     two_sequences: Path, by_one_process: Path, cluster: Any, tmp_path: Path, capsys
 ) -> None:

@@ -43,6 +43,7 @@ def test_every_property_of_an_empty_arrives(scenes: Path) -> None:
     assert not [key for key, value in OWN.items() if value == rest[key]]
 
 
+@pytest.mark.slow
 def test_radio_scene_traces_what_the_empties_say(
     python: Callable, scenes: Path, tmp_path: Path
 ) -> None:

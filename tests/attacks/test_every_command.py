@@ -54,6 +54,8 @@ FOLDERS = {
 }
 #: Commands of many parts: a dataset is there, and each part is refused.
 MANY = ("study", "table1", "gallery")
+#: Takes seconds, and set-ups run it.
+SELFTEST = "rfgs selftest --json OUT.json"
 #: Files that a command writes; a link of that name goes, and what it leads to stays.
 FILES = [
     "rfgs export RUN --out OUT.ply",
@@ -64,7 +66,7 @@ FILES = [
     "rfgs room DATA --json OUT.json",
     "rfgs encode DATA --radio wifi --steps 1 --out OUT.npz",
     "rfgs-factory check living_room_walk --json OUT.json",
-    "rfgs selftest --json OUT.json",
+    SELFTEST,
 ]
 #: Folders that are made anew and must not be there, whatever they are.
 FRESH = [
@@ -195,7 +197,10 @@ def test_no_link_leads_out_of_a_folder_that_is_filled(
     assert untouched(elsewhere)
 
 
-@pytest.mark.parametrize("command", FILES)
+@pytest.mark.parametrize(
+    "command",
+    [pytest.param(row, marks=[pytest.mark.slow] * (row == SELFTEST)) for row in FILES],
+)
 def test_files_are_not_written_where_a_link_leads(
     command: str, places: dict[str, Path], tmp_path: Path, impatient: None, capfd: Any
 ) -> None:

@@ -19,6 +19,9 @@ from rfgs_core.report.strip import panels_of, write_strip
 from rfgs_core.study.cells import make
 from rfgs_core.study.paper_tables import Cell, Size
 
+#: A table with its cells takes a quarter of a minute.
+pytestmark = pytest.mark.slow
+
 TINY = Size(("living_room_walk",), 1, "1:2", 3, 8, 2, 6, 0)
 METHODS = ("rfgs", "paper_fixed", "nerf_features")
 

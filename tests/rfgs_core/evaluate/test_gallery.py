@@ -256,6 +256,7 @@ def tiny_scenes(
     return tmp_path
 
 
+@pytest.mark.slow
 def test_the_command_keeps_what_is_finished_and_shows_what_failed(
     tiny_scenes: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

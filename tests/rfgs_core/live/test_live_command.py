@@ -157,6 +157,7 @@ def test_a_page_shows_the_stream(tiny_dataset: Path, capsys: pytest.CaptureFixtu
     assert re.search(r"http://127.0.0.1:\d+/\S+ shows them", capsys.readouterr().out)
 
 
+@pytest.mark.slow
 def test_six_receivers_lose_nothing_inside() -> None:
     """The bench, short and slow; its figures are those of this machine as it is."""
     options = LiveOptions(learn_s=0.3, whole_fit_s=0.0, updates_per_s=10.0)

@@ -59,6 +59,7 @@ def relative_error(kind: FieldKind, several_extents: bool = False, steps: int = 
     return float(torch.sqrt(torch.mean((found - true) ** 2) / torch.mean(true**2)))
 
 
+@pytest.mark.slow
 def test_sines_and_tables_see_what_a_plain_network_does_not() -> None:
     plain, nerf, ngp = (relative_error(kind) for kind in ("plain", "nerf", "ngp"))
     # Networks learn low frequencies first (Tancik et al., NeurIPS 2020); measured 0.59, 0.12, 0.03.

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 import torch
 from skimage.metrics import structural_similarity
 
@@ -31,6 +32,7 @@ def room_spectra(tx: np.ndarray) -> np.ndarray:
     return total / total.max(axis=1, keepdims=True)
 
 
+@pytest.mark.slow
 def test_spectra_of_an_empty_room_at_transmitters_that_were_never_seen() -> None:
     rng = np.random.default_rng(0)
     tx = rng.uniform(BOUNDS_M[0] + [1.2, 1.2, 0.2], BOUNDS_M[1] - [0.2, 0.2, 0.4], (90, 3))

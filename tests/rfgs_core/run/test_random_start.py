@@ -80,6 +80,7 @@ def test_nobody_is_known_and_every_frame_is_drawn_anew(random_run: Run) -> None:
     assert len(read_ply(random_run.ply_path(1))) == len(numbers[0])
 
 
+@pytest.mark.slow
 def test_it_is_evaluated_reported_and_exported(random_run: Run, tmp_path: Path) -> None:
     groups = evaluate_method(random_run)
     assert groups["method"]["geometry"]["f20"] is not None

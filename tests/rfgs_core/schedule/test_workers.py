@@ -120,6 +120,7 @@ def test_nothing_is_left_running(marks: Path) -> None:
     assert [p for p in left if "resource_tracker" not in " ".join(p.cmdline())] == []
 
 
+@pytest.mark.slow
 def test_a_worker_is_replaced_between_frames_when_it_is_nearly_full(marks: Path) -> None:
     with starting(marks, count=1, memory_gb=1.0) as workers:
         told = [run(workers, marks, [frame])[frame] for frame in (1, 2, 7, 3, 4)]

@@ -108,7 +108,9 @@ def _of_new_chips(count: int, samples: np.ndarray) -> Field | None:
     level = np.abs(samples[:, :length]).mean(axis=0)
     rising = np.arange(-far, far + 1)
     middle = level[far - empty : far + empty + 1].mean()
-    index = rising if middle < 0.5 * np.median(level) else _from_zero(far, far)
+    # From zero on, what is empty below the middle comes last; zero itself is among the spoilt.
+    other = level[length - empty :].mean() if empty else 0.5 * np.median(level)
+    index = rising if middle < other else _from_zero(far, far)
     return Field(form, mhz == 40, slice(0, length), index, _occupied(form, mhz))
 
 

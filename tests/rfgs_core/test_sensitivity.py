@@ -128,6 +128,7 @@ def quick(monkeypatch: pytest.MonkeyPatch, one_step: Callable[[pytest.MonkeyPatc
     return Setup("living_room_walk", "wifi", "1:2")
 
 
+@pytest.mark.slow
 def test_a_setup_is_kept_and_its_rows_tell_who_is_best(
     quick: Setup, tiny_dataset: Path, tmp_path: Path
 ) -> None:

@@ -17,6 +17,7 @@ from rfgs_core.radio.impairments import Impairments
 from rfgs_core.settings import TrainConfig
 
 
+@pytest.mark.slow
 def test_noise_reaches_the_table_where_it_is_asked_for(own_dataset: Path) -> None:
     impair_dataset(own_dataset, Impairments(thermal_noise=True, power_dbm=-10.0), seed=1)
     sequence = open_dataset(own_dataset).sequence()

@@ -204,6 +204,7 @@ def test_who_stands_is_left_to_the_prior(heard, walker_body, small_book, monkeyp
     assert tell(seen, PLACE[None, :2]) is None
 
 
+@pytest.mark.slow
 def test_of_who_hardly_stands_out_only_the_heading_is_told(
     heard, walker_body, body, small_book, monkeypatch
 ) -> None:

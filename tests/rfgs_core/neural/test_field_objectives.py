@@ -105,6 +105,7 @@ def test_what_was_empty_for_long_is_not_asked_again() -> None:
     assert looks > 10, "one look does not tell"
 
 
+@pytest.mark.slow
 def test_fields_of_a_sequence_are_evaluated_as_runs_are(tiny_dataset: Path, tmp_path: Path) -> None:
     dataset = open_dataset(tiny_dataset)
     config = TrainConfig(grid_side=8, solver_steps=2, posture="standing")

@@ -99,7 +99,7 @@ def find_views(
         evaluated = item.evaluated_get(graph)
         matrix = np.array(evaluated.matrix_world, dtype=np.float64)
         lens, rigid = _intrinsics(evaluated, width, height), _rigid(matrix)
-        if not np.allclose(rigid[:3, :3], _unscaled(matrix), atol=1e-4):
+        if (rigid[:3, :3] != _unscaled(matrix)).any():
             note = {"what": "camera", "object": item.name, "value": "straightened"}
             guesses.append({**note, "why": "something above it mirrors or shears it"})
         views.append(View(f"cam{len(views):02d}", item.name, item.data, rigid, lens))
@@ -277,7 +277,9 @@ def _rigid(matrix: np.ndarray) -> np.ndarray:
     axes = _unscaled(matrix)
     across = np.cross(axes[:, 1], axes[:, 2])
     across /= np.linalg.norm(across)
-    out[:3, :3] = np.stack([across, np.cross(axes[:, 2], across), axes[:, 2]], axis=1)
+    straight = np.stack([across, np.cross(axes[:, 2], across), axes[:, 2]], axis=1)
+    # Rounding is left alone: pictures would differ in nothing but their last bits.
+    out[:3, :3] = axes if np.allclose(axes, straight, atol=1e-4) else straight
     return out
 
 

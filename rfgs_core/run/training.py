@@ -182,8 +182,8 @@ def _fit_frames(run: Run, config: TrainConfig, log: bool) -> float:
     begin = time.perf_counter()
     trained = limbs_network(run) if limbs_wanted(run, config) else None
     # What is told of limbs is not kept where it is of no use, and a finished run needs none of it.
-    left = lost_limbs(run) or not all(is_finished(run, frame) for frame in run.frames)
-    posing = _posing(run, trained) if left and (trained or _evidence(run, config)) else []
+    unfinished = lost_limbs(run) or not all(is_finished(run, frame) for frame in run.frames)
+    posing = _posing(run, trained) if unfinished and (trained or _evidence(run, config)) else []
     can = resolving(run.sequence, run.config.radio, config.num_gaussians, config.observe)
     sys.stderr.write("".join(f"{line}\n" for line in [*can.lines(), price_line(run, posing)]))
     limbs = _limbs(run, config, trained, posing) if posing else None

@@ -13,7 +13,6 @@ import pytest
 import zarr
 from lit_bodies import lit
 
-from rfgs_core.bodies import excess_path
 from rfgs_core.bodies.count import place_bodies
 from rfgs_core.bodies.excess_path import excess_path_m
 from rfgs_core.cli import main
@@ -56,14 +55,10 @@ def test_taking_off_what_was_put_on_gives_the_same_frame(empty: Observations) ->
 
 
 @pytest.mark.parametrize("path_m", [0.0, 1.0])
-def test_an_excess_path_is_found_where_there_is_one(
-    empty: Observations, path_m: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # Up to 1.2 m, which is enough for 1 m.
-    monkeypatch.setattr(excess_path, "COARSE", 4)
+def test_an_excess_path_is_found_where_there_is_one(empty: Observations, path_m: float) -> None:
     lefts: list[int] = []
     seen = lit(empty, BODIES[:1], seed=2).lengthened(path_m)
-    found = excess_path_m([seen], TrainConfig(num_gaussians=1000), 0, lefts.append)
+    found = excess_path_m([seen], TrainConfig(), 0, lefts.append)
     if path_m:
         assert found == pytest.approx(path_m, abs=0.2)
     else:

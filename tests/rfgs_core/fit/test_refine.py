@@ -187,29 +187,29 @@ def test_density_control_resumes_exactly(
     assert len(again.power) == len(again.track_id) == len(again.gaussians) == counts[-1]
 
 
-def test_what_a_checkpoint_right_after_new_rows_holds_can_be_read(
-    tmp_path: Path, monkeypatch, observations, state, quick_config
+@pytest.mark.parametrize("last", [49, 50, 99, 100])
+def test_what_stopped_right_after_rows_changed_resumes_exactly(
+    tmp_path: Path, monkeypatch, observations, state, quick_config, last: int
 ) -> None:
     """Every checkpoint of the paper's recipe falls on a pruning and a densification."""
     state.gaussians.features[:6] = 0.0
     monkeypatch.setattr(refine_module, "CHECKPOINT_EVERY", 1)
     config = replace(quick_config, iterations=101, objective="paper", recipe="paper")
-    counts: list[int] = []
-    for last in (49, 50, 99, 100):
-        checkpoint = tmp_path / f"{last}.npz"
+    undisturbed = refine(observations, state, config, 0)
+    steps: list[float] = []
 
-        def stop(_loss: float, count: int, last: int = last) -> None:
-            counts.append(count)
-            if len(counts) == last:
-                raise Stopped
+    def stop(loss: float, _count: int) -> None:
+        steps.append(loss)
+        if len(steps) == last:
+            raise Stopped
 
-        counts.clear()
-        with pytest.raises(Stopped):
-            refine(observations, state, config, 0, checkpoint, stop)
-        saved = counts[-1]
-        counts.clear()
-        refine(observations, state, config, 0, checkpoint, lambda _loss, n: counts.append(n))
-        assert len(counts) == 101 - last, saved
+    with pytest.raises(Stopped):
+        refine(observations, state, config, 0, tmp_path / "frame.npz", stop)
+    resumed: list[float] = []
+    again = refine(
+        observations, state, config, 0, tmp_path / "frame.npz", lambda loss, _: resumed.append(loss)
+    )
+    assert len(resumed) == 101 - last and same(again, undisturbed)
 
 
 def assert_shares(fitted: FrameState, start: FrameState) -> None:

@@ -70,7 +70,7 @@ def store_frame(
     write_ply(run.ply_path(frame), cloud_of(state.gaussians, rf_power_db=power_db))
     gamma = state.gamma.detach().numpy().astype(np.complex64)
     save_arrays(
-        run.ply_path(frame).with_suffix(".features.npz"),
+        run.features_path(frame),
         {
             "features": state.gaussians.features.numpy(),
             "gamma": gamma[:, None],
@@ -96,8 +96,7 @@ def store_frame(
 
 def is_finished(run: Run, frame: int) -> bool:
     """Whether a frame is fitted and everything that is kept of it is there."""
-    cloud = run.ply_path(frame)
-    kept = [checkpoint_path(run.path, frame), cloud, cloud.with_suffix(".features.npz")]
+    kept = [checkpoint_path(run.path, frame), run.ply_path(frame), run.features_path(frame)]
     if run.config.settings.calibrate != "none":
         kept.append(calibration_path(run.path, frame))
     return all(path.exists() for path in (*kept, run.path / HEAD_FILE))
@@ -105,7 +104,7 @@ def is_finished(run: Run, frame: int) -> bool:
 
 def lost_limbs(run: Run) -> bool:
     """Whether Gaussians of a run are on skins of people whose limbs are no longer there."""
-    first = run.ply_path(run.frames[0]).with_suffix(".features.npz")
+    first = run.features_path(run.frames[0])
     if (run.path / LIMBS_FILE).exists() or not first.exists():
         return False
     bone: dict[str, Shape] = {"bone": ("M",)}

@@ -137,14 +137,14 @@ class Run:
         Raises:
             RfgsError: A frame is not trained yet.
         """
-        missing = [frame for frame in self.frames if not self._features(frame).exists()]
+        missing = [frame for frame in self.frames if not self.features_path(frame).exists()]
         if missing:
             raise RfgsError(
                 f"{self.path}: {len(missing)} of {len(self.frames)} frames are not trained yet, "
                 f"the first is {missing[0]}; run the same `rfgs train` again"
             )
 
-    def _features(self, frame: int) -> Path:
+    def features_path(self, frame: int) -> Path:
         """What the PLY of a frame's moving Gaussians does not hold; there once it is fitted."""
         return self.ply_path(frame).with_suffix(".features.npz")
 
@@ -158,7 +158,7 @@ class Run:
             RfgsError: The run has no such frame.
             RfgsFormatError: The file is damaged.
         """
-        path = self._features(frame)
+        path = self.features_path(frame)
         if not path.exists():
             known = frame in self.frames
             raise RfgsError(

@@ -36,8 +36,7 @@ def finished_frames(run: Run) -> list[int]:
 
     def fitted(frame: int) -> bool:
         # Features and the head of reflectivities are written after the Gaussians.
-        cloud = run.ply_path(frame)
-        kept = (cloud, cloud.with_suffix(".features.npz"), run.path / HEAD_FILE)
+        kept = (run.ply_path(frame), run.features_path(frame), run.path / HEAD_FILE)
         return all(file.is_file() for file in kept)
 
     frames = list(filter(fitted, run.frames))

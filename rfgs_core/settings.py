@@ -105,8 +105,20 @@ class TrainOptions:
                 "--without leaves out parts of the paper's losses; expected --objective paper or "
                 "both"
             )
+        self._need_density()
         if not self.temporal >= 0.0:
             raise RfgsError(f"--temporal {self.temporal}: expected at least 0")
+
+    def _need_density(self) -> None:
+        """Refuses to leave out parts of a rule that is not followed."""
+        if self.density in (None, "paper"):
+            return
+        unused = [part for part in self.without if part != "rf_weights"]
+        if unused:
+            raise RfgsError(
+                f"--without {' '.join(unused)} leaves out parts of the paper's density rule, and "
+                f"--density {self.density} has others; expected --density paper"
+            )
 
 
 def _objective(options: TrainOptions) -> Objective:

@@ -114,6 +114,7 @@ def job_of(args: GenerateArgs) -> tuple[Job, Outline]:
         RfgsError: An argument is out of range, or names nothing.
     """
     from dataset_factory.plan.contents import whole_frames
+    from dataset_factory.plan.folder import open_folder
     from dataset_factory.plan.job import Job
     from dataset_factory.scene.blender import Blender
     from dataset_factory.scene.catalogue import find_scene
@@ -144,6 +145,18 @@ def job_of(args: GenerateArgs) -> tuple[Job, Outline]:
     plan = _plan(args, scene, named, frames, said)
     use_llvm()
     radios = [plan.radio(name) for name in plan.radios]
+    job = Job(
+        args.out,
+        plan,
+        blender,
+        args.workers,
+        worker_memory_gb=args.worker_memory,
+        scheduler=args.scheduler,
+        device=args.device,
+        overrides_label=source,
+    )
+    # A place that is taken is refused before a large scene is opened.
+    open_folder(job)
     # Also refuses frames that the scene does not have, before anything is made for them.
     seen = seen or look(any(pose_span_s(radio) is not None for radio in radios))
     for radio in radios:
@@ -151,17 +164,6 @@ def job_of(args: GenerateArgs) -> tuple[Job, Outline]:
             raise RfgsError(f"{scene.blend}: {problem}")
     for sentence in left_out(seen.devices, radios):
         logger.warning("%s", sentence)
-    memory_gb = args.worker_memory
-    job = Job(
-        args.out,
-        plan,
-        blender,
-        args.workers,
-        worker_memory_gb=memory_gb,
-        scheduler=args.scheduler,
-        device=args.device,
-        overrides_label=source,
-    )
     return job, seen
 
 

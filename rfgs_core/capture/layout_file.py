@@ -14,6 +14,7 @@ from rfgs_core.dataset.schema import check_name
 from rfgs_core.errors import RfgsError, RfgsFormatError
 from rfgs_core.radio import DevicePose
 from rfgs_core.records import record
+from rfgs_core.rotations import of_unit_length
 from rfgs_core.yaml_file import read_yaml
 
 #: Files of as many receivers are no capture.
@@ -177,7 +178,7 @@ def _pose(path: Path, row: _Device) -> DevicePose:
     quat_wxyz = (1.0, 0.0, 0.0, 0.0) if row.quat_wxyz is None else row.quat_wxyz
     if not any(quat_wxyz):
         raise RfgsFormatError(f"{path}: {row.name}: quat_wxyz: expected a rotation, found zeros")
-    return DevicePose(row.name, row.position_m, quat_wxyz, row.role)
+    return DevicePose(row.name, row.position_m, of_unit_length(quat_wxyz), row.role)
 
 
 def _guess(row: _Device) -> dict[str, Any]:

@@ -57,7 +57,7 @@ def run(args: EncodeArgs) -> int:
     from rfgs_core.fit.self_supervised import train_encoder
     from rfgs_core.frames import chosen_frames
     from rfgs_core.measure.observations import observe, packets_to_read
-    from rfgs_core.run.data import need_a_band
+    from rfgs_core.run.data import need_a_band, need_one_port
 
     if args.out.suffix != ".npz":
         raise RfgsError(f"--out {args.out}: expected a file name that ends in .npz")
@@ -67,6 +67,7 @@ def run(args: EncodeArgs) -> int:
     dataset.need("csi", "csi_static")
     sequence = dataset.sequence(args.sequence)
     need_a_band(sequence, args.radio)
+    need_one_port(sequence, args.radio)
     packets = packets_to_read(args.packets, sequence, args.radio, TrainConfig())
     frames = [
         observe(sequence, args.radio, frame, args.channel, packets=packets)

@@ -6,8 +6,13 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import tyro
+
+if TYPE_CHECKING:
+    import numpy as np
+    from jaxtyping import Float64
 
 
 @dataclass(frozen=True)
@@ -21,7 +26,8 @@ class PoseArgs:
     The errors are printed beside those of a standing body of average height at the same place,
     which knows nothing of the limbs: only what beats it was seen by radio. RUN/pose.json holds
     them. Where the network told limbs, how tall people are is printed too, beside what the same
-    body shape has with the true limbs.
+    body shape has with the true limbs. Where limbs are told, each joint has an expected
+    error: joints below 0.06 m count as seen, and how many of these are within 0.08 m is printed.
     """
 
     run: tyro.conf.Positional[Path]
@@ -74,6 +80,8 @@ def run(args: PoseArgs) -> int:
             f"{scores['people']} sit)\n{_missed(scores['matched'], scores['people'])}"
         )
     sys.stdout.write(_height(scores["heights_m"], scores["true_heights_m"]))
+    if estimate.sigma_m is not None:
+        sys.stdout.write(_seen(estimate.sigma_m, scores["confidence"]))
     sys.stdout.write(f"{args.run / 'pose.png'} written\n")
     return 0
 
@@ -101,3 +109,21 @@ def _height(told_m: list[float] | None, true_m: list[float] | None) -> str:
         return ""
     told, true = (", ".join(f"{one:.2f}" for one in each or []) for each in (told_m, true_m))
     return f"height    {told} m" + (f"; by the true limbs {true} m\n" if true else "\n")
+
+
+def _seen(
+    sigma_m: Float64[np.ndarray, "frame body 17"], confidence: dict[str, float | None] | None
+) -> str:
+    """Lines of which joints count as seen, and whether that holds."""
+    from rfgs_core.pose.confidence import NEAR_M, SEEN_M, joints_seen
+
+    of_joints = joints_seen(sigma_m)
+    unsure = [name.replace("_", " ") for name, share in of_joints.items() if share < 0.5]
+    share = sum(of_joints.values()) / len(of_joints)
+    lines = f"seen      {100 * share:.0f} % of joints, expected within {SEEN_M:g} m"
+    if confidence is not None and confidence["seen_near"] is not None:
+        lines += (
+            f"; {100 * confidence['seen_near']:.0f} % of these are within {NEAR_M:g} m (mean "
+            f"error over mean expected error {confidence['error_over_sigma']:.2f})"
+        )
+    return lines + "\n" + (f"unsure    {', '.join(unsure)}\n" if unsure else "")

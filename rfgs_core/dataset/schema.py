@@ -19,6 +19,7 @@ from rfgs_core.files import read_json
 from rfgs_core.radio import DevicePose, Radio
 from rfgs_core.radio.antennas import PATTERNS, POLARIZATIONS
 from rfgs_core.records import record, unknown_fields
+from rfgs_core.rotations import of_unit_length
 
 DATASET_SCHEMA = "rfgs-dataset/1"
 SEQUENCE_SCHEMA = "rfgs-sequence/1"
@@ -214,7 +215,7 @@ def device_pose(values: dict[str, Any]) -> DevicePose:
     row: DeviceRow = record("device", values, DeviceRow)
     if not any(row.quat_wxyz):
         raise RfgsFormatError(f"device {row.name!r}: expected finite numbers and a rotation")
-    return DevicePose(row.name, row.position_m, row.quat_wxyz, row.role)
+    return DevicePose(row.name, row.position_m, of_unit_length(row.quat_wxyz), row.role)
 
 
 def bounds_array(info: SequenceInfo) -> Float64[np.ndarray, "2 3"]:

@@ -33,6 +33,7 @@ from rfgs_core.limbs.propose import Joints, smoothed
 from rfgs_core.limbs.skins import PosedPeople, shapes_of
 from rfgs_core.limbs.together import walk_with_network
 from rfgs_core.measure.observations import Observations, observe, packets_to_read
+from rfgs_core.pose.confidence import confidence
 from rfgs_core.seeds import sub_seed
 from rfgs_core.settings import TrainConfig
 from rfgs_core.skeleton import JOINTS
@@ -116,7 +117,7 @@ def limb_table(
     channel: Observed = "clean",
     on_frame: Callable[[], Any] = lambda: None,
     others: Callable[[Person], dict[str, np.ndarray]] = lambda person: {},
-) -> dict[str, dict[str, float]]:
+) -> dict[str, dict[str, float | None]]:
     """Errors of every row.
 
     Args:
@@ -131,7 +132,8 @@ def limb_table(
 
     Returns:
         For each row: joints, with the pelvis in place, limbs and wrists [m], F-scores at 5 and
-        10 cm of the posed surface. Rows of the evidence are missing where it tells nothing, those
+        10 cm of the posed surface, and of rows with a deviation for each joint what
+        `pose.confidence` says. Rows of the evidence are missing where it tells nothing, those
         of the radio of another frame where there is one only.
     """
     config = TrainConfig(channel=channel)
@@ -161,7 +163,10 @@ def limb_table(
         "true joints, another body": person.truth,
     }
     surfaces = _Surfaces.of(sequence, person)
-    return {name: _scores(joints, person, surfaces) for name, joints in rows.items()}
+    sure = {name: joints.sigma_m[:, 0] for name, joints in told.items()}
+    return {
+        name: _scores(joints, person, surfaces, sure.get(name)) for name, joints in rows.items()
+    }
 
 
 def _by_network(network: LimbNetwork, person: Person, other: list[int]) -> dict[str, Joints]:
@@ -279,9 +284,12 @@ class _Surfaces:
 
 
 def _scores(
-    joints: Float64[np.ndarray, "frame 17 3"], person: Person, surfaces: _Surfaces
-) -> dict[str, float]:
-    """Mean errors and F-scores of one row."""
+    joints: Float64[np.ndarray, "frame 17 3"],
+    person: Person,
+    surfaces: _Surfaces,
+    sigma_m: Float64[np.ndarray, "frame 17"] | None,
+) -> dict[str, float | None]:
+    """Mean errors and F-scores of one row, and whether joints know how far off they are."""
     error = np.linalg.norm(joints - person.truth, axis=2)
     aligned = (joints - joints[:, :1]) - (person.truth - person.truth[:, :1])
     body, found = people().body(np.zeros(0)), []
@@ -298,4 +306,4 @@ def _scores(
         "wrists_m": float(error[:, WRISTS].mean()),
         "f05": float(f05),
         "f10": float(f10),
-    }
+    } | ({} if sigma_m is None else confidence(error, sigma_m))

@@ -77,7 +77,7 @@ def batch(task: Task, config: TrainConfig, seed: int, step: int) -> tuple[np.nda
     else:
         # Groups in random order until there are enough links, and one group at least.
         order = rng.permutation(int(together.max()) + 1)
-        filled = np.cumsum(np.bincount(together)[order]) - 1
+        filled = np.cumsum(np.bincount(together)[order])
         links = np.flatnonzero(np.isin(together, order[: 1 + np.searchsorted(filled, wanted)]))
     size = 0 if task.points is None else len(task.points.xyz)
     points = rng.choice(size, min(config.batch_points, size), replace=False) if size else []

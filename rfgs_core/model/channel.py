@@ -22,6 +22,7 @@ from rfgs_core.propagation import (
     propagate,
     shadow,
 )
+from rfgs_core.radio.constants import SPEED_OF_LIGHT
 
 
 @dataclass(frozen=True)
@@ -86,14 +87,19 @@ class Channel:
         return propagate(replace(g, gamma=strength), self.links, self.subcarriers)
 
     def shadowed(self, head: RadioHead, gaussians: Gaussians) -> Complex[Tensor, "link subcarrier"]:
-        """What the Gaussians take away from the direct paths: (T − 1) a e^{−j2πfτ}."""
+        """What the Gaussians take away from the direct paths: (T − 1) a (f_c/f) e^{−j2πfτ}.
+
+        Free space weakens a path by λ/(4πd), so what is lost falls along the band (Friis).
+        """
         if len(self.paths) == 0:
             size = len(self.links), self.subcarriers.num_selected
             return gaussians.means.new_zeros(size, dtype=torch.complex64)
         g = head.radio_gaussians(gaussians)
         passed = shadow(g.means, g.quats, g.scales, g.alpha, self.paths)
         lost = environment(passed - 1.0, self.paths, self.subcarriers, len(self.links))
-        return lost.to(torch.complex64)
+        centre_hz = SPEED_OF_LIGHT / self.paths.wavelength_m
+        weaker = (centre_hz / self.subcarriers.freq_hz).to(lost.device)
+        return (lost * weaker).to(torch.complex64)
 
     def change(self, head: RadioHead, gaussians: Gaussians) -> Complex[Tensor, "link subcarrier"]:
         """Csi − csi_static: scattering plus shadow."""

@@ -11,6 +11,7 @@ from scipy.optimize import linear_sum_assignment
 
 from rfgs_core.articulated import fit_shape, people
 from rfgs_core.dataset import Sequence
+from rfgs_core.pose.confidence import confidence, joints_seen
 from rfgs_core.pose.estimate import PoseEstimate, is_low
 from rfgs_core.skeleton import JOINTS
 
@@ -29,6 +30,8 @@ def score_poses(estimate: PoseEstimate, sequence: Sequence) -> dict[str, Any]:
     `identity_kept` is the share of matches with the person that a body had at first, and
     `tracked` the share of people with their body within half a metre. `posture_right` is the share
     of matches of which the run says rightly whether they sit or lie, `seated` the number who do.
+    `joints_seen` is the share of frames and bodies in which each joint counts as seen, and
+    `confidence` whether joints are as far off as is expected; both None where limbs were not told.
     Values are None where no joint is known.
     """
     truth = [sequence.joints(frame).astype(np.float64) for frame in estimate.frames]
@@ -44,6 +47,9 @@ def score_poses(estimate: PoseEstimate, sequence: Sequence) -> dict[str, Any]:
         for body, person in row
     ]
     result |= _heights(estimate.heights_m, truth, matches)
+    sigma_m = estimate.sigma_m
+    result["joints_seen"] = None if sigma_m is None else joints_seen(sigma_m)
+    result["confidence"] = None if sigma_m is None else _confidence(estimate, truth, matches)
     result["tracked"] = float(np.sum(np.array(distance) < LOST_M) / present) if present else None
     result["identity_kept"] = identity_kept([[(int(b), int(p)) for b, p in row] for row in matches])
     floor_m = float(np.asarray(sequence.bounds_m)[0, 2])
@@ -87,6 +93,21 @@ def _errors(
         "joints_m": {name: float(each[:, j].mean()) for j, name in enumerate(JOINTS)},
         "people_m": [float(each[whose == person].mean()) for person in np.unique(whose)],
     }
+
+
+def _confidence(
+    estimate: PoseEstimate,
+    truth: list[Float64[np.ndarray, "person 17 3"]],
+    matches: list[Int64[np.ndarray, "match 2"]],
+) -> dict[str, float | None] | None:
+    """`confidence` of all matches; None where there is none."""
+    assert estimate.sigma_m is not None
+    pairs = [(k, body, person) for k, row in enumerate(matches) for body, person in row]
+    if not pairs:
+        return None
+    offset = np.array([estimate.joints[k, body] - truth[k][person] for k, body, person in pairs])
+    sigma_m = np.array([estimate.sigma_m[k, body] for k, body, _ in pairs])
+    return confidence(np.linalg.norm(offset, axis=2), sigma_m)
 
 
 def _heights(

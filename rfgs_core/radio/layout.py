@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
+from rfgs_core.radio.constants import SPEED_OF_LIGHT
 from rfgs_core.radio.presets import Radio
 from rfgs_core.rotations import rotation_rows
 
@@ -16,6 +18,9 @@ Role = Literal["ACCESS_POINT", "TRANSMITTER", "RECEIVER"]
 
 #: Antennas closer than this have no far field to speak of, and no finite channel at zero [m].
 NEAREST_ANTENNAS_M = 1e-3
+#: Phases along an array change by this much at most between the middle and the ends of the band
+#: where it counts as one place [rad]; tracers carry beams on over the band by a short series.
+_TURNING_RAD = 2.0
 
 
 @dataclass(frozen=True)
@@ -147,7 +152,10 @@ def layout(radio: Radio, devices: list[DevicePose], sample: int = 0) -> Layout:
     )
     senders = [i for i, device in enumerate(devices) if device.role != "RECEIVER"]
     hearers = [i for i, device in enumerate(devices) if device.role != "TRANSMITTER"]
-    far = radio.tx_spacing_m > radio.wavelength_m, radio.rx_spacing_m > radio.wavelength_m
+    far = (
+        radio.tx_spacing_m > radio.wavelength_m or _beams_turn(tx_local, radio),
+        radio.rx_spacing_m > radio.wavelength_m or _beams_turn(rx_local, radio),
+    )
     tx_xyz, tx_device, tx_port, tx_site = _spread(radio, devices, senders, tx_local, far[0])
     rx_xyz, rx_device, rx_port, rx_site = _spread(radio, devices, hearers, rx_local, far[1])
     own = tx_device[:, None] == rx_device[None, :]
@@ -174,6 +182,12 @@ def nearest_m(tx_xyz: Float64[np.ndarray, "tx 3"], rx_xyz: Float64[np.ndarray, "
     return min(float(np.linalg.norm(rx_xyz - place, axis=1).min()) for place in tx_xyz)
 
 
+def _beams_turn(local: Float64[np.ndarray, "element 3"], radio: Radio) -> bool:
+    """Whether an array is so wide for its band that its beams differ from end to end of that."""
+    reach_m = float(np.linalg.norm(local - local.mean(axis=0), axis=1).max())
+    return math.pi * radio.bandwidth_hz / SPEED_OF_LIGHT * reach_m > _TURNING_RAD
+
+
 def _spacing_m(given_m: float, radio: Radio) -> float:
     """Distance of neighbouring elements [m]."""
     return given_m or 0.5 * radio.wavelength_m
@@ -198,6 +212,7 @@ def _spread(
     site = np.repeat(np.arange(len(chosen), dtype=np.int64), ports * len(local))
     device = np.array(chosen, dtype=np.int64)[site]
     if far_apart:
-        # Too far apart to see the same: rays are traced to each element.
+        # Too far apart to see the same, or to be one place over all of the band: rays are traced
+        # to each element.
         site = site * len(local) + np.tile(np.arange(len(local)), ports * len(chosen))
     return np.concatenate([np.zeros((0, 3)), *xyz]), device, port, site

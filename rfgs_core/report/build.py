@@ -23,6 +23,7 @@ from rfgs_core.figures.style import BASELINE, file_uri, picture_uri
 from rfgs_core.files import write_text
 from rfgs_core.render.view import pictures_of
 from rfgs_core.report.cards import headline_cards, in_words, strongest
+from rfgs_core.report.limbs import limbs_of
 from rfgs_core.report.metrics_file import read_metrics
 from rfgs_core.report.page import (
     Page,
@@ -179,6 +180,7 @@ def _section(run: EvaluatedRun, metrics: dict[str, Any]) -> RunSection:
             "How well every frame matches the true moving surface, beside what knows less; the "
             "fit that starts on the truth is a ceiling and does not compete.",
         ),
+        limbs=limbs_of(run),
         motion=_motion(run),
         views=_views(run),
         tables=metric_tables(metrics),

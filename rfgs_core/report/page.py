@@ -74,6 +74,18 @@ class Verdict:
 
 
 @dataclass(frozen=True)
+class LimbSection:
+    """What is known of limbs."""
+
+    chart: Shot
+    """Skeletons, estimated beside true."""
+    sentences: list[str]
+    """How far off joints are, and how many are seen."""
+    table: Table
+    """Each part of the body."""
+
+
+@dataclass(frozen=True)
 class RunSection:
     """Everything about one run."""
 
@@ -95,6 +107,8 @@ class RunSection:
     """Gaussians beside the true mesh."""
     f10: Shot
     """F10 per frame."""
+    limbs: LimbSection | None
+    """Skeletons and joints; None where no limbs were told."""
     motion: Shot | None
     """Gaussians and speeds over time; None of a few frames."""
     views: list[list[Shot]]

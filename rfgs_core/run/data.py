@@ -24,6 +24,22 @@ def need_a_band(sequence: Sequence, radio: str) -> None:
         )
 
 
+def need_one_port(sequence: Sequence, radio: str) -> None:
+    """Refuses radios whose antennas have two polarisations.
+
+    Raises:
+        RfgsError: They have. One reflectivity, and sums over the links of a device pair, hold for
+            one pair of ports: upright antennas hear a body by VV and HH with opposite signs.
+    """
+    spec = sequence.radio_spec(radio)
+    if len(spec.slants_deg) > 1:
+        raise RfgsError(
+            f"{radio} has antennas of two polarisations ({spec.polarization}), whose ports hear a "
+            "body with different signs, which no fit here models; expected a radio file with "
+            "polarization: V or H, traced again"
+        )
+
+
 @lru_cache(maxsize=8)
 def trained_sequence(
     run: Path, place: Path, name: str, fingerprint: str, channel: Observed

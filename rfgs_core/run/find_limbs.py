@@ -91,7 +91,7 @@ def find_limbs(
             )
         return kept
     frames = frames_read(run)
-    seen, tracks, alone = _read(run, frames, config, begin(FIND, len(frames)))
+    frames, seen, tracks, alone = _read(run, frames, config, begin(FIND, len(frames)))
     # A vehicle is a body too, and does not walk.
     only_people = len(alone[0]) == known_people(run)
     walks = only_people and evidence_tells(run, frames)
@@ -133,18 +133,25 @@ def find_limbs(
 
 def _read(
     run: Run, frames: list[int], config: TrainConfig, on_frame: Callable[[], Any]
-) -> tuple[list[Observations], list[Tracks], list[list[Observations]]]:
-    """Frames, where bodies are in each, and each once for each body without the others."""
+) -> tuple[list[int], list[Observations], list[Tracks], list[list[Observations]]]:
+    """Frames, where bodies are in each, and each once for each body without the others.
+
+    Frames beside those of the run in which nobody is heard, since people come and go, are left out.
+    """
+    kept: list[int] = []
     seen: list[Observations] = []
     tracks: list[Tracks] = []
     alone: list[list[Observations]] = []
     for frame in frames:
         seed = sub_seed(config.seed, run.config.sequence, run.config.radio, frame, "fit")
-        seen.append(run.observations(frame))
-        tracks.append(followed(tracks[-1] if tracks else None, seen[-1], config, seed))
-        alone.append(_alone(seen[-1], tracks[-1].axes_xy, config, seed))
+        heard = run.observations(frame)
+        if heard.changed or frame in run.frames:
+            kept.append(frame)
+            seen.append(heard)
+            tracks.append(followed(tracks[-1] if tracks else None, heard, config, seed))
+            alone.append(_alone(heard, tracks[-1].axes_xy, config, seed))
         on_frame()
-    return seen, tracks, alone
+    return kept, seen, tracks, alone
 
 
 def evidence_tells(run: Run, frames: list[int]) -> bool:

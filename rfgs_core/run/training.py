@@ -44,7 +44,7 @@ from rfgs_core.run.checkpoint import (
 )
 from rfgs_core.run.config import REMEDY
 from rfgs_core.run.costs import CostBar, cost_bar, pose_stages, price_line
-from rfgs_core.run.data import need_a_band
+from rfgs_core.run.data import need_a_band, need_one_port
 from rfgs_core.run.encoders import (
     ENCODER_FILE,
     keep_encoder,
@@ -155,6 +155,7 @@ def _train(
 def _check(dataset: Dataset, sequence: Sequence, radio: str, config: TrainConfig) -> None:
     """Refuses settings that do not go together, or ask for what is not there."""
     need_a_band(sequence, radio)
+    need_one_port(sequence, radio)
     need_shared_links(sequence, radio, config)
     need_phases(config)
     need_sample_points(config)

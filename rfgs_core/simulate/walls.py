@@ -20,7 +20,10 @@ from jaxtyping import Complex, Float64
 
 from rfgs_core.errors import RfgsError
 from rfgs_core.radio import Layout, Radio
+from rfgs_core.radio.antennas import field
 from rfgs_core.radio.constants import SPEED_OF_LIGHT
+from rfgs_core.radio.layout import rotation
+from rfgs_core.radio.levels import amplitude_of
 from rfgs_core.radio.materials import MATERIALS
 from rfgs_core.radio.reflection import slab
 from rfgs_core.simulate.geometry.room import Room, SlabMaterial, box_room
@@ -40,6 +43,8 @@ _LINKS = 16
 _NEAREST_M = 0.02
 #: Steps of the search, as a share of the range resolution c/B, and no more than this [m].
 _STEP, _STEP_M = 0.125, 0.02
+#: Least product of the patterns of two ends whose levels are read.
+_LEAST_PATTERN = 0.03
 #: Materials that walls may be made of.
 _MATERIALS = ("plasterboard", "wood", "glass", "concrete", "metal")
 #: Cosines of the angles of incidence over which their reflection is averaged.
@@ -75,8 +80,12 @@ class _Pair(NamedTuple):
     """Receiving element of each [m], shape (link, 3)."""
     residual: np.ndarray
     """What is not explained yet, complex128, shape (link, subcarrier)."""
-    direct: float
-    """Gain of the line of sight."""
+    line: complex
+    """Gain of the line of sight that is taken out."""
+    isolation: float
+    """Amplitude that is left of it."""
+    axes: tuple[np.ndarray, np.ndarray]
+    """World from device of the transmitting and of the receiving one."""
     floor: float
     """Power that counts as unexplained whatever is left."""
 
@@ -102,7 +111,7 @@ def find_walls(
         raise RfgsError("walls are told by delays: expected two subcarriers or more, got 1")
     wavenumber = 2.0 * np.pi * radio.freq_hz / SPEED_OF_LIGHT
     band = float(wavenumber[0]), float(wavenumber[1] - wavenumber[0])
-    pairs = _pairs(csi_static, layout, band)
+    pairs = _pairs(csi_static, layout, radio, band)
     every = np.concatenate([layout.tx_xyz, layout.rx_xyz])
     hull = np.stack([every.min(axis=0), every.max(axis=0)])
     step_m = min(_STEP_M, _STEP * SPEED_OF_LIGHT / radio.bandwidth_hz)
@@ -111,17 +120,18 @@ def find_walls(
     found: list[tuple[Wall, list[complex]]] = []
     while open_sides:
         walls = [_best(pairs, band, axis, high, hull, away) for axis, high in open_sides]
-        wall, gains = _taken(pairs, max(walls, key=lambda wall: wall.gain), band)
+        wall, gains = _taken(pairs, max(walls, key=lambda wall: wall.gain), radio, band)
         if wall.gain < LEAST_GAIN or wall.reflection < LEAST_REFLECTION:
             break
         found.append((wall, gains))
         open_sides.remove((wall.axis, wall.high))
     for _ in range(_ROUNDS):
+        pairs = [_without_line_of_sight(pair, band) for pair in pairs]
         for n, (wall, gains) in enumerate(found):
             for pair, gain in zip(pairs, gains, strict=True):
                 pair.residual[:] += gain * _channel(pair, wall.axis, wall.at_m, band)
             again = _best(pairs, band, wall.axis, wall.high, hull, away)
-            found[n] = _taken(pairs, again, band)
+            found[n] = _taken(pairs, again, radio, band)
     return sorted((wall for wall, _ in found), key=lambda wall: -wall.gain)
 
 
@@ -160,7 +170,9 @@ def room_of_walls(
     return Room(triangles, number, number, materials, plain.source)
 
 
-def _pairs(csi_static: np.ndarray, layout: Layout, band: tuple[float, float]) -> list[_Pair]:
+def _pairs(
+    csi_static: np.ndarray, layout: Layout, radio: Radio, band: tuple[float, float]
+) -> list[_Pair]:
     """Device pairs without their lines of sight."""
     pairs = []
     for a, b in layout.device_pairs:
@@ -170,14 +182,29 @@ def _pairs(csi_static: np.ndarray, layout: Layout, band: tuple[float, float]) ->
         residual = csi_static[tx, rx].astype(np.complex128)
         if not np.abs(residual).any():
             continue
-        pair = _Pair(layout.tx_xyz[tx], layout.rx_xyz[rx], residual, 1.0, 0.0)
-        direct = _take(pair, _waves(pair.tx, pair.rx, *band, residual.shape[1]))
-        pairs.append(
-            pair._replace(direct=max(abs(direct), 1e-30), floor=_MISSED * _power(residual))
-        )
+        quats = layout.tx_quat_wxyz[tx[0]], layout.rx_quat_wxyz[rx[0]]
+        axes = rotation(tuple(quats[0].tolist())), rotation(tuple(quats[1].tolist()))
+        # What weakens the path within a device, beside the patterns of its antennas.
+        own = amplitude_of(-radio.isolation_db) if a == b else 1.0
+        pair = _Pair(layout.tx_xyz[tx], layout.rx_xyz[rx], residual, 0.0j, own, axes, 0.0)
+        pair = _without_line_of_sight(pair, band)
+        pairs.append(pair._replace(floor=_MISSED * _power(residual)))
     if not pairs:
         raise RfgsError("walls: csi_static is zero for every measured link")
     return pairs
+
+
+def _without_line_of_sight(pair: _Pair, band: tuple[float, float]) -> _Pair:
+    """The line of sight taken out anew, beside all else that is."""
+    wave = _waves(pair.tx, pair.rx, *band, pair.residual.shape[1])
+    pair.residual[:] += pair.line * wave
+    return pair._replace(line=_take(pair, wave))
+
+
+def _isotropic_gain(pair: _Pair, radio: Radio) -> float:
+    """Gain of the line of sight between isotropic antennas without isolation."""
+    way = pair.rx.mean(axis=0) - pair.tx.mean(axis=0)
+    return max(abs(pair.line) / (pair.isolation * _pattern_gain(pair, radio, way, -way)), 1e-30)
 
 
 def _power(values: np.ndarray) -> float:
@@ -191,10 +218,31 @@ def _take(pair: _Pair, wave: np.ndarray) -> complex:
     return gain
 
 
-def _taken(pairs: list[_Pair], wall: Wall, band: tuple[float, float]) -> tuple[Wall, list[complex]]:
+def _pattern_gain(pair: _Pair, radio: Radio, out: np.ndarray, back: np.ndarray) -> float:
+    """Product of the patterns of both ends, out of the transmitter and back from the receiver."""
+    both = [
+        np.linalg.norm(field(radio.pattern, 0.0, way[None], axes))
+        for way, axes in zip((out, back), pair.axes, strict=True)
+    ]
+    # In a null of a pattern nothing is told of its level.
+    return max(float(both[0] * both[1]), _LEAST_PATTERN)
+
+
+def _taken(
+    pairs: list[_Pair], wall: Wall, radio: Radio, band: tuple[float, float]
+) -> tuple[Wall, list[complex]]:
     """Takes a wall out of all pairs; the wall with what it reflects, and its gain in each pair."""
-    gains = [_take(pair, _channel(pair, wall.axis, wall.at_m, band)) for pair in pairs]
-    ratios = [abs(gain) / pair.direct for gain, pair in zip(gains, pairs, strict=True)]
+    gains, ratios = [], []
+    for pair in pairs:
+        gains.append(_take(pair, _channel(pair, wall.axis, wall.at_m, band)))
+        ends = pair.tx.mean(axis=0), pair.rx.mean(axis=0)
+        # To the wall and on is as to the image of the other end.
+        out, back = ends[1] - ends[0], ends[0] - ends[1]
+        for way, end, other in ((out, *ends), (back, *ends[::-1])):
+            way[wall.axis] = 2.0 * wall.at_m - other[wall.axis] - end[wall.axis]
+        ratios.append(
+            abs(gains[-1]) / _isotropic_gain(pair, radio) / _pattern_gain(pair, radio, out, back)
+        )
     return wall._replace(reflection=float(np.median(ratios))), gains
 
 

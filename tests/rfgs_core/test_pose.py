@@ -7,9 +7,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import maxwell
 
 from rfgs_core.articulated import people
-from rfgs_core.cli.pose import _missed
+from rfgs_core.cli.pose import _missed, _seen
 from rfgs_core.limbs.evidence.library import upright
 from rfgs_core.pose.body import (
     BONES,
@@ -19,6 +20,7 @@ from rfgs_core.pose.body import (
     index_of,
     joints_of,
 )
+from rfgs_core.pose.confidence import NEAR_M, SEEN_M, confidence
 from rfgs_core.pose.estimate import PoseEstimate, headings_of
 from rfgs_core.pose.fit import Cloud, fit_body, standing
 from rfgs_core.pose.score import score_poses
@@ -153,12 +155,14 @@ def scored(
     truth: np.ndarray,
     seated: np.ndarray | None = None,
     heights_m: np.ndarray | None = None,
+    sigma_m: np.ndarray | None = None,
 ) -> dict:
     """Scores of estimated joints (frame, body, 17, 3) against true ones, on a floor at 0.2 m."""
     sits = np.zeros(joints.shape[:2], bool) if seated is None else seated
     estimate = PoseEstimate(
         *(list(range(len(joints))), np.arange(len(joints)), joints[:, :, 0], joints, sits),
         joints + 0.3,
+        sigma_m=sigma_m,
         heights_m=heights_m,
     )
     bounds_m = np.array([[0.0, 0.0, 0.2], [4.0, 4.0, 2.4]])
@@ -216,6 +220,43 @@ def test_heights_are_those_of_the_people_who_were_matched() -> None:
     nothing_known = scored(found, np.full_like(truth, np.nan), heights_m=np.array([1.81, 1.52]))
     assert nothing_known["heights_m"] == [1.81, 1.52]
     assert nothing_known["true_heights_m"] is None
+
+
+def test_seen_joints_are_those_that_are_expected_to_be_near() -> None:
+    """Of one body the left arm is unsure, and a joint that was sure is far off."""
+    truth = joints_of(parameters(height=1.7), 0.2)[None, None].repeat(4, axis=0)
+    sigma_m, found = np.full((4, 1, 17), 0.02), truth + np.array([0.03, 0.0, 0.0])
+    arm = [JOINTS.index(f"left_{name}") for name in ("elbow", "wrist")]
+    sigma_m[:, :, arm] = 0.12
+    found[:, :, arm] += [0.2, 0.0, 0.0]
+    found[0, 0, JOINTS.index("head")] += [0.0, 0.0, 0.1]
+    result = scored(found, truth, sigma_m=sigma_m)
+    assert result["joints_seen"]["left_wrist"] == 0.0 and result["joints_seen"]["head"] == 1.0
+    assert result["confidence"]["seen"] == pytest.approx(15 / 17)
+    assert result["confidence"]["seen_near"] == pytest.approx(59 / 60)
+    error_m = np.linalg.norm(found - truth, axis=3)
+    assert result["confidence"]["error_over_sigma"] == pytest.approx(error_m.sum() / sigma_m.sum())
+    printed = _seen(sigma_m, result["confidence"])
+    assert "88 % of joints" in printed and "98 % of these" in printed
+    assert "unsure    left elbow, left wrist\n" in printed
+    assert scored(found, truth)["confidence"] is None
+    # Nobody's joints are known: what is seen is said, not whether it is right.
+    unknown = scored(found, np.full_like(truth, np.nan), sigma_m=sigma_m)
+    assert unknown["confidence"] is None and unknown["joints_seen"]["head"] == 1.0
+
+
+def test_errors_as_large_as_expected_are_told_from_smaller_ones() -> None:
+    """Of errors that are normal and alike along the axes the mean length is 1.596 deviations."""
+    drawn = np.linalg.norm(np.random.default_rng(0).normal(size=(4000, 17, 3)), axis=2)
+    error_m = SEEN_M / np.sqrt(8.0 / np.pi) * drawn
+    result = confidence(error_m, np.full_like(error_m, SEEN_M))
+    assert result["seen"] == 1.0 and result["error_over_sigma"] == pytest.approx(1.0, abs=0.01)
+    # Maxwell's distribution at 2.13 deviations.
+    assert result["seen_near"] == pytest.approx(maxwell.cdf(NEAR_M / SEEN_M * 1.596), abs=0.01)
+    unsure = confidence(error_m, np.full_like(error_m, 2.0 * SEEN_M))
+    assert unsure == {
+        "seen": 0.0, "seen_near": None, "error_over_sigma": pytest.approx(0.5, abs=0.01)
+    }  # fmt: skip
 
 
 def test_errors_say_of_how_many_people_they_are() -> None:

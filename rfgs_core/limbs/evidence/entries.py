@@ -67,6 +67,11 @@ class Bands(NamedTuple):
     share: Float64[np.ndarray, "block"]
     """What subcarriers of a block are multiplied by."""
 
+    @property
+    def half_k(self) -> float:
+        """Half of the band's width [1/m]."""
+        return 0.5 * abs(self.step_k) * len(self.block)
+
     @staticmethod
     def of(
         freq_hz: Float64[np.ndarray, "subcarrier"], visible: Bool[np.ndarray, "subcarrier"]

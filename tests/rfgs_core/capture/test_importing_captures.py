@@ -57,6 +57,18 @@ def refused(arguments: list[str], capsys) -> str:
     return lines[0]
 
 
+def test_a_rotation_of_any_length_is_the_same_rotation(tmp_path: Path) -> None:
+    """(1, 0, 0, 1) is a quarter turn; taken as it stands it would stretch the array to twice."""
+    files.intel5300_file(tmp_path / "a.dat", packets=300)
+    turned = PAIR.replace("position_m: [3, 0, 1]", "position_m: [3, 0, 1], quat_wxyz: [1, 0, 0, 1]")
+    sequence = imported(tmp_path, tmp_path / "a.dat", layout=turned)
+    receiver = next(row for row in sequence.devices("wifi") if row.name == "rx")
+    np.testing.assert_allclose(receiver.quat_wxyz, [0.5**0.5, 0.0, 0.0, 0.5**0.5])
+    np.testing.assert_allclose(
+        sequence.coordinates("wifi")["rx_quat_wxyz"][0], [0.5**0.5, 0.0, 0.0, 0.5**0.5]
+    )
+
+
 def test_intel_packets_survive_to_the_bit(tmp_path: Path) -> None:
     antennas = files.intel5300_file(tmp_path / "a.dat", packets=300)
     sequence = imported(tmp_path, tmp_path / "a.dat")

@@ -164,3 +164,14 @@ def test_pairs_are_numbered_by_their_devices() -> None:
     pair, names = elements.pairs_of(use)
     assert names == [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2)]
     assert pair.tolist() == [[0, 1, 1, -1], [0, 1, 1, 2], [-1, 3, 3, 4]]
+
+
+@pytest.mark.parametrize(("columns", "places"), [(2, 1), (8, 8)])
+def test_beams_that_turn_over_the_band_have_a_place_for_each_element(
+    columns: int, places: int
+) -> None:
+    """Half a wavelength apart, but 0.15 m wide over 7.5 GHz: 6 rad from the band's middle on."""
+    radio = replace(preset("uwb"), rx_cols=columns, rx_spacing_m=0.0)
+    assert len(np.unique(layout(radio, [UPRIGHT]).rx_site)) == places
+    narrow = replace(preset("mmwave"), rx_cols=32)
+    assert len(np.unique(layout(narrow, [UPRIGHT]).rx_site)) == 1

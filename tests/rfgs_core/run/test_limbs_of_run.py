@@ -28,6 +28,7 @@ from rfgs_core.limbs.network import LimbNetwork
 from rfgs_core.limbs.postures.tell import Told as Posture
 from rfgs_core.limbs.propose import Joints
 from rfgs_core.limbs.weights import save_network
+from rfgs_core.measure.observations import Observations
 from rfgs_core.radio.presets import preset
 from rfgs_core.run import Run
 from rfgs_core.run import find_limbs as limbs_of_run
@@ -319,6 +320,25 @@ def test_frames_between_those_of_the_run_are_read_too(limbed: Run) -> None:
     near = open_dataset(limbed.path / limbed.config.dataset).sequence()
     apart_s = abs(near.time_s(2) - near.time_s(1))
     assert frames_read(one) == ([1, 2] if apart_s <= 0.4 else [1])
+
+
+def test_frames_beside_the_run_in_which_nobody_is_heard_are_left_out(limbed: Run) -> None:
+    """People come and go: who asks for frames with somebody in them does not ask for the others."""
+
+    class Before:
+        """A run whose other frames are those of the empty room."""
+
+        frames, path, config, sequence = [1], limbed.path, limbed.config, limbed.sequence
+
+        def observations(self, frame: int) -> Observations:
+            seen = limbed.observations(frame)
+            return seen if frame == 1 else seen.with_delta(np.zeros_like(seen.delta))
+
+    settings = limbed.config.settings
+    frames, seen, tracks, alone = limbs_of_run._read(Before(), [1, 2], settings, lambda: None)  # type: ignore[arg-type]
+    assert frames == [1] and len(seen) == len(tracks) == len(alone) == 1
+    both = limbs_of_run._read(limbed, [1, 2], settings, lambda: None)[0]
+    assert both == [1, 2]
 
 
 def test_poses_come_from_the_limbs(limbed: Run, capsys: pytest.CaptureFixture[str]) -> None:

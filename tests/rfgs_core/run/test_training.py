@@ -13,7 +13,7 @@ import torch
 import zarr
 
 from rfgs_core.bodies import posture
-from rfgs_core.dataset import open_dataset
+from rfgs_core.dataset import Sequence, open_dataset
 from rfgs_core.dataset.csi_store import digest
 from rfgs_core.dataset.names import SequenceFiles
 from rfgs_core.errors import RfgsError, RfgsFormatError
@@ -28,6 +28,7 @@ from rfgs_core.run import Run, open_run
 from rfgs_core.run.begun import finished_run
 from rfgs_core.run.training import train_sequence
 from rfgs_core.seals import write_sealed_json
+from rfgs_core.settings import TrainConfig
 
 RESULTS = [
     "gaussians/000001.features.npz",
@@ -315,3 +316,26 @@ def test_curves_are_logged_on_request(
     assert [entry.value for entry in events.Scalars("frame 000001/Gaussians")] == [40.0] * 4
     name = "gaussians/000001.ply"
     assert (out / name).read_bytes() == (trained_run.path / name).read_bytes()
+
+
+def test_antennas_of_two_polarisations_are_refused(
+    tiny_dataset: Path, tmp_path: Path, quick_config, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """VV and HH of a body have opposite signs: what is summed over both is nothing at all."""
+    own = Sequence.radio_spec
+    monkeypatch.setattr(
+        Sequence, "radio_spec", lambda self, name: replace(own(self, name), polarization="VH")
+    )
+    dataset = open_dataset(tiny_dataset)
+    sequence = dataset.sequence()
+    with pytest.raises(RfgsError, match=r"two polarisations \(VH\).*polarization: V or H"):
+        train_sequence(dataset, sequence, "wifi", [1], quick_config, tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("part", ["densify", "prune", "feature_gradients"])
+def test_parts_of_a_rule_that_is_not_followed_cannot_be_left_out(part) -> None:
+    with pytest.raises(RfgsError, match=f"--without {part} .* --density none has others"):
+        TrainConfig(objective="paper", density="none", without=(part,))
+    assert TrainConfig(objective="paper", density="paper", without=(part,)).without == (part,)
+    assert TrainConfig(objective="paper", density="none", without=("rf_weights",))

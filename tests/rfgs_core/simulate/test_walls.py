@@ -76,3 +76,24 @@ def test_phases_between_devices_do_not_matter() -> None:
     one, other = (find_walls(channel, elements, RADIO) for channel in (csi, turned))
     assert [wall.name for wall in one] == [wall.name for wall in other]
     np.testing.assert_allclose([w.at_m for w in one], [w.at_m for w in other], atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"isolation_db": 40.0},
+        {"isolation_db": 40.0, "own_device_links": "only"},
+        {"pattern": "tr38901"},
+    ],
+)
+def test_neither_isolation_nor_pattern_turns_walls_into_metal(changes: dict) -> None:
+    """What walls reflect is told beside a line of sight that has lost its level."""
+    radio = replace(RADIO, **changes)
+    room = box_room(BOX[0], BOX[1], SlabMaterial("plasterboard", 0.0125))
+    places, nobody = place_devices(radio, BOX), Movers.none()
+    static = FastTracer(room, nobody, nobody, radio, places).static()
+    walls = find_walls(static, layout(radio, places), radio)
+    upright = [wall.reflection for wall in walls if wall.axis < 2]
+    assert len(upright) == 4
+    # Plasterboard reflects 0.2 to 0.4 over the angles that are met.
+    assert 0.08 < min(upright) and max(upright) < 0.7

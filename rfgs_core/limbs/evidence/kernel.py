@@ -91,15 +91,16 @@ def covariance(
         images: Ends that are mirrored; the covariances by way of each are added up.
     """
     tx, rx, bands = pair.tx, pair.rx, pair.bands
-    arrays = [
-        *facets, by_tx, by_rx, *images, tx.xyz, rx.xyz, tx.steered_m, rx.steered_m,
-        tx.block, rx.block, tx.share, rx.share,
-    ]  # fmt: skip
-    first_k, step_k, middle_k, block, share = bands
+    ends = (
+        tx.xyz, rx.xyz, tx.steered_m, rx.steered_m, tx.block, rx.block, tx.share, rx.share
+    )  # fmt: skip
     if max(_width_m(tx.xyz), _width_m(rx.xyz)) * bands.half_k > _TURNING_RAD:
-        rows = wide_responses(*arrays, first_k, step_k, block, share, lobe_rad)
+        rows = wide_responses(
+            *facets, by_tx, by_rx, *images, *ends,
+            bands.first_k, bands.step_k, bands.block, bands.share, lobe_rad,
+        )  # fmt: skip
     else:
-        rows = responses(*arrays, first_k, step_k, middle_k, block, share, lobe_rad)
+        rows = responses(*facets, by_tx, by_rx, *images, *ends, *bands, lobe_rad)
     return product_with_itself(rows)
 
 

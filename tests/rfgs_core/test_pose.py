@@ -11,6 +11,7 @@ from scipy.stats import maxwell
 
 from rfgs_core.articulated import people
 from rfgs_core.cli.pose import _missed, _seen
+from rfgs_core.figures.poses import ahead
 from rfgs_core.limbs.evidence.library import upright
 from rfgs_core.pose.body import (
     BONES,
@@ -243,6 +244,16 @@ def test_seen_joints_are_those_that_are_expected_to_be_near() -> None:
     # Nobody's joints are known: what is seen is said, not whether it is right.
     unknown = scored(found, np.full_like(truth, np.nan), sigma_m=sigma_m)
     assert unknown["confidence"] is None and unknown["joints_seen"]["head"] == 1.0
+
+
+@pytest.mark.parametrize("heading", [0.4, 0.4 + np.pi, -0.7, 2.2])
+def test_skeletons_are_looked_at_from_the_side(heading: float) -> None:
+    """Whichever way along their line people go, and though they pass each other."""
+    there = joints_of(parameters(**(STRIDE | {"heading": heading})), 0.0)
+    back = joints_of(parameters(**(STRIDE | {"heading": heading + np.pi, "x": 3.0})), 0.0)
+    found = ahead(np.stack([there, back])[None])
+    assert -0.25 * np.pi < found <= 0.75 * np.pi
+    assert abs(np.sin(found - heading)) < 0.05
 
 
 def test_errors_as_large_as_expected_are_told_from_smaller_ones() -> None:

@@ -29,7 +29,9 @@ from rfgs_core.limbs.postures.tell import Told as Posture
 from rfgs_core.limbs.propose import Joints
 from rfgs_core.limbs.weights import save_network
 from rfgs_core.measure.observations import Observations
+from rfgs_core.pose import estimate_poses, score_poses
 from rfgs_core.radio.presets import preset
+from rfgs_core.report.limbs import limbs_of
 from rfgs_core.run import Run
 from rfgs_core.run import find_limbs as limbs_of_run
 from rfgs_core.run.find_limbs import frames_read
@@ -339,6 +341,19 @@ def test_frames_beside_the_run_in_which_nobody_is_heard_are_left_out(limbed: Run
     assert frames == [1] and len(seen) == len(tracks) == len(alone) == 1
     both = limbs_of_run._read(limbed, [1, 2], settings, lambda: None)[0]
     assert both == [1, 2]
+
+
+def test_reports_say_which_joints_are_seen(limbed: Run, small_run: Run) -> None:
+    section = limbs_of(limbed)
+    assert section is not None and limbs_of(small_run) is None
+    assert section.chart.uri.startswith("data:image/png;base64,")
+    scores = score_poses(estimate_poses(limbed), limbed.sequence)
+    table = {row.label: [cell.text for cell in row.cells] for row in section.table.rows}
+    wrists = [scores["fit"]["joints_m"][f"{side}_wrist"] for side in ("left", "right")]
+    assert table["wrists"][2] == f"{np.mean(wrists):.3f}"
+    share = 100.0 * np.mean([scores["joints_seen"][f"{side}_knee"] for side in ("left", "right")])
+    assert table["knees"][0] == f"{share:.0f}"
+    assert f"{scores['fit']['mpjpe_m']:.3f} m off on average" in section.sentences[0]
 
 
 def test_poses_come_from_the_limbs(limbed: Run, capsys: pytest.CaptureFixture[str]) -> None:

@@ -126,4 +126,5 @@ def _seen(
             f"; {100 * confidence['seen_near']:.0f} % of these are within {NEAR_M:g} m (mean "
             f"error over mean expected error {confidence['error_over_sigma']:.2f})"
         )
-    return lines + "\n" + (f"unsure    {', '.join(unsure)}\n" if unsure else "")
+    named = 0 < len(unsure) < len(of_joints)
+    return lines + "\n" + (f"unsure    {', '.join(unsure)}\n" if named else "")

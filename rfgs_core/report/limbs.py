@@ -65,8 +65,8 @@ def _sentences(scores: Mapping[str, Any]) -> list[str]:
         return [*sentences, f"No joint is expected within {SEEN_M:g} m."]
     return [
         *sentences,
-        f"{share} % of the joints count as seen; {show(100.0 * confidence['seen_near'], 0)} % of "
-        f"these are within {NEAR_M:g} m.",
+        f"{share}\u00a0% of the joints count as seen, {show(100.0 * confidence['seen_near'], 0)}"
+        f"\u00a0% of these are within {NEAR_M:g} m.",
     ]
 
 

@@ -6,13 +6,8 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import tyro
-
-if TYPE_CHECKING:
-    import numpy as np
-    from jaxtyping import Float64
 
 
 @dataclass(frozen=True)
@@ -80,8 +75,8 @@ def run(args: PoseArgs) -> int:
             f"{scores['people']} sit)\n{_missed(scores['matched'], scores['people'])}"
         )
     sys.stdout.write(_height(scores["heights_m"], scores["true_heights_m"]))
-    if estimate.sigma_m is not None:
-        sys.stdout.write(_seen(estimate.sigma_m, scores["confidence"]))
+    if scores["joints_seen"] is not None:
+        sys.stdout.write(_seen(scores["joints_seen"], scores["confidence"]))
     sys.stdout.write(f"{args.run / 'pose.png'} written\n")
     return 0
 
@@ -111,13 +106,10 @@ def _height(told_m: list[float] | None, true_m: list[float] | None) -> str:
     return f"height    {told} m" + (f"; by the true limbs {true} m\n" if true else "\n")
 
 
-def _seen(
-    sigma_m: Float64[np.ndarray, "frame body 17"], confidence: dict[str, float | None] | None
-) -> str:
+def _seen(of_joints: dict[str, float], confidence: dict[str, float | None] | None) -> str:
     """Lines of which joints count as seen, and whether that holds."""
-    from rfgs_core.pose.confidence import NEAR_M, SEEN_M, joints_seen
+    from rfgs_core.pose.confidence import NEAR_M, SEEN_M
 
-    of_joints = joints_seen(sigma_m)
     unsure = [name.replace("_", " ") for name, share in of_joints.items() if share < 0.5]
     share = sum(of_joints.values()) / len(of_joints)
     lines = f"seen      {100 * share:.0f} % of joints, expected within {SEEN_M:g} m"

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from jaxtyping import Float64
 
@@ -38,7 +36,7 @@ def confidence(
     }
 
 
-def joints_seen(sigma_m: Float64[np.ndarray, "*frame 17"]) -> dict[str, Any]:
+def joints_seen(sigma_m: Float64[np.ndarray, "*frame 17"]) -> dict[str, float]:
     """Share of frames and bodies in which each joint counts as seen, by its name."""
     seen = (sigma_m <= SEEN_M).reshape(-1, len(JOINTS)).mean(axis=0)
     return dict(zip(JOINTS, seen.tolist(), strict=True))

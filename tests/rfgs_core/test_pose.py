@@ -237,7 +237,7 @@ def test_seen_joints_are_those_that_are_expected_to_be_near() -> None:
     assert result["confidence"]["seen_near"] == pytest.approx(59 / 60)
     error_m = np.linalg.norm(found - truth, axis=3)
     assert result["confidence"]["error_over_sigma"] == pytest.approx(error_m.sum() / sigma_m.sum())
-    printed = _seen(sigma_m, result["confidence"])
+    printed = _seen(result["joints_seen"], result["confidence"])
     assert "88 % of joints" in printed and "98 % of these" in printed
     assert "unsure    left elbow, left wrist\n" in printed
     assert scored(found, truth)["confidence"] is None

@@ -89,11 +89,13 @@ def _band_responses(
 @numba.njit(forceinline=True, cache=True, nogil=True, fastmath=FAST_MATH)
 def _lit(
     points: np.ndarray, normals: np.ndarray, root_area: np.ndarray, by_tx: np.ndarray,
-    by_rx: np.ndarray, end: np.ndarray, axis: np.ndarray, at: np.ndarray, mid: np.ndarray,
-    steered_m: float, lobe: float,
+    by_rx: np.ndarray, end: np.ndarray, axis: np.ndarray, at: np.ndarray, tx: np.ndarray,
+    rx: np.ndarray, steered_m: float, lobe: float,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
     """What counts: places as each end sees them (end, 3, N), path beyond a length [m], weights."""
-    mirrored = np.zeros((2, 3))
+    mid, mirrored = np.zeros((2, 3)), np.zeros((2, 3))
+    for i in range(3):
+        mid[0, i], mid[1, i] = tx[:, i].mean(), rx[:, i].mean()
     most, used = len(end) * len(points), 0
     # Where facets are for each end: mirrored in its stead, which leaves distances the same.
     sees = np.zeros((2, 3, most))
@@ -136,11 +138,8 @@ def responses(
 
     Across the band only the length of the path counts, not that within the arrays.
     """
-    mid = np.zeros((2, 3))
-    for i in range(3):
-        mid[0, i], mid[1, i] = tx[:, i].mean(), rx[:, i].mean()
     by_end, late, strength = _lit(
-        points, normals, root_area, by_tx, by_rx, end, axis, at, mid,
+        points, normals, root_area, by_tx, by_rx, end, axis, at, tx, rx,
         tx_steered.mean() + rx_steered.mean(), lobe,
     )  # fmt: skip
     per_m = 1.0 / (2.0 * math.pi)
@@ -170,11 +169,9 @@ def wide_responses(
     first_k: float, step_k: float, band: np.ndarray, band_share: np.ndarray, lobe: float,
 ) -> np.ndarray:  # fmt: skip
     """The same where beams turn across the band: each of its parts has its own wavenumber."""
-    mid, per_m = np.zeros((2, 3)), 1.0 / (2.0 * math.pi)
-    for i in range(3):
-        mid[0, i], mid[1, i] = tx[:, i].mean(), rx[:, i].mean()
+    per_m = 1.0 / (2.0 * math.pi)
     by_end, _, strength = _lit(
-        points, normals, root_area, by_tx, by_rx, end, axis, at, mid, 0.0, lobe
+        points, normals, root_area, by_tx, by_rx, end, axis, at, tx, rx, 0.0, lobe
     )
     late = _mean_late(by_end[0], tx, tx_steered) + _mean_late(by_end[1], rx, rx_steered)
     weight, bands = strength.astype(np.float32), len(band_share)
